@@ -1,0 +1,46 @@
+# The front door. `make` alone lists what there is.
+SHELL := /bin/bash
+.SHELLFLAGS := -eo pipefail -c
+.DEFAULT_GOAL := help
+.PHONY: help build demo test bench bench-diagnosis lint format lock clean distclean
+
+PACKAGE := ros2_ws/src/paint_deposition
+IN_ENVIRONMENT := source setup/environment.sh;
+PIN := .venv/bin/uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest \
+	--no-annotate --custom-compile-command 'make lock' --upgrade
+
+help:  ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
+
+build:  ## set up the environment and the workspace (minutes at first, then at once)
+	@setup/build.sh
+
+demo: build  ## paint a door through the nodes, recommend an index, explain a measured door
+	@$(IN_ENVIRONMENT) python demo/demo.py runs/demo
+
+test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
+	@$(IN_ENVIRONMENT) pytest $(ARGS)
+
+bench: build  ## measure the speed of simulation and nodes
+	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)
+
+bench-diagnosis: build  ## score the diagnosis on doors with known defects
+	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
+
+lint: build  ## check style and types
+	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy
+
+format: build  ## put imports and layout in order
+	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .
+
+lock: build  ## pin the newest versions that every supported Python can have
+	$(PIN) requirements/core.in -o requirements/core.txt
+	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
+	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
+
+clean:  ## remove what was built, keep the environment
+	rm -rf ros2_ws/{build,install,log} .setup .{pytest,mypy,ruff}_cache .hypothesis
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+distclean: clean  ## remove the environment too
+	rm -rf .venv

@@ -1,0 +1,90 @@
+# shellcheck shell=bash
+# Where things are and how the set-up speaks; sourced by the scripts beside it.
+
+root=$(cd -- "$(dirname -- "${BASH_SOURCE[0]}")/.." && pwd -P)
+venv=$root/.venv
+workspace=$root/ros2_ws
+log=$root/.setup/setup.log
+
+say() {
+    printf '%s\n' "$*"
+}
+
+fail() {
+    printf '%s\n' "$@" >&2
+    exit 1
+}
+
+# logged WHAT COMMAND...: runs the command into the log; when it fails, shows the end and names the log.
+logged() {
+    local what=$1 started=$SECONDS
+    shift
+    say "$what ..."
+    printf '\n== %s: %s\n' "$what" "$*" >>"$log"
+    if ! "$@" >>"$log" 2>&1 </dev/null; then
+        tail -n 15 "$log" >&2
+        fail "'$what' failed after $((SECONDS - started)) s. The whole log: $log"
+    fi
+}
+
+# Where ROS 2 comes from: the distribution that is sourced, else the one this environment was made
+# with, else 'wheels'.
+ros_source() {
+    local made_with=wheels
+    [[ ! -f $venv/.ros_source ]] || made_with=$(<"$venv/.ros_source")
+    printf '%s\n' "${ROS_DISTRO:-$made_with}"
+}
+
+# What the Python environment is made from.
+environment_fingerprint() {
+    {
+        printf '%s\n' "$root" "$(ros_source)"
+        cat "$root"/requirements/*.txt "$root"/setup/{python_environment.sh,repair_cmake_exports.py}
+    } | sha256sum
+}
+
+# What compiled messages depend on besides their own sources.
+toolchain_fingerprint() {
+    {
+        printf '%s\n' "$root" "$(ros_source)"
+        grep '^version' "$venv/pyvenv.cfg"
+        cat "$root/requirements/ros.txt" "$root/setup/workspace.sh"
+    } | sha256sum
+}
+
+# sources_fingerprint linked|copied: the sources as far as an install does not follow them by
+# itself. One made of links follows what is inside Python modules and shared files.
+sources_fingerprint() {
+    local package=$workspace/src/paint_deposition
+    {
+        find "$workspace/src/paint_msgs" "$package"/{setup.py,setup.cfg,package.xml,resource} \
+            -type f -print0 | sort -z | xargs -0 sha256sum
+        find "$package" \( -path '*/launch/*' -o -path '*/config/*' -o -path '*/samples/*' \) \
+            -type f -not -path '*/__pycache__/*' | sort
+        if [[ $1 == copied ]]; then
+            find "$package" -type f -not -path '*/__pycache__/*' -print0 \
+                | sort -z | xargs -0 sha256sum
+        fi
+    } | sha256sum
+}
+
+install_kind() {
+    if [[ -L $workspace/build/paint_deposition/paint_deposition ]]; then
+        echo linked
+    else
+        echo copied
+    fi
+}
+
+# The fingerprint files are removed before anything is changed and written when all is done:
+# what was interrupted has none, and is made from nothing.
+environment_is_current() {
+    [[ -x $venv/bin/python && -f $venv/.fingerprint ]] \
+        && [[ $(<"$venv/.fingerprint") == "$(environment_fingerprint)" ]]
+}
+
+workspace_is_current() {
+    [[ -f $workspace/install/.fingerprint ]] \
+        && [[ $(<"$workspace/install/.fingerprint") == \
+            "$(toolchain_fingerprint; sources_fingerprint "$(install_kind)")" ]]
+}
