@@ -1,0 +1,1 @@
+"""Film thickness of rotary bell spray painting: simulation, calibration, diagnosis."""

@@ -1,0 +1,1 @@
+"""The integral of flux over the way: the film at every point, and its statistics."""

@@ -1,0 +1,125 @@
+"""Exponential and logarithm that a compiler can vectorise, for code inside the kernel.
+
+The C library's functions are calls and stop SIMD. These are near-minimax polynomials after an
+exact range reduction, good to a few units in the last place of the result, times the magnitude
+of the exponent. Outside compiled code they are the C library's.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numba import types
+from numba.extending import overload, register_jitable
+
+# Fused multiply-add only: the rest of fast-math would cancel the rounding to an integer.
+WITHOUT_REORDERING = {'fastmath': {'contract'}}
+
+
+def exp2(x):
+    """2**x; below -120 (single) or -1000 (double) the result stays at that floor."""
+    return 2.0**x
+
+
+def exp(x):
+    """e**x; below -83 (single) or -693 (double) the result stays at that floor."""
+    return math.exp(x)
+
+
+def log(x):
+    """Natural logarithm of a positive, normal number."""
+    return math.log(x)
+
+
+@register_jitable
+def power(x, exponent):
+    """A positive, normal number to any power."""
+    return exp(exponent * log(x))
+
+
+@overload(exp2, jit_options=WITHOUT_REORDERING)
+def _exp2(x):
+    if x == types.float32:
+        return _exp2_of(np.float32, np.int32, 23, -120.0, 5)
+    if x == types.float64:
+        return _exp2_of(np.float64, np.int64, 52, -1000.0, 11)
+    return None
+
+
+@overload(exp, jit_options=WITHOUT_REORDERING)
+def _exp(x):
+    if x not in (types.float32, types.float64):
+        return None
+    log2_e = (np.float32 if x == types.float32 else np.float64)(math.log2(math.e))
+    return lambda x: exp2(x * log2_e)
+
+
+def _exp2_terms(degree: int) -> list[float]:
+    """Polynomial of least relative error over -0.5 to 0.5, exactly 1 at 0: any power 0 is 1."""
+    x = 0.5 * np.cos(np.pi * (np.arange(4 * degree) + 0.5) / (4 * degree))
+    powers = np.arange(1, degree + 1)
+    columns = (2.0 * x[:, np.newaxis]) ** powers
+    relative = np.exp2(-x)
+    wanted = np.expm1(x * math.log(2.0))
+    fit = np.linalg.lstsq(columns * relative[:, np.newaxis], wanted * relative, rcond=None)[0]
+    return [1.0, *(fit * 2.0**powers).tolist()]
+
+
+def _exp2_of(real, integer, mantissa_bits, floor, degree):
+    polynomial = _horner([real(term) for term in _exp2_terms(degree)])
+    lowest, shift = real(floor), integer(mantissa_bits)
+    # Adding this number leaves the nearest integer in the lowest bits of the mantissa.
+    round_off = real(1.5 * 2.0**mantissa_bits)
+
+    def exp2_by_polynomial(x):
+        x = max(x, lowest)
+        rounded = real(x + round_off)
+        fraction = x - (rounded - round_off)
+        exponent = integer(rounded.view(integer) << shift)
+        return integer(real(polynomial(fraction)).view(integer) + exponent).view(real)
+
+    return exp2_by_polynomial
+
+
+@overload(log, jit_options=WITHOUT_REORDERING)
+def _log(x):
+    if x == types.float32:
+        return _log_of(np.float32, np.int32, 23, [2.0 / n for n in range(1, 11, 2)])
+    if x == types.float64:
+        return _log_of(np.float64, np.int64, 52, [2.0 / n for n in range(1, 25, 2)])
+    return None
+
+
+def _log_of(real, integer, mantissa_bits, terms):
+    # ln(2^n m) = n ln 2 + 2 atanh((m - 1) / (m + 1)), with m between 1/sqrt 2 and sqrt 2.
+    ln2, one, shift = real(math.log(2.0)), real(1.0), integer(mantissa_bits)
+    root_half = real(math.sqrt(0.5)).view(integer)
+    series = _horner([real(term) for term in terms])
+
+    def log_by_series(x):
+        bits = integer(real(x).view(integer) - root_half)
+        n = integer(bits >> shift)
+        mantissa = integer((bits - integer(n << shift)) + root_half).view(real)
+        w = (mantissa - one) / (mantissa + one)
+        return real(n) * ln2 + w * series(w * w)
+
+    return log_by_series
+
+
+def _horner(terms: Sequence[float]) -> Callable[[float], float]:
+    """A polynomial, lowest power first, as nested compiled functions."""
+    value = terms[0]
+    if len(terms) == 1:
+
+        @register_jitable
+        def constant(x):
+            return value
+
+        return constant
+    higher = _horner(terms[1:])
+
+    @register_jitable
+    def nested(x):
+        return value + x * higher(x)
+
+    return nested

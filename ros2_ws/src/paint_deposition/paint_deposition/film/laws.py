@@ -1,0 +1,73 @@
+"""Laws of effects made ready for the kernel: in its precision, and multiplied."""
+
+from collections.abc import Callable, Sequence
+from types import FunctionType
+
+from numba.extending import register_jitable
+
+Law = Callable[..., float]
+
+
+def in_precision(law: Law, real: type) -> Law:
+    """The law with its numbers in the kernel's precision.
+
+    A literal 1.0 is of double precision, and one is enough to carry a whole loop over single
+    precision into double and halve its speed. So the numbers in the law's code, and those of its
+    module that it names, are replaced by ones of type ``real``.
+    """
+    code = law.__code__
+    constants = tuple(_as_real(value, real) for value in code.co_consts)
+    named = {
+        name: _as_real(law.__globals__[name], real)
+        for name in code.co_names
+        if name in law.__globals__
+    }
+    return FunctionType(
+        code.replace(co_consts=constants),
+        law.__globals__ | named,
+        law.__name__,
+        law.__defaults__,
+        law.__closure__,
+    )
+
+
+def _as_real(value: object, real: type) -> object:
+    return real(value) if _is_number(value) else value
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:
+    """The laws' product as one function (ray, parameters) for compiled code.
+
+    Args:
+        laws: each with how many parameters it takes.
+        real: precision of the kernel.
+        offset: where in the flat parameters those of the first law begin.
+    """
+    if not laws:
+
+        @register_jitable
+        def one(ray, parameters):
+            return real(1.0)
+
+        return one
+    (law, count), rest = laws[0], laws[1:]
+    head = register_jitable(in_precision(law, real))
+    end = offset + count
+    if not rest:
+
+        @register_jitable
+        def last(ray, parameters):
+            return head(ray, *parameters[offset:end])
+
+        return last
+    tail = product(rest, real, end)
+
+    @register_jitable
+    def both(ray, parameters):
+        return head(ray, *parameters[offset:end]) * tail(ray, parameters)
+
+    return both

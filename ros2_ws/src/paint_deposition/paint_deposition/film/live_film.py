@@ -1,0 +1,187 @@
+"""The film of a motion that is still under way."""
+
+import copy
+from collections.abc import Iterable
+
+import numpy as np
+
+from paint_deposition.film.deposition import FilmIntegrator, Occluder, Precision
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.motion_log import (
+    DEFAULT_LIMIT_POSES,
+    MotionLog,
+    PoseBatch,
+    TriggerChange,
+    merged,
+)
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
+from paint_deposition.motion.trajectory import PoseCounts
+from paint_deposition.part.points import SurfacePoints
+
+DEFAULT_TRIGGER_LATENCY_S = 0.1
+# A trigger change so much older than the newest pose is from a stream that begins again [ns].
+ANOTHER_STREAM_NS = 1_000_000_000
+
+
+class LiveFilm:
+    """Paints as poses and trigger changes come, and can paint the same motion again.
+
+    Poses wait until one is newer by the trigger's latency, measured by their stamps: a change of
+    the trigger that comes a little later than the poses around it still cuts where it belongs.
+    However the poses were batched, the film is the same to the last bit, and the same as that of
+    an offline run.
+
+    Without any trigger change the gun always sprays; once one was seen, the gun was off before
+    it, as in a recording. What was painted up to then is taken back.
+
+    Args:
+        points: where the film is wanted.
+        model: the deposition model with its effects.
+        precision, occluder: as for ``FilmIntegrator``.
+        max_pose_gap_s: a longer time between two poses is gun off [s].
+        trigger_latency_s: how much later than poses of its time a trigger change may come [s].
+        limit_poses: poses to remember, so that they can be painted with another model.
+    """
+
+    def __init__(
+        self,
+        points: SurfacePoints,
+        model: DepositionModel,
+        *,
+        precision: Precision = 'single',
+        occluder: Occluder | None = None,
+        max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+        trigger_latency_s: float = DEFAULT_TRIGGER_LATENCY_S,
+        limit_poses: int = DEFAULT_LIMIT_POSES,
+    ) -> None:
+        self.max_pose_gap_s = max_pose_gap_s
+        self.trigger_latency_s = trigger_latency_s
+        self._limit_poses = limit_poses
+        self._integrator = FilmIntegrator(points, model, precision, occluder)
+        self._carried: list[TriggerChange] = []
+        self._clear()
+
+    @property
+    def model(self) -> DepositionModel:
+        """The model that paints."""
+        return self._integrator.model
+
+    @property
+    def counts(self) -> PoseCounts:
+        """What became of the poses since the last reset."""
+        return self._builder.counts
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Stamp of the newest pose that was kept."""
+        return self._builder.newest_ns
+
+    @property
+    def _settled_ns(self) -> int:
+        """Up to here no trigger change is waited for any more."""
+        return (self.newest_ns or 0) - round(self.trigger_latency_s * 1e9)
+
+    @property
+    def flow(self) -> float | None:
+        """Relative flow at the newest pose; None: no trigger was ever seen."""
+        changes = self._changes or self._carried
+        if not changes:
+            return None
+        newest = self.newest_ns
+        passed = [c for c in changes if newest is None or c.stamp_ns <= newest]
+        return passed[-1].flow if passed else 0.0
+
+    def reset(self) -> None:
+        """Back to bare metal; the gun stays as it is, on or off, if the motion goes on."""
+        self._carried = self._changes or self._carried
+        self._clear()
+
+    def _clear(self) -> None:
+        self._integrator.reset()
+        self._builder = PathBuilder(
+            self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
+        )
+        self.log = MotionLog(self._limit_poses)
+        self._changes: list[TriggerChange] = []
+        self._now: FilmIntegrator | None = None
+
+    def add_trigger(self, change: TriggerChange) -> None:
+        """Take a change of the trigger, early, in time or late."""
+        self._carry_on(change.stamp_ns)
+        if not self._changes and self.log.complete and self.log.poses:
+            self._begin_again(change)
+            return
+        newest = self.newest_ns
+        if newest is not None and newest - change.stamp_ns > ANOTHER_STREAM_NS:
+            self._changes = []
+        self.log.add(change)
+        self._builder.add_trigger(change.stamp_ns, change.flow)
+        self._note(change)
+
+    def add_poses(self, batch: PoseBatch) -> None:
+        """Take poses and paint what is old enough."""
+        if not len(batch):
+            return
+        self._carry_on(int(batch.stamps_ns[0]))
+        self.log.add(batch)
+        self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
+        self._integrator.add(self._builder.take(self._settled_ns))
+        self._now = None
+
+    def follow(self, events: Iterable[TriggerChange | PoseBatch]) -> None:
+        """Take what was logged."""
+        for event in merged(events):
+            if isinstance(event, TriggerChange):
+                self.add_trigger(event)
+            else:
+                self.add_poses(event)
+
+    def up_to_date(self) -> FilmIntegrator:
+        """The film of everything received; the film that is painted on stays as it is.
+
+        Strokes under way count as ending here.
+        """
+        if self._now is None:
+            self._now = self._integrator.fork()
+            self._now.add(copy.deepcopy(self._builder).take(finish=True))
+        return self._now
+
+    def use(self, model: DepositionModel) -> None:
+        """Paint with another model from here on; what was painted before stays."""
+        builder = self._builder
+        self._integrator.add(builder.take(self._settled_ns, finish=True))
+        self._integrator.use(model)
+        builder.max_step_m = model.max_step_m
+        builder.whole_strokes = model.needs_whole_strokes
+        self._now = None
+
+    def warm_up(self) -> None:
+        """Compile and compute all that the model needs, before there is any motion."""
+        away = PathBuilder()
+        away.add_poses([0, 1_000_000], np.full((2, 3), 1e3), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+        unpainted = self._integrator.fork()
+        unpainted.add(away.take(finish=True))
+        _ = unpainted.gauge_um
+
+    def _begin_again(self, first_change: TriggerChange) -> None:
+        events = self.log.events
+        self._clear()
+        self.log.add(first_change)
+        self._builder.add_trigger(first_change.stamp_ns, first_change.flow)
+        self._note(first_change)
+        self.follow(events)
+
+    def _carry_on(self, stamp_ns: int) -> None:
+        """After a reset, keep the trigger of a motion that goes on, drop that of an older one."""
+        carried, self._carried = self._carried, []
+        if carried and stamp_ns >= carried[0].stamp_ns:
+            for change in carried:
+                self.add_trigger(change)
+
+    def _note(self, change: TriggerChange) -> None:
+        """Keep the changes that count from the newest pose on."""
+        later = [c for c in self._changes if c.stamp_ns <= change.stamp_ns]
+        self._changes = [*later, change, *(c for c in self._changes if c not in later)]
+        passed = sum(c.stamp_ns <= (self.newest_ns or 0) for c in self._changes)
+        self._changes = self._changes[max(0, passed - 1) :]
+        self._now = None

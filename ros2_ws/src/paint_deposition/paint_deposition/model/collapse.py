@@ -1,0 +1,297 @@
+"""The 1D collapse: the film that one long straight pass leaves, across the direction of travel.
+
+Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians; ``collapse_um`` is
+the film that the 2D model, eqs. (1) and (2), leaves on a plane that the gun faces squarely.
+"""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Protocol
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+from scipy.interpolate import CubicSpline
+
+from paint_deposition.errors import PlanError
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pass_film import pass_film_um
+from paint_deposition.model.pattern import PlanarPattern
+
+# Film below this share of the peak is left out of sums over passes.
+NEGLIGIBLE = 1e-9
+# Nodes of the line integral in the narrower standard deviation: trapezoids of a Gaussian with
+# three of them are exact to 1e-15.
+NODES_PER_SIGMA = 4.0
+SAMPLES_PER_SIGMA = 16.0
+FEWEST_SAMPLES, MOST_SAMPLES = 257, 4097
+# Where the asymmetry f turns over, at the centre, samples close in by halves this many times.
+HALVINGS = 16
+HALF_WIDTH_POINTS = 4001
+
+
+class Collapse(Protocol):
+    """A film profile across the direction of travel."""
+
+    def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
+        """Film [um] at distances x [m] from the line that the gun followed."""
+        ...
+
+    @property
+    def area_um_m(self) -> float:
+        """Integral of the film over x [um m]."""
+        ...
+
+    @property
+    def reach_m(self) -> float:
+        """Distance beyond which the film is negligible [m]."""
+        ...
+
+    @property
+    def finest_m(self) -> float:
+        """Scale on which the film changes; quadrature needs a few points in it [m]."""
+        ...
+
+    def mirrored(self) -> 'Collapse':
+        """The same pass with left and right exchanged."""
+        ...
+
+    def scaled(self, factor: float) -> 'Collapse':
+        """All thicknesses times a factor."""
+        ...
+
+
+def half_width_m(collapse: Collapse) -> float:
+    """SB50: width of a profile between its outermost places at half its peak [m]."""
+    x = np.linspace(-collapse.reach_m, collapse.reach_m, HALF_WIDTH_POINTS)
+    film = collapse.thickness_um(x)
+    above = x[film >= 0.5 * film.max()]
+    return float(above[-1] - above[0])
+
+
+class ThreeGaussianCollapse(BaseModel):
+    """Eq. (3), with the paper's symbols and signs: r1 lies at +x, r2 at -x, the third at 0.
+
+    A gain K is in um m: K / sigma is a film thickness. A third of their sum is the area.
+    """
+
+    model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
+
+    K1_um_m: float = Field(description='K1, gain of the Gaussian at +r1 [um m]')
+    K2_um_m: float = Field(description='K2, gain of the Gaussian at -r2 [um m]')
+    K3_um_m: float = Field(description='K3, gain of the centred Gaussian [um m]')
+    r1_m: float = Field(description='r_1, offset radius towards +x [m]')
+    r2_m: float = Field(description='r_2, offset radius towards -x [m]')
+    sigma1_m: float = Field(gt=0.0, description='sigma_1, of the Gaussian at +r1 [m]')
+    sigma2_m: float = Field(gt=0.0, description='sigma_2, of the Gaussian at -r2 [m]')
+    sigma3_m: float = Field(gt=0.0, description='sigma_3, of the centred Gaussian [m]')
+
+    @property
+    def gains_um_m(self) -> np.ndarray:
+        """(3,) K1, K2, K3 [um m]."""
+        return np.array([self.K1_um_m, self.K2_um_m, self.K3_um_m])
+
+    @property
+    def centres_m(self) -> np.ndarray:
+        """(3,) where the Gaussians stand: r1, -r2, 0 [m]."""
+        return np.array([self.r1_m, -self.r2_m, 0.0])
+
+    @property
+    def sigmas_m(self) -> np.ndarray:
+        """(3,) standard deviations [m]."""
+        return np.array([self.sigma1_m, self.sigma2_m, self.sigma3_m])
+
+    def components_um(self, x_m: np.ndarray) -> np.ndarray:
+        """(3, ...) film of each Gaussian at x (...) [um]; their sum is the film."""
+        away = (np.asarray(x_m)[..., np.newaxis] - self.centres_m) / self.sigmas_m
+        heights = self.gains_um_m / (3.0 * math.sqrt(2.0 * math.pi) * self.sigmas_m)
+        return np.moveaxis(heights * np.exp(-0.5 * away**2), -1, 0)
+
+    def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
+        """Eq. (3): c(x) [um] at x [m]; arrays of any shape."""
+        return self.components_um(x_m).sum(axis=0)
+
+    @property
+    def area_um_m(self) -> float:
+        """Integral of c over x [um m]."""
+        return float(self.gains_um_m.sum()) / 3.0
+
+    @property
+    def reach_m(self) -> float:
+        """Distance beyond which the film is below 1e-9 of the peak [m]."""
+        deviations = math.sqrt(2.0 * math.log(3.0 / NEGLIGIBLE))
+        return float(np.max(np.abs(self.centres_m) + deviations * self.sigmas_m))
+
+    @property
+    def finest_m(self) -> float:
+        """Least standard deviation [m]."""
+        return float(self.sigmas_m.min())
+
+    def scaled(self, factor: float) -> 'ThreeGaussianCollapse':
+        """All thicknesses times a factor."""
+        gains = {f'K{k + 1}_um_m': factor * gain for k, gain in enumerate(self.gains_um_m)}
+        return self.model_copy(update=gains)
+
+    def mirrored(self) -> 'ThreeGaussianCollapse':
+        """The same pass with left and right exchanged."""
+        return ThreeGaussianCollapse(
+            K1_um_m=self.K2_um_m, K2_um_m=self.K1_um_m, K3_um_m=self.K3_um_m,
+            r1_m=self.r2_m, r2_m=self.r1_m,
+            sigma1_m=self.sigma2_m, sigma2_m=self.sigma1_m, sigma3_m=self.sigma3_m,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SampledCollapse:
+    """A profile given at a row of distances, zero beyond them; a cubic spline in between.
+
+    Attributes:
+        x_m: (N,) increasing [m].
+        film_um: (N,) [um]; next to nothing at both ends.
+        finest_m: scale on which it changes [m].
+    """
+
+    x_m: np.ndarray
+    film_um: np.ndarray
+    finest_m: float
+
+    @cached_property
+    def _spline(self) -> CubicSpline:
+        return CubicSpline(self.x_m, self.film_um)
+
+    def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
+        """Film [um] at x [m]; arrays of any shape."""
+        x = np.asarray(x_m, dtype=float)
+        inside = (x >= self.x_m[0]) & (x <= self.x_m[-1])
+        return np.where(inside, self._spline(np.where(inside, x, self.x_m[0])), 0.0)
+
+    @cached_property
+    def area_um_m(self) -> float:
+        """Integral of the film over x [um m]."""
+        return float(self._spline.integrate(self.x_m[0], self.x_m[-1]))
+
+    @property
+    def reach_m(self) -> float:
+        """Distance beyond which there is no film [m]."""
+        return float(np.abs(self.x_m[[0, -1]]).max())
+
+    def mirrored(self) -> 'SampledCollapse':
+        """The same pass with left and right exchanged."""
+        return SampledCollapse(-self.x_m[::-1], self.film_um[::-1].copy(), self.finest_m)
+
+    def scaled(self, factor: float) -> 'SampledCollapse':
+        """All thicknesses times a factor."""
+        return SampledCollapse(self.x_m, factor * self.film_um, self.finest_m)
+
+
+def nominal_standoff_m(model: DepositionModel) -> float:
+    """Distance of the TCP from the part at which the part lies on the model plane [m]."""
+    return model.projection.model_plane_m - model.projection.emission_offset_m
+
+
+def collapse_um(
+    model: DepositionModel,
+    x_m: np.ndarray,
+    speed_m_per_s: float,
+    standoff_m: float | None = None,
+    travel_rad: float = 0.0,
+    backwards: bool = False,
+    turned: bool = False,
+) -> np.ndarray:
+    """Film of one long pass over a plane that the gun faces squarely, good to 1e-6 of its peak.
+
+    The x axis is fixed in space: tool z times forward travel, to its right as the gun sees it.
+    A gun that keeps its orientation lays the same profile both ways; one that is turned with the
+    travel lays the mirrored one.
+
+    Args:
+        model: effects on the path and along the rays count; the plane is a standing panel,
+            travel is level and x points up. Effects on the finished film are left out.
+        x_m: (N,) distances from the gun's line [m].
+        speed_m_per_s: of the gun along its line [m/s].
+        standoff_m: TCP to plane [m]; default: where the plane is the model plane.
+        travel_rad: direction of forward travel in the tool's x-y frame, from x to y [rad].
+        backwards: the pass runs the other way.
+        turned: the gun is turned by half a turn about its axis.
+
+    Returns:
+        (N,) film [um].
+
+    Raises:
+        PlanError: speed or standoff is not above zero.
+    """
+    standoff = nominal_standoff_m(model) if standoff_m is None else standoff_m
+    for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f'{name} is {value:g}; give a number above 0')
+    x = np.asarray(x_m, dtype=float)
+    if model.effects:
+        way = -1.0 if backwards else 1.0
+        roll = travel_rad + (math.pi if turned else 0.0)
+        return pass_film_um(model, x, way * speed_m_per_s, standoff, roll)
+    shrinking = model.projection.model_plane_m / (standoff + model.projection.emission_offset_m)
+    across = -shrinking * x if turned else shrinking * x
+    return shrinking / speed_m_per_s * line_integral_um_m_per_s(model.planar, across, travel_rad)
+
+
+def line_integral_um_m_per_s(
+    planar: PlanarPattern, across_m: np.ndarray, travel_rad: float = 0.0
+) -> np.ndarray:
+    """Eq. (1) integrated over a line of the model plane [um m/s].
+
+    The part of f that is odd along the line integrates to zero. What is left of it is smooth in
+    u with distance along the line = |across| sinh(u), though not in the distance itself.
+
+    Args:
+        planar: the pattern.
+        across_m: (N,) signed distances of the lines from the centre, positive along
+            tool z times the direction [m].
+        travel_rad: direction of the lines in the tool's x-y frame [rad].
+    """
+    p = planar
+    across = np.abs(np.atleast_1d(across_m)).astype(float)
+    far = p.radius_of_flux_m(1e-14)
+    step = p.sigma1_m / NODES_PER_SIGMA
+    along = step * np.arange(math.ceil(far / step) + 1)
+    ring = _even_sum(p.g1(across[:, np.newaxis], along), step)
+    # f is strongest at right angles to phi, ahead of it.
+    lopsided = p.K3 * math.cos(travel_rad - p.phi_rad)
+    if lopsided:
+        side = np.sign(across_m).reshape(across.shape) * lopsided
+        ring = ring + side * _ring_over_radius(p, across, far)
+    centre = np.exp(-0.5 * (across / p.sigma2_m) ** 2) / (p.sigma2_m * math.sqrt(2.0 * math.pi))
+    film = p.K1_cm3_per_s * ((1.0 - p.K2) * ring + p.K2 * centre)
+    return film.reshape(np.shape(across_m))
+
+
+def _ring_over_radius(p: PlanarPattern, across: np.ndarray, far: float) -> np.ndarray:
+    """|across| times the line integral of g1 over the radius; it vanishes at the centre."""
+    off_centre = np.maximum(across, 1e-12 * far)
+    step = p.sigma1_m / NODES_PER_SIGMA / far
+    u = step * np.arange(math.ceil(math.asinh(1e12) / step) + 1)
+    result = np.empty(len(across))
+    for row, distance in enumerate(off_centre):
+        used = u[: math.ceil(math.asinh(far / distance) / step) + 1]
+        result[row] = distance * _even_sum(p.g1(distance * np.cosh(used), 0.0), step)
+    return result
+
+
+def _even_sum(values: np.ndarray, step: float) -> np.ndarray:
+    """Trapezoids over the whole line for an even function sampled from 0 on, last axis."""
+    return step * (2.0 * values.sum(axis=-1) - values[..., 0])
+
+
+def sampled_collapse(
+    model: DepositionModel, speed_m_per_s: float, **options: Any
+) -> SampledCollapse:
+    """``collapse_um`` sampled finely enough for sums over passes; options as there."""
+    standoff = options.get('standoff_m') or nominal_standoff_m(model)
+    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
+    widening = max((standoff + offset) / omega, 1e-6)
+    reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    count = math.ceil(2.0 * reach / finest * SAMPLES_PER_SIGMA)
+    x = np.linspace(-reach, reach, min(max(count, FEWEST_SAMPLES), MOST_SAMPLES) | 1)
+    close = (x[1] - x[0]) * 0.5 ** np.arange(1, HALVINGS)
+    x = np.sort(np.concatenate([x, close, -close]))
+    return SampledCollapse(x, collapse_um(model, x, speed_m_per_s, **options), finest)

@@ -1,0 +1,152 @@
+"""Evenness of a film laid by parallel passes: eqs. (4) and (5) of Conner et al. (IROS 2002)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import erf
+
+from paint_deposition.model.collapse import Collapse, ThreeGaussianCollapse
+
+# Points of the period in the collapse's finest scale; the rule converges faster than any power.
+POINTS_PER_SCALE = 8.0
+FEWEST_POINTS = 32
+# Fourier terms are summed until the spectrum of the narrowest Gaussian has fallen to this.
+SPECTRUM_LIMIT = 1e-16
+
+
+@dataclass(frozen=True)
+class Raster:
+    """Endless parallel passes at an even index.
+
+    Attributes:
+        first: collapse of every other pass, one of them at x = 0.
+        second: collapse of the passes between; the same object if all passes are alike.
+    """
+
+    first: Collapse
+    second: Collapse
+
+    @staticmethod
+    def one_way(collapse: Collapse) -> 'Raster':
+        """All passes alike, as in eq. (4)."""
+        return Raster(collapse, collapse)
+
+    @property
+    def alike(self) -> bool:
+        """Whether all passes lay one profile, so that the film repeats with every pass."""
+        return self.first is self.second
+
+    def mean_um(self, index_m: float) -> float:
+        """Mean film of the raster [um]: the area of a pass spread over the index."""
+        return 0.5 * (self.first.area_um_m + self.second.area_um_m) / index_m
+
+    def period_m(self, index_m: float) -> float:
+        """Distance after which the film repeats [m]."""
+        return index_m if self.alike else 2.0 * index_m
+
+    def thickness_um(self, index_m: float, x_m: np.ndarray) -> np.ndarray:
+        """Eq. (4): T(x) [um] at x (N,) [m]."""
+        x = np.asarray(x_m, dtype=float)
+        period = self.period_m(index_m)
+        film = np.zeros(x.shape)
+        for collapse, start in self._rows(index_m):
+            lowest = math.floor((x.min() - start - collapse.reach_m) / period)
+            highest = math.ceil((x.max() - start + collapse.reach_m) / period)
+            centres = start + period * np.arange(lowest, highest + 1)
+            film += collapse.thickness_um(x[..., np.newaxis] - centres).sum(axis=-1)
+        return film
+
+    def sigma_n(self, index_m: float) -> float:
+        """Eq. (5): standard deviation of the film over its mean, over one period.
+
+        Even points over a period of a smooth periodic function: exact to rounding once they
+        resolve the collapse.
+        """
+        period = self.period_m(index_m)
+        finest = min(self.first.finest_m, self.second.finest_m)
+        points = max(FEWEST_POINTS, math.ceil(POINTS_PER_SCALE * period / finest))
+        film = self.thickness_um(index_m, period * np.arange(points) / points)
+        return float(film.std() / film.mean())
+
+    def _rows(self, index_m: float) -> list[tuple[Collapse, float]]:
+        if self.alike:
+            return [(self.first, 0.0)]
+        return [(self.first, 0.0), (self.second, index_m)]
+
+
+def sigma_n_closed_form(collapse: ThreeGaussianCollapse, index_m: float) -> float:
+    """Eq. (5) for eq. (3) without quadrature.
+
+    By Poisson's sum the raster's Fourier coefficients are the collapse's spectrum at multiples of
+    2 pi / index, and by Parseval's theorem its variance is the sum of their squares.
+    """
+    most = math.sqrt(-2.0 * math.log(SPECTRUM_LIMIT)) / collapse.finest_m
+    terms = max(1, math.ceil(most * index_m / (2.0 * math.pi)))
+    omega = 2.0 * math.pi / index_m * np.arange(1, terms + 1)[:, np.newaxis]
+    damping = np.exp(-0.5 * (omega * collapse.sigmas_m) ** 2)
+    phases = np.exp(-1j * omega * collapse.centres_m)
+    spectrum = (collapse.gains_um_m / 3.0 * damping * phases).sum(axis=1)
+    return float(np.sqrt(2.0 * np.sum(np.abs(spectrum) ** 2)) / abs(collapse.area_um_m))
+
+
+@dataclass(frozen=True)
+class Variation:
+    """A film between two limits.
+
+    Attributes:
+        mean_um: [um].
+        sigma_n: standard deviation over the mean [1].
+    """
+
+    mean_um: float
+    sigma_n: float
+
+
+def variation(passes: list[tuple[Collapse, float]], low_m: float, high_m: float) -> Variation:
+    """Mean and sigma_n of the film of a finite number of passes between two limits.
+
+    Args:
+        passes: each pass's collapse and where its line lies [m].
+        low_m, high_m: limits [m], in the interior for eq. (5) to be approached.
+    """
+    gaussians = [(c, at) for c, at in passes if isinstance(c, ThreeGaussianCollapse)]
+    if len(gaussians) == len(passes):
+        return _variation_of_gaussians(gaussians, low_m, high_m)
+    finest = min(collapse.finest_m for collapse, _ in passes)
+    panels = max(1, math.ceil((high_m - low_m) / finest))
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    edges = np.linspace(low_m, high_m, panels + 1)
+    half = 0.5 * (edges[1] - edges[0])
+    x = (edges[:-1, np.newaxis] + half * (1.0 + nodes)).ravel()
+    weight = np.tile(0.5 * weights / panels, panels)
+    film = np.sum([collapse.thickness_um(x - centre) for collapse, centre in passes], axis=0)
+    mean = float(weight @ film)
+    return Variation(mean, math.sqrt(float(weight @ (film - mean) ** 2)) / mean)
+
+
+def _variation_of_gaussians(
+    passes: list[tuple[ThreeGaussianCollapse, float]], low_m: float, high_m: float
+) -> Variation:
+    """Pairwise products of Gaussians are Gaussians, whose integrals are error functions."""
+    area = np.concatenate([c.gains_um_m for c, _ in passes]) / 3.0
+    sigma = np.concatenate([c.sigmas_m for c, _ in passes])
+    centre = np.concatenate([c.centres_m + at for c, at in passes])
+    width = high_m - low_m
+    mean = float(area @ _share_between(centre, sigma, low_m, high_m)) / width
+
+    squares = sigma**2
+    both = squares[:, np.newaxis] + squares
+    apart = centre[:, np.newaxis] - centre
+    overlap = np.exp(-0.5 * apart**2 / both) / np.sqrt(2.0 * math.pi * both)
+    middle = (centre[:, np.newaxis] * squares + centre * squares[:, np.newaxis]) / both
+    narrow = np.sqrt(squares[:, np.newaxis] * squares / both)
+    inside = _share_between(middle, narrow, low_m, high_m)
+    mean_square = float(area @ (overlap * inside) @ area) / width
+    return Variation(mean, math.sqrt(max(mean_square - mean**2, 0.0)) / mean)
+
+
+def _share_between(centre: np.ndarray, sigma: np.ndarray, low: float, high: float) -> np.ndarray:
+    """Share of normal distributions between two limits."""
+    scale = math.sqrt(2.0) * sigma
+    return 0.5 * (erf((high - centre) / scale) - erf((low - centre) / scale))

@@ -1,0 +1,1 @@
+"""The atomizer's way: recorded poses, planned passes and the sub-steps both become."""

@@ -1,0 +1,105 @@
+"""What came of a stream of poses and trigger changes, kept so that it can be followed again."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+# Two hours at 250 Hz; about 100 bytes a pose as they come.
+DEFAULT_LIMIT_POSES = 2_000_000
+MERGED_POSES = 200
+
+
+@dataclass(frozen=True)
+class TriggerChange:
+    """The flow (relative; 0 is gun off) from a time on."""
+
+    stamp_ns: int
+    flow: float
+
+
+@dataclass(frozen=True)
+class PoseBatch:
+    """Poses that were taken together: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
+
+    stamps_ns: np.ndarray
+    positions_m: np.ndarray
+    quaternions_xyzw: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    def select(self, rows: slice | list[int]) -> 'PoseBatch':
+        """The chosen rows."""
+        chosen = rows if isinstance(rows, slice) else np.array(rows, dtype=np.int64)
+        return PoseBatch(
+            self.stamps_ns[chosen], self.positions_m[chosen], self.quaternions_xyzw[chosen]
+        )
+
+    @staticmethod
+    def joined(batches: list['PoseBatch']) -> 'PoseBatch':
+        """At least one batch, one after the other."""
+        return PoseBatch(
+            np.concatenate([batch.stamps_ns for batch in batches]),
+            np.concatenate([batch.positions_m for batch in batches]),
+            np.concatenate([batch.quaternions_xyzw for batch in batches]),
+        )
+
+
+class MotionLog:
+    """Poses as received and trigger changes in the order in which they came.
+
+    One thread may write while others read what is there already. Memory is bounded: at the limit
+    the log closes, is no longer ``complete`` and forgets what it has.
+
+    Args:
+        limit_poses: poses to keep.
+    """
+
+    def __init__(self, limit_poses: int = DEFAULT_LIMIT_POSES) -> None:
+        self.limit_poses = limit_poses
+        self.poses = 0
+        self.complete = True
+        self.events: list[TriggerChange | PoseBatch] = []
+
+    def add(self, event: TriggerChange | PoseBatch) -> None:
+        """Note what came."""
+        if not self.complete:
+            return
+        if isinstance(event, PoseBatch):
+            self.poses += len(event)
+        if self.poses > self.limit_poses:
+            self.complete = False
+            self.events = []
+            return
+        self.events.append(event)
+
+    def first_poses(self, count: int) -> PoseBatch | None:
+        """The first poses that are kept, at least ``count`` if there are so many."""
+        batches, found = [], 0
+        for event in self.events:
+            if isinstance(event, PoseBatch):
+                batches.append(event)
+                found += len(event)
+            if found >= count:
+                break
+        return PoseBatch.joined(batches) if batches else None
+
+
+def merged(
+    events: Iterable[TriggerChange | PoseBatch], poses: int = MERGED_POSES
+) -> Iterator[TriggerChange | PoseBatch]:
+    """The same events with poses that came in a row in batches of about so many."""
+    waiting: list[PoseBatch] = []
+    for event in events:
+        if isinstance(event, PoseBatch):
+            waiting.append(event)
+            if sum(map(len, waiting)) < poses:
+                continue
+        if waiting:
+            yield PoseBatch.joined(waiting)
+            waiting = []
+        if isinstance(event, TriggerChange):
+            yield event
+    if waiting:
+        yield PoseBatch.joined(waiting)

@@ -1,0 +1,85 @@
+"""The spray path: a recorded motion cut into the sub-steps over which the film is integrated."""
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class SprayPath:
+    """Sub-steps of the motion in time order, one row each; the nodes of the film integral.
+
+    Attributes:
+        stamp_ns: (M,) int64 middle of the sub-step.
+        dwell_s: (M,) its duration, the quadrature weight [s].
+        flow: (M,) flow relative to the calibrated one; 0 is gun off.
+        position_m: (M, 3) TCP [m].
+        rotation: (M, 3, 3) tool axes x, y, z as columns.
+        velocity_m_per_s: (M, 3) of the TCP [m/s].
+        pattern_shift_m: (M, 2) displacement of the pattern on the model plane, tool x, y [m].
+        stroke: (M,) int, number of the straight stroke; a new one starts where the path turns.
+        spray_pass: (M,) int, number of the spraying pass, -1 before the first.
+        open_flow: (M,) flow of the opening that runs or ran last; 1 before the first.
+        since_on_s, since_off_s: (M,) time since the trigger last opened and closed, inf if never
+            [s].
+        until_on_s, until_off_s: (M,) time until it next does within the stroke, inf if not.
+        from_turn_m, to_turn_m: (M,) distance along the path from the last turn and to the next.
+    """
+
+    stamp_ns: np.ndarray
+    dwell_s: np.ndarray
+    flow: np.ndarray
+    position_m: np.ndarray
+    rotation: np.ndarray
+    velocity_m_per_s: np.ndarray
+    pattern_shift_m: np.ndarray
+    stroke: np.ndarray
+    spray_pass: np.ndarray
+    open_flow: np.ndarray
+    since_on_s: np.ndarray
+    since_off_s: np.ndarray
+    until_on_s: np.ndarray
+    until_off_s: np.ndarray
+    from_turn_m: np.ndarray
+    to_turn_m: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.stamp_ns)
+
+    @property
+    def speed_m_per_s(self) -> np.ndarray:
+        """(M,) speed of the TCP [m/s]."""
+        return np.linalg.norm(self.velocity_m_per_s, axis=1)
+
+    @property
+    def spraying_time_s(self) -> float:
+        """Time sprayed, weighted by the relative flow [s]: K1 times this was emitted."""
+        return float(np.sum(self.dwell_s * self.flow))
+
+    def select(self, rows: slice | np.ndarray) -> 'SprayPath':
+        """The chosen rows, by mask, slice or indices."""
+        return SprayPath(*(getattr(self, item.name)[rows] for item in fields(self)))
+
+    def with_(self, **columns: np.ndarray) -> 'SprayPath':
+        """A copy with some columns replaced."""
+        return replace(self, **columns)
+
+    @staticmethod
+    def empty() -> 'SprayPath':
+        """No sub-steps."""
+        tails = {'position_m': (3,), 'rotation': (3, 3), 'velocity_m_per_s': (3,)}
+        tails['pattern_shift_m'] = (2,)
+        whole = ('stamp_ns', 'stroke', 'spray_pass')
+        return SprayPath(
+            *(
+                np.empty((0, *tails.get(c.name, ())), np.int64 if c.name in whole else float)
+                for c in fields(SprayPath)
+            )
+        )
+
+    @staticmethod
+    def joined(paths: list['SprayPath']) -> 'SprayPath':
+        """Paths one after the other."""
+        return SprayPath(
+            *(np.concatenate([getattr(p, item.name) for p in paths]) for item in fields(SprayPath))
+        )

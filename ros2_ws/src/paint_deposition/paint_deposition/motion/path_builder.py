@@ -1,0 +1,212 @@
+"""From a stream of poses to the spray path: the one integrator of live node and offline run."""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from paint_deposition.motion import strokes
+from paint_deposition.motion.flow_schedule import FlowSchedule
+from paint_deposition.motion.motion_log import PoseBatch
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.screening import PoseScreen
+from paint_deposition.motion.sub_steps import split_segments
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+
+DEFAULT_MAX_POSE_GAP_S = 0.25
+DEFAULT_MAX_STEP_M = 0.008
+
+
+class PathBuilder:
+    """Screens poses as they come and turns them into sub-steps.
+
+    Feed it in any batches: the sub-steps depend on the poses and trigger changes alone. Which
+    poses are dropped and when a stream counts as begun again, see ``PoseScreen``; a stream begun
+    again is followed after a gap.
+
+    Args:
+        max_pose_gap_s: a longer time between two poses is gun off [s].
+        max_step_m: longest travel of the spray in a sub-step [m].
+        whole_strokes: hand out a stroke when it is complete, with what lies ahead of each
+            sub-step known.
+    """
+
+    def __init__(
+        self,
+        max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+        max_step_m: float = DEFAULT_MAX_STEP_M,
+        whole_strokes: bool = False,
+    ) -> None:
+        self.max_gap_ns = int(round(max_pose_gap_s * 1e9))
+        self.max_step_m = max_step_m
+        self.whole_strokes = whole_strokes
+        self._screen = PoseScreen(self.max_gap_ns)
+        self._flow = FlowSchedule()
+        self._waiting: list[PoseBatch] = []
+        self._integrated_ns: int | None = None
+        self._finished: list[SprayPath] = []
+        self._gap_before_next = False
+        self._state: np.ndarray | None = None
+        self._held: list[SprayPath] = []
+
+    @property
+    def counts(self) -> PoseCounts:
+        """What became of the poses."""
+        return self._screen.counts
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Stamp of the newest pose that was kept."""
+        return self._screen.newest_ns
+
+    @property
+    def integrated_ns(self) -> int | None:
+        """Stamp up to which the stream was cut into sub-steps."""
+        return self._integrated_ns
+
+    def add_trigger(self, stamp_ns: int, flow: float) -> None:
+        """Change the flow (relative; 0 is gun off) at a time.
+
+        Before the first change the gun is off; without any it always sprays. A change that comes
+        after the path beyond it was handed out is counted and takes effect from there on.
+        """
+        late_ns = 0 if self._integrated_ns is None else self._integrated_ns - int(stamp_ns)
+        self.counts.late_triggers += late_ns > 0
+        self._flow.add(stamp_ns, flow, another_stream=late_ns > self.max_gap_ns)
+
+    def add_poses(
+        self,
+        stamps_ns: ArrayLike,
+        positions_m: ArrayLike,
+        quaternions_xyzw: ArrayLike,
+    ) -> None:
+        """Take poses: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
+        batch = PoseBatch(
+            np.asarray(stamps_ns, dtype=np.int64),
+            np.asarray(positions_m, dtype=float),
+            np.asarray(quaternions_xyzw, dtype=float),
+        )
+        going_on, *begun_again = self._screen.take(batch)
+        self._waiting.append(going_on)
+        for stream in begun_again:
+            self._cut_segments(until_ns=None)
+            self.counts.late_triggers -= self._flow.begin_again()
+            self._integrated_ns = None
+            self._gap_before_next = True
+            self._waiting = [stream]
+
+    def take(self, until_ns: int | None = None, finish: bool = False) -> SprayPath:
+        """Hand out the sub-steps that are complete.
+
+        Args:
+            until_ns: leave segments that end later for the next call; None: all.
+            finish: the stream has ended; incomplete strokes are handed out too.
+        """
+        if finish:
+            self._screen.finish()
+        self._cut_segments(until_ns)
+        if self._integrated_ns is not None:
+            self._flow.forget(self._integrated_ns)
+        pieces, self._finished = self._finished, []
+        if self.whole_strokes:
+            return self._whole_strokes(pieces, finish)
+        pieces, self._held = self._held + pieces, []
+        return SprayPath.joined(pieces) if pieces else SprayPath.empty()
+
+    def _cut_segments(self, until_ns: int | None) -> None:
+        if not self._waiting:
+            return
+        poses = PoseBatch.joined(self._waiting)
+        self._waiting = [poses]
+        ready = len(poses)
+        if until_ns is not None:
+            ready = int(np.searchsorted(poses.stamps_ns, until_ns, side='right'))
+        if ready < 2:
+            return
+        cuts, flows = self._flow.steps()
+        now = poses.select(slice(0, ready))
+        stamp, dwell, position, rotation, velocity, after_gap = split_segments(
+            now.stamps_ns,
+            now.positions_m,
+            now.quaternions_xyzw,
+            cuts,
+            self.max_gap_ns,
+            self.max_step_m,
+        )
+        if len(stamp):
+            after_gap[0] |= self._gap_before_next
+            self._gap_before_next = False
+            flow = flows[np.searchsorted(cuts, stamp, side='right')]
+            self._follow(stamp, dwell, flow, position, rotation, velocity, after_gap)
+        # A gap at the end of this batch must be seen by the next one.
+        last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
+        self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
+        self._integrated_ns = int(now.stamps_ns[-1])
+        self._waiting = [poses.select(slice(ready - 1, None))]
+
+    def _follow(
+        self,
+        stamp: np.ndarray,
+        dwell: np.ndarray,
+        flow: np.ndarray,
+        position: np.ndarray,
+        rotation: np.ndarray,
+        velocity: np.ndarray,
+        after_gap: np.ndarray,
+    ) -> None:
+        if self._state is None:
+            self._state = strokes.new_state(0.0 if self._flow else 1.0)
+        stroke, spray_pass, open_flow, since_on, since_off, from_turn = strokes.follow(
+            self._state, position, velocity, dwell, flow, after_gap
+        )
+        unknown = np.full(len(stamp), np.inf)
+        path = SprayPath(
+            stamp_ns=stamp,
+            dwell_s=dwell,
+            flow=flow,
+            position_m=position,
+            rotation=rotation,
+            velocity_m_per_s=velocity,
+            pattern_shift_m=np.zeros((len(stamp), 2)),
+            stroke=stroke,
+            spray_pass=spray_pass,
+            open_flow=open_flow,
+            since_on_s=since_on,
+            since_off_s=since_off,
+            until_on_s=unknown,
+            until_off_s=unknown,
+            from_turn_m=from_turn,
+            to_turn_m=unknown,
+        )
+        self._finished.append(path)
+
+    def _whole_strokes(self, pieces: list[SprayPath], finish: bool) -> SprayPath:
+        held = self._held + pieces
+        if not held:
+            return SprayPath.empty()
+        path = SprayPath.joined(held)
+        if not len(path):
+            return path
+        stroke = path.stroke
+        ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
+        # The last stroke's end shows with the first row of the next, which the look ahead needs.
+        until_on, until_off, to_turn = strokes.look_ahead(
+            stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s
+        )
+        complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
+        self._held = [path.select(slice(ready, None))]
+        return complete.select(slice(0, ready))
+
+
+def spray_path(
+    trajectory: Trajectory,
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+    max_step_m: float = DEFAULT_MAX_STEP_M,
+    whole_strokes: bool = True,
+) -> tuple[SprayPath, PoseCounts]:
+    """Screen a whole recording and cut it into sub-steps; also returns what was dropped."""
+    builder = PathBuilder(max_pose_gap_s, max_step_m, whole_strokes)
+    for stamp_ns, flow in zip(
+        trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow.tolist(), strict=True
+    ):
+        builder.add_trigger(stamp_ns, flow)
+    builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
+    return builder.take(finish=True), builder.counts

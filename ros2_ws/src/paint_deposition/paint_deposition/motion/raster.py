@@ -1,0 +1,280 @@
+"""Planned passes: lines over the smoothed skin, and the timed motion that runs along them."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from paint_deposition.errors import PlanError
+from paint_deposition.motion.planned_move import PlannedMove
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.skin_map import SkinMap
+
+WAYPOINT_STEP_M = 0.01
+# A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
+WAYPOINTS_PER_MOVE = 4
+POSE_RATE_HZ = 250.0
+# Travel at full speed before the gun opens and after it closes.
+SETTLING_M = 0.02
+LEAST_TRANSFER_SPEED_M_PER_S = 0.3
+# Turn of the tool between passes is no faster than this.
+TURN_RATE_RAD_PER_S = math.radians(90.0)
+
+
+@dataclass(frozen=True)
+class RasterStyle:
+    """How passes are run.
+
+    Attributes:
+        standoff_m: TCP to smoothed skin [m].
+        speed_m_per_s: of the TCP while spraying [m/s].
+        acceleration_m_per_s2: of the robot [m/s^2].
+        overspray_m: the gun opens and closes this far outside the part [m].
+        band_m: the part's ends are looked for this far to both sides of a pass [m].
+        travel_rad: direction of the first pass in the tool's x-y frame [rad].
+        one_way: every pass runs in the direction of the first.
+    """
+
+    standoff_m: float
+    speed_m_per_s: float
+    acceleration_m_per_s2: float = 2.0
+    overspray_m: float = 0.3
+    band_m: float = 0.15
+    travel_rad: float = 0.0
+    one_way: bool = False
+
+    def __post_init__(self) -> None:
+        for name in ('standoff_m', 'speed_m_per_s', 'acceleration_m_per_s2'):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0.0):
+                raise PlanError(f'{name} is {value:g}; give a number above 0')
+        for name in ('overspray_m', 'band_m'):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0.0):
+                raise PlanError(f'{name} is {value:g}; give 0 or more')
+
+    @property
+    def lead_m(self) -> float:
+        """Way from standstill to full speed, gun off [m]."""
+        return self.speed_m_per_s**2 / (2.0 * self.acceleration_m_per_s2) + SETTLING_M
+
+
+@dataclass(frozen=True)
+class PlannedPass:
+    """One pass, from standstill to standstill.
+
+    Attributes:
+        across_m: where its line lies [m].
+        positions_m: (W, 3) TCP at waypoints, in running order.
+        rotations: (W, 3, 3) tool axes as columns.
+        along_m: (W,) travel of the TCP from the start.
+        on_m, off_m: travel at which the gun opens and closes.
+        speed_m_per_s: while spraying.
+    """
+
+    across_m: float
+    positions_m: np.ndarray
+    rotations: np.ndarray
+    along_m: np.ndarray
+    on_m: float
+    off_m: float
+    speed_m_per_s: float
+
+    @property
+    def sprayed_m(self) -> float:
+        """Travel with the gun on [m]."""
+        return self.off_m - self.on_m
+
+
+def plan_pass(
+    skin: SkinMap, across_m: float, style: RasterStyle, backwards: bool = False
+) -> PlannedPass:
+    """The pass along a line: standoff and orientation follow the smoothed skin.
+
+    The tool keeps its orientation about its axis whichever way the pass runs.
+    """
+    first, last = skin.extent_near_m(across_m, style.band_m)
+    beyond = style.overspray_m + style.lead_m
+    count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
+    line = np.linspace(first - beyond, last + beyond, count)
+    positions, rotations = tool_poses(skin, line, np.full(count, across_m), style)
+    if backwards:
+        line, positions, rotations = line[::-1], positions[::-1], rotations[::-1]
+    step = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+    along = np.concatenate([[0.0], np.cumsum(step)])
+    ends = np.array([first - style.overspray_m, last + style.overspray_m])
+    order = 1.0 if not backwards else -1.0
+    on, off = np.sort(np.interp(order * ends, order * line, along))
+    return PlannedPass(
+        float(across_m),
+        np.ascontiguousarray(positions),
+        np.ascontiguousarray(rotations),
+        along,
+        float(on),
+        float(off),
+        style.speed_m_per_s,
+    )
+
+
+def tool_poses(
+    skin: SkinMap, travel_m: np.ndarray, across_m: np.ndarray, style: RasterStyle
+) -> tuple[np.ndarray, np.ndarray]:
+    """TCP (N, 3) [m] and tool axes (N, 3, 3), square to the smoothed skin at the standoff."""
+    axes = skin.axes
+    normals = skin.normals(travel_m, across_m)
+    height = skin.height_m(travel_m, across_m)
+    on_skin = axes.points_m(np.stack([travel_m, across_m, height], axis=1))
+    tool_z = -normals
+    way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    side = np.cross(tool_z, way)
+    cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
+    rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
+    return on_skin + style.standoff_m * normals, rotations
+
+
+def plan_passes(skin: SkinMap, lines_m: np.ndarray, style: RasterStyle) -> tuple[PlannedPass, ...]:
+    """Passes along lines in this order; every other one backwards unless all run one way."""
+    return tuple(
+        plan_pass(skin, float(across), style, backwards=bool(number % 2) and not style.one_way)
+        for number, across in enumerate(lines_m)
+    )
+
+
+def trajectory_of(
+    passes: tuple[PlannedPass, ...],
+    style: RasterStyle,
+    frame_id: str = '',
+    start_ns: int = 0,
+    rate_hz: float = POSE_RATE_HZ,
+) -> Trajectory:
+    """The timed motion: poses at an even rate, and the trigger.
+
+    Every pass and every way between passes starts and ends at rest; speeds are trapezoids.
+    """
+    stamps, positions, rotations, triggers = [], [], [], []
+    clock = 0.0
+    for number, planned in enumerate(passes):
+        if number:
+            leg = _transfer(passes[number - 1], planned, style, rate_hz)
+            stamps.append(clock + leg.sample_s)
+            positions.append(leg.positions_m)
+            rotations.append(leg.quaternions)
+            clock += leg.duration_s
+        ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
+        leg = _followed(planned, ramp, rate_hz)
+        stamps.append(clock + leg.sample_s)
+        positions.append(leg.positions_m)
+        rotations.append(leg.quaternions)
+        triggers += [clock + ramp.time_at_s(planned.on_m), clock + ramp.time_at_s(planned.off_m)]
+        clock += leg.duration_s
+    stamps_ns = start_ns + np.round(np.concatenate(stamps) * 1e9).astype(np.int64)
+    forward = np.append(True, np.diff(stamps_ns) > 0)
+    return Trajectory(
+        stamps_ns=stamps_ns[forward],
+        positions_m=np.concatenate(positions)[forward],
+        quaternions_xyzw=np.concatenate(rotations)[forward],
+        frame_id=frame_id,
+        trigger_stamps_ns=start_ns + np.round(np.array(triggers) * 1e9).astype(np.int64),
+        trigger_flow=np.tile([1.0, 0.0], len(passes)),
+    )
+
+
+def planned_moves(passes: tuple[PlannedPass, ...], style: RasterStyle) -> list[PlannedMove]:
+    """Straight moves for a robot program: lead-in, waypoints with the gun on, lead-out."""
+    moves = []
+    for planned in passes:
+        inside = (planned.along_m > planned.on_m) & (planned.along_m < planned.off_m)
+        between = planned.along_m[inside][WAYPOINTS_PER_MOVE::WAYPOINTS_PER_MOVE].tolist()
+        stops = [0.0, planned.on_m, *between, planned.off_m, float(planned.along_m[-1])]
+        positions, quaternions = _poses_at(planned, np.array(stops))
+        for k, (position, quaternion) in enumerate(zip(positions, quaternions, strict=True)):
+            transfer = k == 0
+            speed = _transfer_speed(style) if transfer else planned.speed_m_per_s
+            spraying = 2 <= k < len(stops) - 1
+            moves.append(PlannedMove(position, quaternion, speed, spraying))
+    return moves
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """A timed stretch: samples with their times from its start, and how long it takes."""
+
+    sample_s: np.ndarray
+    positions_m: np.ndarray
+    quaternions: np.ndarray
+    duration_s: float
+
+
+class _Ramp:
+    """Trapezoidal speed over a way, from rest to rest."""
+
+    def __init__(self, length_m: float, speed_m_per_s: float, style: RasterStyle) -> None:
+        self.length = length_m
+        self.acceleration = style.acceleration_m_per_s2
+        # A short way is a triangle.
+        self.speed = min(speed_m_per_s, math.sqrt(length_m * self.acceleration))
+        self.rise_s = self.speed / self.acceleration
+        self.duration_s = length_m / self.speed + self.rise_s if length_m > 0.0 else 0.0
+
+    def way_at_m(self, time_s: np.ndarray) -> np.ndarray:
+        """Travel at times from the start."""
+        t = np.clip(time_s, 0.0, self.duration_s)
+        left = self.duration_s - t
+        even = self.speed * (t - 0.5 * self.rise_s)
+        rising, falling = 0.5 * self.acceleration * t**2, 0.5 * self.acceleration * left**2
+        return np.select(
+            [t < self.rise_s, left < self.rise_s], [rising, self.length - falling], even
+        )
+
+    def time_at_s(self, way_m: float) -> float:
+        """When a travel is reached."""
+        rise_m = 0.5 * self.speed * self.rise_s
+        if way_m < rise_m:
+            return math.sqrt(2.0 * way_m / self.acceleration)
+        if way_m > self.length - rise_m:
+            return self.duration_s - math.sqrt(2.0 * (self.length - way_m) / self.acceleration)
+        return 0.5 * self.rise_s + way_m / self.speed
+
+
+def _followed(planned: PlannedPass, ramp: _Ramp, rate_hz: float) -> _Leg:
+    times = _sample_times(ramp.duration_s, rate_hz)
+    positions, quaternions = _poses_at(planned, ramp.way_at_m(times))
+    return _Leg(times, positions, quaternions, ramp.duration_s)
+
+
+def _transfer(before: PlannedPass, after: PlannedPass, style: RasterStyle, rate_hz: float) -> _Leg:
+    """Straight from the end of a pass to the start of the next, turning evenly with the travel."""
+    start, end = before.positions_m[-1], after.positions_m[0]
+    turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
+    angle = float((turn[0].inv() * turn[1]).magnitude())
+    length = float(np.linalg.norm(end - start))
+    ramp = _Ramp(length, _transfer_speed(style), style)
+    duration = max(ramp.duration_s, angle / TURN_RATE_RAD_PER_S)
+    if duration == 0.0:
+        return _Leg(np.empty(0), np.empty((0, 3)), np.empty((0, 4)), 0.0)
+    times = _sample_times(duration, rate_hz)
+    share = times / duration
+    if length > 0.0:
+        share = ramp.way_at_m(share * ramp.duration_s) / length
+    positions = start + share[:, np.newaxis] * (end - start)
+    return _Leg(times, positions, Slerp([0.0, 1.0], turn)(share).as_quat(), duration)
+
+
+def _transfer_speed(style: RasterStyle) -> float:
+    return max(style.speed_m_per_s, LEAST_TRANSFER_SPEED_M_PER_S)
+
+
+def _poses_at(planned: PlannedPass, way_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    positions = np.stack(
+        [np.interp(way_m, planned.along_m, planned.positions_m[:, k]) for k in range(3)], axis=1
+    )
+    turns = Slerp(planned.along_m, Rotation.from_matrix(planned.rotations))
+    return positions, turns(np.clip(way_m, 0.0, planned.along_m[-1])).as_quat()
+
+
+def _sample_times(duration_s: float, rate_hz: float) -> np.ndarray:
+    """Times at about this rate, both ends included."""
+    count = max(2, math.ceil(duration_s * rate_hz) + 1)
+    return np.linspace(0.0, duration_s, count)

@@ -1,0 +1,88 @@
+"""A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
+
+from dataclasses import dataclass, field, fields
+
+import numpy as np
+
+from paint_deposition.errors import RecordingError
+
+
+@dataclass
+class PoseCounts:
+    """What became of the poses of a stream."""
+
+    received: int = 0
+    repeated_stamps: int = 0
+    backward_stamps: int = 0
+    not_finite: int = 0
+    not_unit_quaternions: int = 0
+    restarts: int = 0
+    gaps: int = 0
+    longest_gap_ns: int = 0
+    late_triggers: int = 0
+
+    @property
+    def rejected(self) -> int:
+        """Poses that were dropped."""
+        return (
+            self.repeated_stamps
+            + self.backward_stamps
+            + self.not_finite
+            + self.not_unit_quaternions
+        )
+
+    def as_dict(self) -> dict[str, int]:
+        """All counts by name, for diagnostics and statistics."""
+        counts = {item.name: int(getattr(self, item.name)) for item in fields(self)}
+        return counts | {'rejected': self.rejected}
+
+
+def _no_stamps() -> np.ndarray:
+    return np.empty(0, dtype=np.int64)
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """Atomizer poses as recorded, in the mesh's frame, not yet screened.
+
+    Attributes:
+        stamps_ns: (N,) int64 header stamps; screening drops what does not move forward.
+        positions_m: (N, 3) TCP [m].
+        quaternions_xyzw: (N, 4) orientation of the tool, scalar last as in ROS.
+        frame_id: frame of the poses, '' where the recording does not say.
+        trigger_stamps_ns: (M,) int64 times at which the flow changes; empty: always spraying.
+        trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
+            Before the first of them the gun is off.
+
+    Raises:
+        RecordingError: the arrays do not have these shapes.
+    """
+
+    stamps_ns: np.ndarray
+    positions_m: np.ndarray
+    quaternions_xyzw: np.ndarray
+    frame_id: str = ''
+    trigger_stamps_ns: np.ndarray = field(default_factory=_no_stamps)
+    trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
+
+    def __post_init__(self) -> None:
+        count = len(self.stamps_ns)
+        shapes = (np.shape(self.positions_m), np.shape(self.quaternions_xyzw))
+        if shapes != ((count, 3), (count, 4)):
+            raise RecordingError(
+                f'{count} stamps go with positions {shapes[0]} and quaternions {shapes[1]}; '
+                f'expected ({count}, 3) and ({count}, 4)'
+            )
+        if np.shape(self.trigger_stamps_ns) != np.shape(self.trigger_flow):
+            raise RecordingError(
+                f'{len(self.trigger_stamps_ns)} trigger stamps go with '
+                f'{len(self.trigger_flow)} flow values; give one flow a stamp'
+            )
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    @property
+    def duration_s(self) -> float:
+        """Time from the first to the last pose [s]."""
+        return float(self.stamps_ns[-1] - self.stamps_ns[0]) * 1e-9 if len(self) else 0.0

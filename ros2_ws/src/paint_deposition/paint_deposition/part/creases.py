@@ -1,0 +1,93 @@
+"""Edges of a triangle mesh: creases, which split normals, and the rim, where the skin ends."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from paint_deposition.part.edge_distance import without_seams
+from paint_deposition.part.refinement import face_normals
+
+# Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
+CREASE_RAD = np.radians(30.0)
+# A convex fold at least this sharp ends the skin as a free edge does: a hem, the rim of a plate.
+RIM_FOLD_RAD = np.radians(75.0)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Which triangle edges lie on each other.
+
+    Half-edge h = 3 f + k runs from corner k of triangle f to its next corner.
+
+    Attributes:
+        paired: (E, 2) half-edges of two triangles with the same winding that share an edge.
+        clashing: (C, 2) half-edges of two triangles of opposite winding that share an edge.
+        single: (B,) half-edges without a partner, or with several.
+    """
+
+    paired: np.ndarray
+    clashing: np.ndarray
+    single: np.ndarray
+
+    @staticmethod
+    def of(faces: np.ndarray) -> 'Edges':
+        """Match the edges of (F, 3) faces."""
+        start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+        key = np.minimum(start, end) * (faces.max() + 1) + np.maximum(start, end)
+        order = np.argsort(key, kind='stable')
+        _, first, count = np.unique(key[order], return_index=True, return_counts=True)
+        pairs = np.stack([order[first[count == 2]], order[first[count == 2] + 1]], axis=1)
+        opposed = start[pairs[:, 0]] != start[pairs[:, 1]]
+        lonely = np.repeat(count, count) != 2
+        return Edges(pairs[opposed], pairs[~opposed], np.sort(order[lonely]))
+
+
+def next_half_edge(half_edges: np.ndarray) -> np.ndarray:
+    """The half-edge that follows in the same triangle."""
+    return half_edges - half_edges % 3 + (half_edges + 1) % 3
+
+
+def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
+    """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
+    normals = face_normals(vertices_m, faces)
+    one, other = normals[edges.paired[:, 0] // 3], normals[edges.paired[:, 1] // 3]
+    along = vertices_m[np.roll(faces, -1, axis=1).ravel()] - vertices_m[faces.ravel()]
+    turning = np.cross(one, other)
+    angle = np.arctan2(np.linalg.norm(turning, axis=1), np.einsum('ij,ij->i', one, other))
+    convex = np.einsum('ij,ij->i', turning, along[edges.paired[:, 0]]) >= 0.0
+    return np.where(convex, angle, -angle)
+
+
+def split_at_creases(
+    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges
+) -> tuple[np.ndarray, np.ndarray]:
+    """Give each smooth patch its own vertices along creases.
+
+    Returns:
+        (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new vertices.
+    """
+    smooth = edges.paired[np.abs(folds_rad(vertices_m, faces, edges)) <= CREASE_RAD]
+    one, other = smooth.T
+    joined = np.concatenate(
+        [np.stack([one, next_half_edge(other)]), np.stack([next_half_edge(one), other])], axis=1
+    )
+    corners = faces.size
+    links = coo_matrix((np.ones(joined.shape[1]), joined), shape=(corners, corners))
+    count, label = connected_components(links, directed=False)
+    origin = np.empty(count, dtype=np.int64)
+    origin[label] = faces.ravel()
+    return origin, label.reshape(-1, 3).astype(np.int64)
+
+
+def rim_segments_m(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
+    """(B, 2, 3) ends of the segments where the skin ends or folds back sharply [m]."""
+    folds = folds_rad(vertices_m, faces, edges)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+
+    def segments(half_edges: np.ndarray) -> np.ndarray:
+        return np.stack([vertices_m[start[half_edges]], vertices_m[end[half_edges]]], axis=1)
+
+    sharp = segments(edges.paired[folds >= RIM_FOLD_RAD, 0])
+    return np.concatenate([without_seams(segments(edges.single)), sharp])

@@ -1,0 +1,82 @@
+"""Signed curvature of the skin, from how its normals turn within a physical radius."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+RADIUS_M = 0.03
+# Skin whose normal points further away than this is another side of the part.
+OTHER_SIDE_COSINE = -0.25
+BLOCK = 4096
+
+
+def curvature_per_m(
+    points_m: np.ndarray,
+    normals: np.ndarray,
+    skin_m: np.ndarray,
+    skin_normals: np.ndarray,
+    skin_areas_m2: np.ndarray,
+    radius_m: float = RADIUS_M,
+) -> np.ndarray:
+    """Sum k1 + k2 of the principal curvatures, positive where concave toward the gun [1/m].
+
+    It is minus the divergence of the outward normal along the skin. The sum is what matters for
+    the electric field E over a conductor, dE/dn = (k1 + k2) E in this sign: stronger toward convex
+    skin. A cylinder's ridge of radius R has -1/R, a ball -2/R, a valley +1/R.
+
+    The divergence is that of a linear function fitted to the normals of the skin within the
+    radius, so a fold narrower than the radius appears smoothed, and the triangulation does not
+    show. On cylinders and balls the tangential components of the normal are exactly linear.
+
+    Args:
+        points_m, normals: (N, 3) where it is wanted.
+        skin_m, skin_normals, skin_areas_m2: (S, 3), (S, 3), (S,) samples of the skin.
+        radius_m: of the neighbourhood [m].
+    """
+    tree = cKDTree(skin_m)
+    result = np.empty(len(points_m))
+    for start in range(0, len(points_m), BLOCK):
+        block = slice(start, start + BLOCK)
+        near = cKDTree(points_m[block]).sparse_distance_matrix(
+            tree, radius_m, output_type='ndarray'
+        )
+        i, j = near['i'], near['j']
+        same_side = np.einsum('ij,ij->i', normals[block][i], skin_normals[j]) > OTHER_SIDE_COSINE
+        i, j = i[same_side], j[same_side]
+        weight = skin_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
+        offset = skin_m[j] - points_m[block][i]
+        axes = tangents(normals[block])
+        place = np.einsum('kni,ni->kn', axes[:, i], offset)
+        lean = np.einsum('kni,ni->kn', axes[:, i], skin_normals[j])
+        result[block] = -_divergence(i, weight, place, lean, len(axes[0]))
+    return result
+
+
+def tangents(normals: np.ndarray) -> np.ndarray:
+    """(2, N, 3) unit vectors that make a right-handed frame with the (N, 3) unit normals."""
+    # Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.
+    x, y, z = normals.T
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    b = x * y * a
+    first = np.stack([1.0 + sign * x * x * a, sign * b, -sign * x], axis=1)
+    second = np.stack([b, sign + y * y * a, -y], axis=1)
+    return np.stack([first, second])
+
+
+def _divergence(
+    group: np.ndarray, weight: np.ndarray, place: np.ndarray, lean: np.ndarray, count: int
+) -> np.ndarray:
+    """Trace of the matrix J of the weighted fit lean = constant + J place, a group at a time."""
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.bincount(group, weight * values, minlength=count) / total
+
+    total = np.maximum(np.bincount(group, weight, minlength=count), 1e-300)
+    x, y = (component - mean(component)[group] for component in place)
+    u, v = lean
+    xx, xy, yy = mean(x * x), mean(x * y), mean(y * y)
+    ux, uy, vx, vy = mean(u * x), mean(u * y), mean(v * x), mean(v * y)
+    # A hair of ridge: neighbours on one line say nothing across it.
+    ridge = 1e-6 * (xx + yy) + 1e-18
+    xx, yy = xx + ridge, yy + ridge
+    return (ux * yy - uy * xy + vy * xx - vx * xy) / (xx * yy - xy * xy)

@@ -1,0 +1,109 @@
+"""Where points near the part lie on its skin."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+# How much further away than the nearest skin the side that a normal points out of may be.
+THICKNESS_M = 0.06
+# Beyond this distance the place is only good to a triangle: nobody paints or measures there.
+FAR_M = 0.3
+FEW = 32
+BLOCK = 2048
+
+
+@dataclass(frozen=True)
+class Location:
+    """Places on the skin closest to N points.
+
+    Attributes:
+        positions_m: (N, 3) the places [m].
+        normals: (N, 3) outward unit normals of the skin there.
+        faces: (N,) triangle.
+        weights: (N, 3) barycentric weights of its corners.
+        distance_m: (N,) from the point to the place [m].
+        angle_rad: (N,) between the point's own normal and the skin's, NaN where none was given.
+    """
+
+    positions_m: np.ndarray
+    normals: np.ndarray
+    faces: np.ndarray
+    weights: np.ndarray
+    distance_m: np.ndarray
+    angle_rad: np.ndarray
+
+
+class SkinLocator:
+    """Finds closest places on a refined mesh.
+
+    Args:
+        vertices_m: (V, 3) [m].
+        faces: (F, 3).
+        normals: (V, 3) outward unit normals.
+    """
+
+    def __init__(self, vertices_m: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> None:
+        self._vertices_m, self._faces, self._normals = vertices_m, faces, normals
+        corners = vertices_m[faces]
+        self._centres = corners.mean(axis=1)
+        self._reach_m = float(np.linalg.norm(corners - self._centres[:, None], axis=2).max())
+        self._tree = cKDTree(self._centres)
+
+    def locate(self, points_m: np.ndarray, normals: np.ndarray | None = None) -> Location:
+        """See ``Surface.locate``."""
+        points_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
+        face = np.empty(len(points_m), dtype=np.int64)
+        place = np.empty((len(points_m), 3))
+        for start in range(0, len(points_m), BLOCK):
+            block = slice(start, start + BLOCK)
+            wanted = None if normals is None else np.asarray(normals, dtype=np.float64)[block]
+            face[block], place[block] = self._closest(points_m[block], wanted)
+        weights = _barycentric(self._vertices_m[self._faces[face]], place)
+        outward = np.einsum('nk,nki->ni', weights, self._normals[self._faces[face]])
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        distance = np.linalg.norm(points_m - place, axis=1)
+        return Location(place, outward, face, weights, distance, _angle(outward, normals))
+
+    def _closest(
+        self, points_m: np.ndarray, normals: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        from trimesh.triangles import closest_point
+
+        nearest, few = self._tree.query(points_m, k=min(FEW, len(self._faces)))
+        nearest, few = nearest.reshape(len(points_m), -1), few.reshape(len(points_m), -1)
+        # No point of a triangle is further from its centre than the reach.
+        radius = nearest[:, 0] + self._reach_m + (0.0 if normals is None else THICKNESS_M)
+        far = nearest[:, 0] > FAR_M
+        near = self._tree.query_ball_point(points_m, np.where(far, 0.0, radius))
+        near = [few[n] if far[n] else faces for n, faces in enumerate(near)]
+        point = np.repeat(np.arange(len(points_m)), [len(faces) for faces in near])
+        face = np.concatenate([np.asarray(faces, dtype=np.int64) for faces in near])
+        place = closest_point(self._vertices_m[self._faces[face]], points_m[point])
+        distance = np.linalg.norm(place - points_m[point], axis=1)
+        if normals is not None:
+            facing = self._normals[self._faces[face]].sum(axis=1)
+            averse = np.einsum('ij,ij->i', facing, normals[point]) < 0.0
+            distance = distance + THICKNESS_M * averse
+        order = np.lexsort((distance, point))
+        first = order[np.unique(point[order], return_index=True)[1]]
+        return face[first], place[first]
+
+
+def _barycentric(corners_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    """(N, 3) weights of the corners (N, 3, 3) at points (N, 3) in their triangles."""
+    a, b, c = corners_m.transpose(1, 0, 2)
+    whole = np.cross(b - a, c - a)
+    size2 = np.einsum('ij,ij->i', whole, whole)
+    of_b = np.einsum('ij,ij->i', np.cross(points_m - a, c - a), whole) / size2
+    of_c = np.einsum('ij,ij->i', np.cross(b - a, points_m - a), whole) / size2
+    weights = np.clip(np.stack([1.0 - of_b - of_c, of_b, of_c], axis=1), 0.0, 1.0)
+    return weights / weights.sum(axis=1, keepdims=True)
+
+
+def _angle(outward: np.ndarray, normals: np.ndarray | None) -> np.ndarray:
+    if normals is None:
+        return np.full(len(outward), np.nan)
+    normals = np.asarray(normals, dtype=np.float64)
+    across = np.linalg.norm(np.cross(outward, normals), axis=1)
+    return np.arctan2(across, np.einsum('ij,ij->i', outward, normals))

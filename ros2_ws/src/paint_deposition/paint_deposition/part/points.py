@@ -1,0 +1,167 @@
+"""Points on a part at which the film is wanted, with what the part is like there."""
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+DOWN = (0.0, 0.0, -1.0)
+
+# A covariate, or how to get it once an effect asks for it.
+Covariate = np.ndarray | Callable[[], np.ndarray]
+
+
+class SurfacePoints:
+    """Points of a part's skin and their covariates; those that cost time are computed when used.
+
+    Args:
+        positions_m: (V, 3) [m].
+        normals: (V, 3) outward unit normals.
+        down: (3,) unit vector of gravity in the mesh frame.
+        outward: (3,) mean outward unit normal of the part; default that of the points.
+        centre_m: (3,) centre of the part's bounding box [m]; default that of the points.
+        area_m2: (V,) skin that each point stands for, or None for gauge readings.
+        curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
+        edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
+        openness: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
+        height_fraction: (V,) 0 at the lowest point of the part to 1 at the highest; default over
+            the points themselves.
+        slope_per_m: (V, V) sparse, maps a field on the points to its derivative along gravity's
+            component in the skin [1/m]; default no neighbours, hence zero.
+
+    Covariates are arrays or functions without arguments that return them.
+    """
+
+    def __init__(
+        self,
+        positions_m: np.ndarray,
+        normals: np.ndarray,
+        *,
+        down: np.ndarray | tuple[float, float, float] = DOWN,
+        outward: np.ndarray | None = None,
+        centre_m: np.ndarray | None = None,
+        area_m2: np.ndarray | None = None,
+        curvature_per_m: Covariate | None = None,
+        edge_distance_m: Covariate | None = None,
+        openness: Covariate | None = None,
+        height_fraction: Covariate | None = None,
+        slope_per_m: csr_matrix | Callable[[], csr_matrix] | None = None,
+    ) -> None:
+        self.positions_m = np.ascontiguousarray(positions_m, dtype=np.float64)
+        self.normals = np.ascontiguousarray(normals, dtype=np.float64)
+        self.down = np.asarray(down, dtype=np.float64)
+        if outward is None:
+            outward = outward_side(self.normals, area_m2, self.down)
+        self.outward = outward
+        self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
+        self.area_m2 = area_m2
+        count = len(self.positions_m)
+        self._covariates = {
+            'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
+            'edge_distance_m': _default(edge_distance_m, lambda: np.full(count, np.inf)),
+            'openness': _default(openness, lambda: np.ones(count)),
+            'height_fraction': _default(height_fraction, self._own_height_fraction),
+            'slope_per_m': _default(slope_per_m, lambda: csr_matrix((count, count))),
+        }
+
+    def __len__(self) -> int:
+        return len(self.positions_m)
+
+    def __getstate__(self) -> dict:
+        """Covariates are computed before points go to another process."""
+        for name in self._covariates:
+            self._covariate(name)
+        return self.__dict__
+
+    @property
+    def curvature_per_m(self) -> np.ndarray:
+        """(V,) k1 + k2 [1/m], positive where the skin is concave toward the gun."""
+        return self._covariate('curvature_per_m')
+
+    @property
+    def edge_distance_m(self) -> np.ndarray:
+        """(V,) distance to the nearest free edge [m], inf where the part has none."""
+        return self._covariate('edge_distance_m')
+
+    @property
+    def openness(self) -> np.ndarray:
+        """(V,) cosine-weighted share of the hemisphere over the point that is not hidden."""
+        return self._covariate('openness')
+
+    @property
+    def height_fraction(self) -> np.ndarray:
+        """(V,) 0 at the lowest point of the part to 1 at its highest."""
+        return self._covariate('height_fraction')
+
+    @property
+    def slope_per_m(self) -> csr_matrix:
+        """(V, V) sparse derivative along gravity's component in the skin [1/m].
+
+        ``points.slope_per_m @ field``: on a vertical skin the change of the field per metre
+        downward; on skin that leans by an angle a from the horizontal sin(a) times the change
+        per metre, zero on a horizontal one. Rows of points without neighbours are zero.
+        """
+        return self._covariate('slope_per_m')
+
+    def select(self, rows: np.ndarray | slice | list[int]) -> 'SurfacePoints':
+        """The chosen rows (mask, slice or indices), covariates computed only if used.
+
+        Slopes need neighbours: a row some of whose neighbours are not chosen has slope zero.
+        """
+        rows = np.arange(len(self))[rows]
+        kept = {
+            name: lambda name=name: self._covariate(name)[rows]
+            for name in self._covariates
+            if name != 'slope_per_m'
+        }
+        return SurfacePoints(
+            self.positions_m[rows],
+            self.normals[rows],
+            down=self.down,
+            outward=self.outward,
+            centre_m=self.centre_m,
+            area_m2=None if self.area_m2 is None else self.area_m2[rows],
+            slope_per_m=lambda: _slope_among(self.slope_per_m, rows),
+            **kept,
+        )
+
+    def _covariate(self, name: str) -> Any:
+        value = self._covariates[name]
+        if callable(value):
+            value = self._covariates[name] = value()
+        return value
+
+    def _own_height_fraction(self) -> np.ndarray:
+        height = -self.positions_m @ self.down
+        extent = np.ptp(height) if len(height) else 0.0
+        return (height - height.min()) / extent if extent > 0 else np.zeros(len(height))
+
+
+def outward_side(normals: np.ndarray, areas_m2: np.ndarray | None, down: np.ndarray) -> np.ndarray:
+    """(3,) unit mean of the (V, 3) normals; where they cancel, as on a closed body, -y or z."""
+    mean = np.average(normals, axis=0, weights=areas_m2) if len(normals) else np.zeros(3)
+    length = np.linalg.norm(mean)
+    if length > 0.1:
+        return mean / length
+    return np.array([0.0, -1.0, 0.0]) if abs(down[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
+
+
+def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
+    """(3,) centre of the bounding box of (V, 3) points [m]."""
+    if not len(positions_m):
+        return np.zeros(3)
+    return 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
+
+
+def _default(given: Any, otherwise: Callable[[], Any]) -> Any:
+    return otherwise if given is None else given
+
+
+def _slope_among(slope: csr_matrix, rows: np.ndarray) -> csr_matrix:
+    whole = slope[rows]
+    inside = whole[:, rows]
+    complete = np.diff(whole.indptr) == np.diff(inside.indptr)
+    inside.data *= np.repeat(complete, np.diff(inside.indptr))
+    inside.eliminate_zeros()
+    return inside

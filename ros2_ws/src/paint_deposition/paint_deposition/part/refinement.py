@@ -1,0 +1,225 @@
+"""From the triangles of a file to a conforming mesh of bounded edge length."""
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
+
+from paint_deposition.errors import MeshError
+from paint_deposition.part.needles import CutEdges, cut_edges, cut_needles, find_needles
+
+WELD_M = 1e-6
+MAX_TRIANGLES = 4_000_000
+KEY_BASE = np.int64(1) << 31
+
+
+def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Make vertices closer than a micrometre one: STL repeats them for every triangle.
+
+    Returns:
+        Vertices (V, 3) [m] in the order in which they first appear, and faces (F, 3) on them.
+    """
+    unique, first, label = np.unique(vertices_m, axis=0, return_index=True, return_inverse=True)
+    label = label.ravel()
+    close = cKDTree(unique).query_pairs(WELD_M, output_type='ndarray')
+    if len(close):
+        links = coo_matrix((np.ones(len(close)), close.T), shape=(len(unique), len(unique)))
+        count, group = connected_components(links, directed=False)
+        label = group[label]
+        lowest = np.full(count, len(vertices_m))
+        np.minimum.at(lowest, group, first)
+        first = lowest
+    order = np.argsort(first)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    return vertices_m[first[order]], rank[label][faces]
+
+
+def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F,) areas [m^2]."""
+    return 0.5 * np.linalg.norm(_face_vectors(vertices_m, faces), axis=1)
+
+
+def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F, 3) unit normals by the right-hand rule."""
+    vectors = _face_vectors(vertices_m, faces)
+    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    a, b, c = vertices_m[faces].transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
+
+
+def refine(
+    vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, max_edge_length_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Halve the longest edges of triangles until none is longer than wanted.
+
+    An edge is halved for both its triangles at once, so no cracks open, and a triangle only ever
+    together with its own longest edge, which keeps every angle above half the smallest one given
+    (Rivara, Mesh refinement processes based on the generalized bisection of simplices, 1984);
+    needles are cut across instead. Normals go along and are interpolated, so that a coarse
+    triangulation of a curved skin keeps the normals of the curve.
+
+    Args:
+        vertices_m: (V, 3) [m].
+        normals: (V, 3) unit.
+        faces: (F, 3).
+        max_edge_length_m: [m].
+
+    Returns:
+        Vertices, unit normals and faces of the refined mesh.
+
+    Raises:
+        MeshError: it would have more than MAX_TRIANGLES triangles.
+    """
+    _refuse_too_many(vertices_m, faces, max_edge_length_m)
+    mesh = _Growing(vertices_m, normals)
+    while True:
+        edges, of_face = _edges(faces)
+        ends = mesh.vertices_m[edges]
+        length_m = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        known = mesh.known_middles(edges)
+        too_long = length_m > max_edge_length_m
+        in_step = known.max() < 0
+        if in_step and not too_long.any():
+            return mesh.vertices_m, mesh.normals, faces
+        thin = find_needles(length_m[of_face], max_edge_length_m)
+        if in_step and len(thin):
+            cut = cut_edges(of_face[thin], length_m, max_edge_length_m, len(mesh.vertices_m))
+            pieces = cut_needles(faces[thin], of_face[thin], length_m, cut)
+            mesh.add_cuts(edges, cut)
+            faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
+            continue
+        # Ranks instead of lengths: neighbours agree on which of two equal edges is the longer.
+        rank = np.empty(len(edges), dtype=np.int64)
+        rank[np.argsort(length_m, kind='stable')] = np.arange(len(edges))
+        longest = rank[of_face].argmax(axis=1)
+        own_longest = of_face[np.arange(len(faces)), longest]
+        halved = _closed_under_longest(too_long | (known >= 0), of_face, own_longest)
+        middle = mesh.add_middles(edges, halved, known)
+        faces = _split(mesh.vertices_m, faces, middle[of_face], longest)
+
+
+class _Growing:
+    """Vertices with normals, to which middles of edges are added.
+
+    Once a needle's edge was cut ahead of its neighbour's, the middles that the neighbour has to
+    meet are remembered.
+    """
+
+    def __init__(self, vertices_m: np.ndarray, normals: np.ndarray) -> None:
+        self.vertices_m, self.normals = vertices_m, normals
+        self._keys = np.empty(0, dtype=np.int64)
+        self._middles = np.empty(0, dtype=np.int64)
+
+    def known_middles(self, edges: np.ndarray) -> np.ndarray:
+        """(E,) vertex in the middle of each edge where there is one already, else -1."""
+        if not len(self._keys):
+            return np.full(len(edges), -1)
+        key = edges[:, 0] * KEY_BASE + edges[:, 1]
+        place = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
+        return np.where(self._keys[place] == key, self._middles[place], -1)
+
+    def add_middles(self, edges: np.ndarray, halved: np.ndarray, known: np.ndarray) -> np.ndarray:
+        """(E,) middles of the edges to halve, new or known, -1 elsewhere."""
+        new = halved & (known < 0)
+        middle = np.where(new, len(self.vertices_m) + np.cumsum(new) - 1, known)
+        self._append(edges[new], np.full((np.sum(new), 1), 0.5))
+        if len(self._keys):
+            self._remember(edges[new, 0], edges[new, 1], middle[new])
+        return middle
+
+    def add_cuts(self, edges: np.ndarray, cut: CutEdges) -> None:
+        """Add the inner vertices of cut edges."""
+        edge = np.repeat(np.arange(len(edges)), cut.parts - 1)
+        step = np.arange(len(edge)) - np.repeat(
+            np.cumsum(cut.parts - 1) - cut.parts, cut.parts - 1
+        )
+        self._append(edges[edge], (step / cut.parts[edge])[:, None])
+        self._keys = self._middles = np.empty(0, dtype=np.int64)
+        self._remember(*cut.middles(edges))
+
+    def _remember(self, lower: np.ndarray, upper: np.ndarray, middle: np.ndarray) -> None:
+        keys = np.concatenate([self._keys, lower * KEY_BASE + upper])
+        order = np.argsort(keys)
+        self._keys, self._middles = keys[order], np.concatenate([self._middles, middle])[order]
+
+    def _append(self, edges: np.ndarray, share: np.ndarray) -> None:
+        start, end = edges.T
+        points = (1.0 - share) * self.vertices_m[start] + share * self.vertices_m[end]
+        between = (1.0 - share) * self.normals[start] + share * self.normals[end]
+        between /= np.maximum(np.linalg.norm(between, axis=1, keepdims=True), 1e-12)
+        self.vertices_m = np.concatenate([self.vertices_m, points])
+        self.normals = np.concatenate([self.normals, between])
+
+
+def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(E, 2) ends of the edges, lower first, and (F, 3) which one leaves each corner."""
+    following = np.roll(faces, -1, axis=1)
+    keys = np.minimum(faces, following) * KEY_BASE + np.maximum(faces, following)
+    keys, of_face = np.unique(keys, return_inverse=True)
+    return np.stack(np.divmod(keys, KEY_BASE), axis=1), of_face.reshape(-1, 3)
+
+
+def _closed_under_longest(
+    halved: np.ndarray, of_face: np.ndarray, own_longest: np.ndarray
+) -> np.ndarray:
+    """(E,) edges to halve: those given, and the longest of every triangle that is touched."""
+    halved = halved.copy()
+    while True:
+        touched = halved[of_face].any(axis=1) & ~halved[own_longest]
+        if not touched.any():
+            return halved
+        halved[own_longest[touched]] = True
+
+
+def _split(
+    vertices_m: np.ndarray, faces: np.ndarray, middle: np.ndarray, longest: np.ndarray
+) -> np.ndarray:
+    """Cut triangles at the middles of their edges.
+
+    ``middle`` (F, 3) has the vertex in the middle of each edge, -1 where that stays whole; the
+    longest is halved wherever another is.
+    """
+    kept = middle.max(axis=1) < 0
+    rows = np.flatnonzero(~kept)
+    turn = (longest[rows, None] + np.arange(3)) % 3
+    a, b, c = faces[rows[:, None], turn].T
+    m, p, q = middle[rows[:, None], turn].T
+    bc, ca = p >= 0, q >= 0
+    one = ~bc & ~ca
+    quads = np.stack([m, np.where(bc, p, b), c, np.where(ca, q, a)], axis=1)[~one]
+    return np.concatenate(
+        [
+            faces[kept],
+            np.stack([m, b, c], axis=1)[one],
+            np.stack([a, m, c], axis=1)[one],
+            np.stack([m, b, p], axis=1)[bc],
+            np.stack([a, m, q], axis=1)[ca],
+            *_halves(vertices_m, quads),
+        ]
+    )
+
+
+def _halves(vertices_m: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two triangles for each quadrilateral (Q, 4), cut along its shorter diagonal."""
+    w, x, y, z = vertices_m[quads].transpose(1, 0, 2)
+    straight = np.linalg.norm(w - y, axis=1) <= np.linalg.norm(x - z, axis=1)
+    quads = np.where(straight[:, None], quads, np.roll(quads, -1, axis=1))
+    return quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]
+
+
+def _refuse_too_many(vertices_m: np.ndarray, faces: np.ndarray, edge_m: float) -> None:
+    corners = vertices_m[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    # Halving ends between half the length and the length: up to 8 triangles an edge squared.
+    by_area = 8.0 * face_areas_m2(vertices_m, faces) / edge_m**2
+    expected = float(np.maximum(np.maximum(by_area, 4.0 * longest / edge_m), 1.0).sum())
+    if expected > MAX_TRIANGLES:
+        raise MeshError(
+            f'max_edge_length_m = {edge_m:g} m would cut this mesh into about {expected:.2g} '
+            'triangles; give an edge length of at least '
+            f'{edge_m * np.sqrt(expected / MAX_TRIANGLES):.2g} m'
+        )

@@ -1,0 +1,206 @@
+"""The part's skin as a taught path sees it: a smooth height over a plane in front of the part."""
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
+
+from paint_deposition.errors import PlanError
+from paint_deposition.part.surface import Surface
+
+# Skin that leans further from the gun's side than this is not painted from it.
+STEEPEST_COSINE = math.cos(math.radians(75.0))
+# Mean normals shorter than this share have no side: a closed body.
+LEAST_SIDE = 0.2
+FINEST_CELL_M, COARSEST_CELL_M = 0.004, 0.02
+CELLS_PER_RADIUS = 5.0
+MOST_CELLS = 1_000_000
+# The blend from the skin to what stands in for it outside, in radii.
+OUTSIDE_BLEND = 0.5
+LIFT_M = 1e-3
+
+
+@dataclass(frozen=True)
+class PartAxes:
+    """Axes in which passes are laid, seen from the gun's side.
+
+    Attributes:
+        origin_m: (3,) middle of the part.
+        travel: (3,) unit vector of the first pass's direction.
+        across: (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
+        outward: (3,) unit vector from the part to the gun.
+    """
+
+    origin_m: np.ndarray
+    travel: np.ndarray
+    across: np.ndarray
+    outward: np.ndarray
+
+    def coordinates_m(self, points_m: np.ndarray) -> np.ndarray:
+        """(N, 3) distances along travel, across and outward [m]."""
+        return (points_m - self.origin_m) @ self.matrix
+
+    def points_m(self, coordinates_m: np.ndarray) -> np.ndarray:
+        """(N, 3) places of such coordinates [m]."""
+        return self.origin_m + coordinates_m @ self.matrix.T
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(3, 3) travel, across and outward as columns."""
+        return np.stack([self.travel, self.across, self.outward], axis=1)
+
+
+def part_axes(
+    surface: Surface, direction: str = 'horizontal', outward: np.ndarray | None = None
+) -> PartAxes:
+    """Axes for horizontal or vertical passes.
+
+    Args:
+        surface: the part.
+        direction: 'horizontal' (travel to the right as the gun sees it) or 'vertical' (travel
+            downward).
+        outward: from the part to the gun, any length; default: the mean normal.
+
+    Raises:
+        PlanError: the direction is another, or the part has no side to paint from.
+    """
+    if direction not in ('horizontal', 'vertical'):
+        raise PlanError(f"direction is '{direction}'; give horizontal or vertical")
+    if outward is None:
+        outward = surface.vertex_areas_m2 @ surface.normals
+        if np.linalg.norm(outward) < LEAST_SIDE * surface.area_m2:
+            raise PlanError(
+                'the part is closed, it has no side to paint from; say where the gun stands '
+                '(outward)'
+            )
+    outward = np.asarray(outward, dtype=float)
+    if not np.linalg.norm(outward) > 0.0:
+        raise PlanError('outward is a vector of length 0; give the direction to the gun')
+    outward = outward / np.linalg.norm(outward)
+    down = surface.down - (surface.down @ outward) * outward
+    if np.linalg.norm(down) < 0.1:
+        raise PlanError(
+            'gravity points along the gun: level is not defined; give gravity in the plane of '
+            'the part (down)'
+        )
+    down /= np.linalg.norm(down)
+    level = np.cross(outward, down)
+    centre = 0.5 * (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0))
+    travel = level if direction == 'horizontal' else down
+    return PartAxes(centre, travel, np.cross(-outward, travel), outward)
+
+
+class SkinMap:
+    """Smoothed height and slope of the painted side over (travel, across).
+
+    About each place a plane is fitted to the skin with Gaussian weights of half the radius. Past
+    the part's edges height and slope go over to what they are at the edge.
+
+    Args:
+        surface: the part.
+        axes: where the gun stands.
+        radius_m: what is finer than this is smoothed away [m].
+    """
+
+    def __init__(self, surface: Surface, axes: PartAxes, radius_m: float) -> None:
+        if not (math.isfinite(radius_m) and radius_m > 0.0):
+            raise PlanError(f'smoothing_radius_m is {radius_m:g}; give a number above 0')
+        self.axes = axes
+        self.radius_m = radius_m
+        facing = surface.normals @ axes.outward
+        self.painted = (facing > STEEPEST_COSINE) & _in_front(surface, axes)
+        if not self.painted.any():
+            raise PlanError('no skin faces the gun; give the direction to the gun (outward)')
+        self.skin_m = axes.coordinates_m(surface.vertices_m[self.painted])
+        weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]
+        cell = min(max(radius_m / CELLS_PER_RADIUS, FINEST_CELL_M), COARSEST_CELL_M)
+        cell = max(cell, surface.longest_edge_m)
+        margin = 3.0 * radius_m + 2.0 * cell
+        low = self.skin_m[:, :2].min(axis=0) - margin
+        high = self.skin_m[:, :2].max(axis=0) + margin
+        cell = max(cell, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+        count = np.ceil((high - low) / cell).astype(int) + 1
+        self._lines = [low[k] + cell * np.arange(count[k]) for k in range(2)]
+        self._cell_m = cell
+        fields = self._smoothed(weight)
+        self._splines = [RectBivariateSpline(*self._lines, field) for field in fields]
+
+    def height_m(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
+        """(N,) smoothed coordinate along outward [m]."""
+        return self._splines[0].ev(*self._held(travel_m, across_m))
+
+    def normals(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
+        """(N, 3) unit normals of the smoothed skin, in the part's frame."""
+        place = self._held(travel_m, across_m)
+        slopes = [spline.ev(*place) for spline in self._splines[1:]]
+        normals = np.stack([-slopes[0], -slopes[1], np.ones(len(slopes[0]))], axis=1)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes.matrix.T
+
+    @cached_property
+    def extent_m(self) -> np.ndarray:
+        """(2, 2) least and greatest coordinate along travel and across [m]."""
+        return np.stack([self.skin_m[:, :2].min(axis=0), self.skin_m[:, :2].max(axis=0)], axis=1)
+
+    def extent_near_m(self, across_m: float, band_m: float) -> tuple[float, float]:
+        """Ends along travel of the skin within a band about a line; of the nearest if none is."""
+        distance = np.abs(self.skin_m[:, 1] - across_m)
+        near = self.skin_m[distance <= max(band_m, distance.min() + self._cell_m), 0]
+        return float(near.min()), float(near.max())
+
+    def _held(self, travel_m: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            np.clip(travel_m, self._lines[0][0], self._lines[0][-1]),
+            np.clip(across_m, self._lines[1][0], self._lines[1][-1]),
+        )
+
+    def _smoothed(self, weight: np.ndarray) -> list[np.ndarray]:
+        """Height and both slopes on the grid, by planes fitted with Gaussian weights."""
+        shape = tuple(len(line) for line in self._lines)
+        origin = np.array([line[0] for line in self._lines])
+        at = np.rint((self.skin_m[:, :2] - origin) / self._cell_m).astype(int)
+        cells = np.ravel_multi_index((at[:, 0], at[:, 1]), shape)
+        u, v, z = self.skin_m.T
+        deviation = 0.5 * self.radius_m / self._cell_m
+
+        def moment(values: np.ndarray) -> np.ndarray:
+            binned = np.bincount(cells, weight * values, minlength=math.prod(shape))
+            return gaussian_filter(binned.reshape(shape), deviation, mode='constant', truncate=4.0)
+
+        total = np.maximum(moment(np.ones(len(u))), 1e-300)
+        mean_u, mean_v, mean_z = (moment(values) / total for values in (u, v, z))
+        # A bit of the kernel's own spread keeps slopes finite where hardly any skin is near.
+        ridge = 1e-3 * self.radius_m**2
+        uu = moment(u * u) / total - mean_u**2 + ridge
+        vv = moment(v * v) / total - mean_v**2 + ridge
+        uv = moment(u * v) / total - mean_u * mean_v
+        uz = moment(u * z) / total - mean_u * mean_z
+        vz = moment(v * z) / total - mean_v * mean_z
+        determinant = uu * vv - uv**2
+        slope_u = (uz * vv - vz * uv) / determinant
+        slope_v = (vz * uu - uz * uv) / determinant
+        grid_u, grid_v = np.meshgrid(*self._lines, indexing='ij')
+        height = mean_z + slope_u * (grid_u - mean_u) + slope_v * (grid_v - mean_v)
+        skin = np.bincount(cells, minlength=math.prod(shape)).reshape(shape) > 0
+        return [self._extended(field, skin) for field in (height, slope_u, slope_v)]
+
+    def _extended(self, field: np.ndarray, skin: np.ndarray) -> np.ndarray:
+        """The field inside the part; outside it what it is at the nearest place inside."""
+        inside = binary_closing(skin, iterations=3) | skin
+        nearest = distance_transform_edt(~inside, return_distances=False, return_indices=True)
+        held = field[tuple(nearest)]
+        deviation = OUTSIDE_BLEND * self.radius_m / self._cell_m
+        blended = gaussian_filter(held, deviation, mode='nearest')
+        near = gaussian_filter(inside.astype(float), deviation, mode='nearest')
+        # Well inside the fitted plane stands; at the edge it goes over to the blend.
+        share = np.clip(2.0 * near - 1.0, 0.0, 1.0)
+        return share * held + (1.0 - share) * blended
+
+
+def _in_front(surface: Surface, axes: PartAxes) -> np.ndarray:
+    """(V,) whether nothing of the part lies between the vertex and the gun's side."""
+    starts = surface.vertices_m + LIFT_M * axes.outward
+    directions = np.broadcast_to(axes.outward, starts.shape)
+    return surface.occluder.first_faces(starts, np.ascontiguousarray(directions)) < 0

@@ -1,0 +1,209 @@
+"""The part's skin as a refined triangle mesh, and where points lie on it."""
+
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.part import creases, curvature, edge_distance, slope
+from paint_deposition.part.locating import Location, SkinLocator
+from paint_deposition.part.normals import skin_normals
+from paint_deposition.part.points import SurfacePoints, box_centre_m, outward_side
+from paint_deposition.part.refinement import face_areas_m2, refine
+from paint_deposition.part.visibility import Occluder
+
+# A part whose mean normal leans less than this from the horizontal plane stands.
+STANDING_COSINE = 0.7
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A part's skin; its outward side, where paint lands, is the one its triangles turn out.
+
+    Attributes:
+        vertices_m: (V, 3) [m]; along creases and rims of the same place several times, once for
+            each smooth patch.
+        faces: (F, 3) int, right-handed about the outward normal.
+        normals: (V, 3) outward unit normals of the curved skin.
+        vertex_areas_m2: (V,) a third of the adjoining triangles [m^2]; sums to the skin's area.
+        down: (3,) unit vector of gravity in the mesh frame.
+        rim_m: (B, 2, 3) segments of the free edges [m].
+        notes: what had to be put right in the file, for the user to read.
+    """
+
+    vertices_m: np.ndarray
+    faces: np.ndarray
+    normals: np.ndarray
+    vertex_areas_m2: np.ndarray
+    down: np.ndarray
+    rim_m: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 3)))
+    notes: tuple[str, ...] = ()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What is kept of rays and searches stays behind: it can be made again."""
+        return {item.name: getattr(self, item.name) for item in fields(self)}
+
+    @staticmethod
+    def from_triangles(
+        vertices_m: np.ndarray,
+        faces: np.ndarray,
+        max_edge_length_m: float,
+        down: np.ndarray | None = None,
+        notes: tuple[str, ...] = (),
+    ) -> 'Surface':
+        """Refine clean triangles: finite, welded, consistently wound, none without area.
+
+        Args:
+            vertices_m: (V, 3) [m].
+            faces: (F, 3), right-handed about the outward normal.
+            max_edge_length_m: longest edge after refinement [m].
+            down: gravity in the mesh frame, any length; default as ``gravity`` guesses.
+            notes: kept with the surface.
+
+        Raises:
+            MeshError: refinement would give too many triangles.
+        """
+        edges = creases.Edges.of(faces)
+        origin, patches = creases.split_at_creases(vertices_m, faces, edges)
+        vertices, normals, fine = refine(
+            vertices_m[origin],
+            skin_normals(vertices_m[origin], patches),
+            patches,
+            max_edge_length_m,
+        )
+        areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
+        vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
+        if down is None:
+            down = gravity(normals, vertex_areas)
+        down = np.asarray(down, dtype=np.float64)
+        return Surface(
+            vertices,
+            fine,
+            normals,
+            vertex_areas,
+            down / np.linalg.norm(down),
+            creases.rim_segments_m(vertices_m, faces, edges),
+            notes,
+        )
+
+    @property
+    def area_m2(self) -> float:
+        """Area of the skin [m^2]."""
+        return float(self.vertex_areas_m2.sum())
+
+    @cached_property
+    def outward(self) -> np.ndarray:
+        """(3,) mean outward unit normal."""
+        return outward_side(self.normals, self.vertex_areas_m2, self.down)
+
+    @cached_property
+    def centre_m(self) -> np.ndarray:
+        """(3,) centre of the bounding box [m]."""
+        return box_centre_m(self.vertices_m)
+
+    @cached_property
+    def occluder(self) -> Occluder:
+        """The part as an obstacle to rays."""
+        return Occluder(self.vertices_m, self.faces)
+
+    def points(self) -> SurfacePoints:
+        """The vertices, with their areas; covariates are computed when used."""
+        return SurfacePoints(
+            self.vertices_m,
+            self.normals,
+            area_m2=self.vertex_areas_m2,
+            slope_per_m=lambda: slope.slope_operator(
+                self.vertices_m, self.faces, self.normals, self.down
+            ),
+            **self._covariates(self.vertices_m, self.normals),
+        )
+
+    def locate(self, points_m: np.ndarray, normals: np.ndarray | None = None) -> Location:
+        """The closest places on the skin; see ``Location``.
+
+        Args:
+            points_m: (N, 3) [m].
+            normals: (N, 3) outward, any length; between two sides of a thin part the one that
+                agrees is taken.
+        """
+        return self._locator.locate(points_m, normals)
+
+    def at(
+        self,
+        points_m: np.ndarray,
+        normals: np.ndarray | None = None,
+        stencil_m: float | None = None,
+    ) -> SurfacePoints:
+        """The skin at points near it, gauge readings for instance.
+
+        Args:
+            points_m: (N, 3) [m]; each is moved to the closest place on the skin.
+            normals: as in ``locate``.
+            stencil_m: if given, the N points are followed by N neighbours this far up the skin
+                and N this far down, and the slope is defined on the first N.
+        """
+        place = self.locate(points_m, normals)
+        positions, outward = place.positions_m, place.normals
+        operator = None
+        if stencil_m is not None and len(positions):
+            way = slope.downhill(outward, self.down)
+            unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
+            above = self.locate(positions - stencil_m * unit, outward)
+            below = self.locate(positions + stencil_m * unit, outward)
+            operator = slope.slope_at_stencil(positions, above.positions_m, below.positions_m, way)
+            positions = np.concatenate([positions, above.positions_m, below.positions_m])
+            outward = np.concatenate([outward, above.normals, below.normals])
+        return SurfacePoints(
+            positions,
+            outward,
+            slope_per_m=operator,
+            **self._covariates(positions, outward),
+        )
+
+    def _covariates(self, positions_m: np.ndarray, normals: np.ndarray) -> dict[str, Any]:
+        return {
+            'down': self.down,
+            'outward': self.outward,
+            'centre_m': self.centre_m,
+            'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
+            'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
+            'openness': lambda: self.occluder.openness(positions_m, normals),
+            'height_fraction': lambda: self._height_fraction(positions_m),
+        }
+
+    @cached_property
+    def _locator(self) -> SkinLocator:
+        return SkinLocator(self.vertices_m, self.faces, self.normals)
+
+    @cached_property
+    def longest_edge_m(self) -> float:
+        """Longest edge after refinement [m]."""
+        corners = self.vertices_m[self.faces]
+        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+
+    def _curvature_per_m(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        centre_normals = self.normals[self.faces].sum(axis=1)
+        centre_normals /= np.linalg.norm(centre_normals, axis=1, keepdims=True)
+        areas = face_areas_m2(self.vertices_m, self.faces)
+        return curvature.curvature_per_m(
+            positions_m,
+            normals,
+            np.concatenate([self.vertices_m, self.vertices_m[self.faces].mean(axis=1)]),
+            np.concatenate([self.normals, centre_normals]),
+            np.concatenate([self.vertex_areas_m2, areas]),
+            max(curvature.RADIUS_M, self.longest_edge_m),
+        )
+
+    def _height_fraction(self, positions_m: np.ndarray) -> np.ndarray:
+        heights = -self.vertices_m @ self.down
+        lowest, extent = heights.min(), np.ptp(heights)
+        return (-positions_m @ self.down - lowest) / extent if extent else 0.0 * positions_m[:, 0]
+
+
+def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
+    """Guess which way is down: -z for a part that stands, -y for one drawn lying in x-y."""
+    mean = areas_m2 @ normals
+    length = np.linalg.norm(mean)
+    lies = length > 0.0 and abs(mean[2]) >= STANDING_COSINE * length
+    return np.array([0.0, -1.0, 0.0]) if lies else np.array([0.0, 0.0, -1.0])
