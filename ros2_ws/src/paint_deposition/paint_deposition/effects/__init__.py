@@ -1,0 +1,1 @@
+"""Physics beyond the plain pattern, one file an effect."""

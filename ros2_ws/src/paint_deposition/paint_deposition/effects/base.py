@@ -1,0 +1,186 @@
+"""What an effect is: one physical cause, its parameters, and where in the model it acts."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple, cast
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field
+
+from paint_deposition.model.projection import Projection
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+
+# Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
+REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
+
+
+class Ray(NamedTuple):
+    """One straight ray from the emission point to a surface point, inside the kernel.
+
+    Attributes:
+        x_m, y_m: where it pierces the model plane, tool axes [m].
+        standoff_ratio: distance along the bell's axis over Omega [1].
+        cos_incidence: cosine of the angle to the surface normal, above 0 [1].
+        speed_m_per_s: speed of the atomizer [m/s].
+    """
+
+    x_m: float
+    y_m: float
+    standoff_ratio: float
+    cos_incidence: float
+    speed_m_per_s: float
+
+
+@dataclass(frozen=True)
+class PathContext:
+    """What an effect on the path may need besides the path.
+
+    Attributes:
+        projection: Omega and the emission point.
+        down: (3,) unit vector of gravity in the mesh frame.
+        outward: (3,) mean outward unit normal of the part.
+        centre_m: (3,) centre of the part [m].
+    """
+
+    projection: Projection
+    down: np.ndarray
+    outward: np.ndarray
+    centre_m: np.ndarray
+
+    @property
+    def across(self) -> np.ndarray:
+        """(3,) horizontal unit vector along the part, to the right as the gun sees it."""
+        across = np.cross(self.outward, self.down)
+        length = np.linalg.norm(across)
+        if length > 1e-3:
+            return across / length
+        # A part that lies flat has no right side: take the mesh's x, or y if x is vertical.
+        axis = np.eye(3)[0] if abs(self.down[0]) < 0.9 else np.eye(3)[1]
+        level = axis - (axis @ self.down) * self.down
+        return level / np.linalg.norm(level)
+
+    @property
+    def downhill(self) -> np.ndarray:
+        """(3,) unit vector down along the part, at right angles to ``across`` and ``outward``."""
+        downhill = np.cross(self.across, self.outward)
+        return downhill / np.linalg.norm(downhill)
+
+
+def parameter(
+    neutral: float,
+    *,
+    low: float,
+    high: float,
+    unit: str,
+    description: str,
+    typical: float | None = None,
+    role: str = 'amplitude',
+) -> Any:
+    """Declare a parameter of an effect.
+
+    Args:
+        neutral: value at which the effect is absent; for a shape, its default.
+        low, high: bounds; a value outside is refused. Where physics knows one sign only, the
+            neutral value is one of them.
+        unit: its unit; also part of the field's name where it is not 1.
+        description: what it is, with its symbol, and what a positive value means.
+        typical: size of the amplitude that occurs in practice, the scale of its prior. For a
+            shape, unused.
+        role: 'amplitude' (neutral means absent) or 'shape' (length or time scale).
+    """
+    if typical is None:
+        if role == 'amplitude':
+            raise TypeError('an amplitude needs its typical size: parameter(..., typical=...)')
+        typical = neutral
+    return Field(
+        neutral,
+        ge=low,
+        le=high,
+        description=f'{description} [{unit}]',
+        json_schema_extra={
+            'neutral': neutral, 'low': low, 'high': high, 'typical': typical,
+            'unit': unit, 'role': role,
+        },
+    )  # fmt: skip
+
+
+class Effect(BaseModel):
+    """Base of all effects: subclass it, name it, and define one of the places where it acts.
+
+    A subclass declares its parameters with ``parameter`` and overrides what it needs:
+
+    * ``on_path``: the motion is not what was recorded, or the flow not what was commanded.
+    * ``flux_factor``: a static function (ray, *parameters) -> factor on the flux along one ray,
+      compiled into the kernel; parameters in the order declared. Plain arithmetic, ``min`` and
+      ``max``, and ``film.fast_math``: a branch or a function of ``math`` costs the loop its
+      speed.
+    * ``pattern_scale``: the same, returning the factor s by which the pattern shrinks seen from
+      the emission point: q becomes s q and the flux s^2, so that no volume is lost.
+    * ``on_film``: the film changes after it has arrived.
+    * ``on_gauge``: the gauge reads something else than the film.
+
+    An effect made without arguments is absent.
+    """
+
+    model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
+
+    id: ClassVar[str]
+    family: ClassVar[str]
+    file: ClassVar[Path | None] = None  # a user's own effect
+    signature: ClassVar[str] = ''
+    rivals: ClassVar[tuple[str, ...]] = ()
+    source: ClassVar[str] = ''
+    needs_whole_strokes: ClassVar[bool] = False
+    needs_slope: ClassVar[bool] = False
+    flux_factor: ClassVar[Callable[..., float] | None] = None
+    pattern_scale: ClassVar[Callable[..., float] | None] = None
+
+    def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
+        """Return the path that really was sprayed."""
+        return path
+
+    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+        """Return the film (V,) [um] that is there in the end."""
+        return film_um
+
+    def on_gauge(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+        """Return what the gauge shows (V,) [um] on that film."""
+        return film_um
+
+    def reach(self) -> float:
+        """How many times wider than the model's pattern the spray can get, at least 1."""
+        return 1.0
+
+    def shadow(self) -> float:
+        """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
+        return 0.0
+
+    @property
+    def is_neutral(self) -> bool:
+        """Whether all amplitudes are at the value at which the effect is absent."""
+        described = self.parameters()
+        return all(getattr(self, name) == described[name]['neutral'] for name in self.amplitudes())
+
+    @classmethod
+    def typical(cls) -> 'Effect':
+        """The effect at the size in which it occurs in practice."""
+        return cls(**{name: described['typical'] for name, described in cls.parameters().items()})
+
+    @classmethod
+    def parameters(cls) -> dict[str, dict[str, Any]]:
+        """Unit, bounds, neutral and typical value and role of each parameter by name."""
+        return {
+            name: {**cast(dict, info.json_schema_extra), 'description': info.description}
+            for name, info in cls.model_fields.items()
+        }
+
+    @classmethod
+    def amplitudes(cls) -> tuple[str, ...]:
+        """Names of the parameters that make the effect absent at their neutral value."""
+        return tuple(n for n, p in cls.parameters().items() if p['role'] == 'amplitude')
+
+    def values(self) -> tuple[float, ...]:
+        """Parameter values in the order declared."""
+        return tuple(float(getattr(self, name)) for name in type(self).model_fields)

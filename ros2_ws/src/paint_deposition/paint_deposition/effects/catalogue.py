@@ -1,0 +1,66 @@
+"""Every effect that the project knows, and how to take in one more."""
+
+import difflib
+import importlib
+import pkgutil
+from pathlib import Path
+from types import MappingProxyType
+
+from paint_deposition import effects
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.own_effect import load_class
+from paint_deposition.errors import ModelError
+
+# In the order in which people look for causes.
+FAMILY_ORDER = (
+    'incidence', 'curvature', 'boundary', 'standoff', 'lateral shift', 'order', 'level', 'time',
+    'visibility',
+)  # fmt: skip
+
+
+def _effects_of_this_package() -> dict[str, type[Effect]]:
+    for module in pkgutil.iter_modules(effects.__path__, f'{effects.__name__}.'):
+        if module.name != __name__:
+            importlib.import_module(module.name)
+    own = [c for c in Effect.__subclasses__() if c.__module__.startswith(effects.__name__)]
+    own.sort(key=lambda effect: (FAMILY_ORDER.index(effect.family), effect.id))
+    return {effect.id: effect for effect in own}
+
+
+# Effect classes by id, and ids by family.
+EFFECTS = MappingProxyType(_effects_of_this_package())
+FAMILIES = MappingProxyType(
+    {
+        family: tuple(name for name, effect in EFFECTS.items() if effect.family == family)
+        for family in FAMILY_ORDER
+    }
+)
+
+
+def effect_class(effect_id: str) -> type[Effect]:
+    """The class of an effect.
+
+    Raises:
+        ModelError: there is none of that id; names the nearest.
+    """
+    if effect_id in EFFECTS:
+        return EFFECTS[effect_id]
+    near = difflib.get_close_matches(effect_id, EFFECTS, n=1, cutoff=0.4)
+    remedy = f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(EFFECTS)}'
+    raise ModelError(f'no effect is called {effect_id!r}; {remedy}')
+
+
+def load_effect_file(path: str | Path) -> type[Effect]:
+    """The class of a user's own effect: a Python file with one class derived from Effect.
+
+    The file is run: load only what you would run yourself.
+
+    Raises:
+        ModelError: the file cannot be run, its class is not sound, or its id is taken.
+    """
+    effect = load_class(Path(path))
+    if effect.id in EFFECTS:
+        raise ModelError(
+            f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
+        )
+    return effect
