@@ -1,0 +1,1 @@
+"""From gauge readings to a model: calibration, comparison, diagnosis, recommendation."""

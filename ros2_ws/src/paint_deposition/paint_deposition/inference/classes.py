@@ -1,0 +1,199 @@
+"""Effects that the readings cannot tell apart, and how probable it is that one of them acts."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+from scipy.stats import norm
+
+from paint_deposition.inference.evidence import Hypothesis, Judge
+from paint_deposition.inference.fit import Fit
+from paint_deposition.inference.hypotheses import posterior
+from paint_deposition.inference.judgement import Judgement
+from paint_deposition.inference.study import Study
+from paint_deposition.inference.unknowns import PATTERN, Unknowns
+
+# Effects whose marks on these readings are parallel to within this cosine are rivals.
+ALIKE = 0.9
+# Hypotheses this far behind the best by the linear evidence are not refitted.
+REFITTED_WITHIN = 7.0
+MOST_REFITTED = 10
+# An effect beside an unknown cause is the answer if it gives this share of their evidence.
+SUFFICIENT = 0.75
+WORTH_LISTING = 0.01
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A class of effects with the refitted model of its best member.
+
+    Attributes:
+        members: ids, most probable first.
+        probability: that one of them is missing, given that something is.
+        fit: of the model with the best member.
+    """
+
+    members: tuple[str, ...]
+    probability: float
+    fit: Fit
+
+    @property
+    def best(self) -> str:
+        """Id of the most probable member."""
+        return self.members[0]
+
+
+@dataclass(frozen=True)
+class Ranking:
+    """What is missing, given that something is.
+
+    Attributes:
+        classes: most probable first; as two may be missing, they may sum to more than one.
+        unknown: probability that the library does not explain it.
+        footprint: probability that the pattern itself deviates from eq. (1).
+    """
+
+    classes: tuple[Candidate, ...]
+    unknown: float
+    footprint: float
+
+
+def rank(study: Study, fit: Fit, judged: Judgement) -> Ranking:
+    """Refit the most probable hypotheses and sum probabilities by class.
+
+    Args:
+        study: the readings.
+        fit: the model so far.
+        judged: the linear evidence around it.
+    """
+    hypotheses = judged.weighing.hypotheses[1:]
+    factors = judged.weighing.log_factors[1:].copy()
+    fits = _refit(study, fit, judged, hypotheses, factors)
+    alone: dict[str, float] = {}
+    for h, factor in zip(hypotheses, factors, strict=True):
+        if _is_single(h):
+            alone[h.effects[0]] = max(factor, alone.get(h.effects[0], -np.inf))
+    weights = posterior(hypotheses, factors)
+    answers = np.array(
+        [
+            bool(h.effects)
+            and (not h.other or max(alone[e] for e in h.effects) >= SUFFICIENT * factor)
+            for h, factor in zip(hypotheses, factors, strict=True)
+        ]
+    )
+    other = np.array([h.other for h in hypotheses])
+    classes = []
+    left = sorted(alone, key=lambda effect_id: -alone[effect_id])
+    while left:
+        members = alike(judged, left)
+        left = [effect_id for effect_id in left if effect_id not in members]
+        holds = np.array([bool(set(members) & set(h.effects)) for h in hypotheses])
+        probability = float(weights[holds & answers].sum())
+        if probability >= WORTH_LISTING and members[0] in fits:
+            best = fits[members[0]].model
+            alone_fit = study.fit(Unknowns.of(best, *best.effects))
+            classes.append(Candidate(members, min(probability, 1.0), alone_fit))
+    return Ranking(
+        tuple(sorted(classes, key=lambda c: -c.probability)),
+        float(weights[(other == 'unknown') & ~answers].sum()),
+        float(weights[(other == 'footprint') & ~answers].sum()),
+    )
+
+
+def _refit(
+    study: Study, fit: Fit, judged: Judgement, hypotheses: list[Hypothesis], factors: np.ndarray
+) -> dict[str, Fit]:
+    """Replace the linear evidence of the most probable by that of a full refit.
+
+    Returns the fits of single effects; ``factors`` is changed in place.
+    """
+    freedom = study.noise.degrees_of_freedom
+    fits: dict[str, Fit] = {}
+    again = fit
+    if study.levels is not None:
+        again = study.fit(Unknowns.of(fit.model, *fit.model.effects), extra=study.levels)
+    base = _log_evidence(again, freedom)
+    weights = factors + np.log([h.prior for h in hypotheses])
+    order = np.argsort(-weights)
+    near = [k for k in order if weights[k] > weights[order[0]] - REFITTED_WITHIN]
+    singles = [k for k in order if _is_single(hypotheses[k])]
+    shapeless = [k for k in order if not hypotheses[k].effects]
+    for k in dict.fromkeys([*near[:MOST_REFITTED], *singles[:3], *shapeless[:2]]):
+        refitted = _fit_with(study, fit, judged, hypotheses[k])
+        factors[k] = _log_evidence(refitted, freedom) - base
+        if _is_single(hypotheses[k]):
+            rival = fits.get(hypotheses[k].effects[0])
+            if rival is None or refitted.chi_square < rival.chi_square:
+                fits[hypotheses[k].effects[0]] = refitted
+    return fits
+
+
+def _is_single(hypothesis: Hypothesis) -> bool:
+    return len(hypothesis.effects) == 1 and not hypothesis.other
+
+
+def _fit_with(study: Study, fit: Fit, judged: Judgement, hypothesis: Hypothesis) -> Fit:
+    """The model as the hypothesis has it, from where the linear evidence sees its effects."""
+    amplitudes = Judge(hypothesis).amplitudes(judged.base.deviation)
+    effects, used = [], 0
+    for effect_id in hypothesis.effects:
+        mark = next(
+            s
+            for s in judged.signatures
+            if s.id == effect_id and set(s.shape) <= set(hypothesis.shape)
+        )
+        info = type(mark.effect).parameters()
+        values = {}
+        for name, amount in zip(mark.names, amplitudes[used:], strict=False):
+            wanted = info[name]['neutral'] + info[name]['typical'] * float(amount)
+            values[name] = min(max(wanted, info[name]['low']), info[name]['high'])
+        used += len(mark.names)
+        effects.append(mark.effect.model_copy(update=values))
+    start = fit.model
+    for effect in effects:
+        start = start.with_effect(effect)
+    free = judged.base.lower @ hypothesis.columns[:, used:]
+    if study.levels is not None:
+        free = np.hstack([free, study.levels])
+    return study.fit(Unknowns.of(start, *start.effects), extra=free if free.size else None)
+
+
+def _log_evidence(fit: Fit, freedom: float) -> float:
+    """Laplace's approximation; the pattern's priors are the same in every model."""
+    misfit = fit.chi_square + fit.penalty
+    if np.isfinite(freedom):
+        count = freedom + len(fit.residual)
+        value = -0.5 * count * np.log1p(misfit / freedom)
+    else:
+        value = -0.5 * misfit
+    value -= 0.5 * (np.linalg.slogdet(fit.precision)[1] + fit.extra_log_det)
+    low, high = fit.unknowns.bounds
+    spread = np.sqrt(np.diag(fit.covariance))
+    for k in range(len(PATTERN), len(fit.vector)):
+        if low[k] >= 0.0 or high[k] <= 0.0:
+            side = 1.0 if low[k] >= 0.0 else -1.0
+            value += np.log(2.0) + norm.logcdf(side * fit.vector[k] / spread[k])
+    return float(value)
+
+
+def alike(judged: Judgement, ordered: list[str]) -> tuple[str, ...]:
+    """The first effect and those that could have left the same mark on these readings."""
+    best: dict[str, tuple[Hypothesis, float]] = {}
+    for h, factor in zip(judged.weighing.hypotheses, judged.weighing.log_factors, strict=True):
+        if _is_single(h):
+            known = best.get(h.effects[0])
+            if known is None or factor > known[1]:
+                best[h.effects[0]] = (h, factor)
+    first = best[ordered[0]][0]
+    mark = first.columns @ Judge(first).amplitudes(judged.base.deviation)
+    length = np.linalg.norm(mark)
+    members = [ordered[0]]
+    for effect_id in ordered[1:]:
+        other = best[effect_id][0]
+        # Fixed signs become non-negative unknowns; free ones are split into two of them.
+        free = other.sides == 0.0
+        signed = other.columns * np.where(free, 1.0, other.sides)
+        _, rest = nnls(np.hstack([signed, -signed[:, free]]), mark)
+        if length > 0.0 and np.sqrt(max(0.0, 1.0 - (rest / length) ** 2)) > ALIKE:
+            members.append(effect_id)
+    return tuple(members)

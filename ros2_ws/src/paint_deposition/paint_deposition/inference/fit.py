@@ -1,0 +1,200 @@
+"""Weighted least squares on the readings, through the forward simulation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import OptimizeResult, least_squares
+
+from paint_deposition.inference.forward import Forward
+from paint_deposition.inference.unknowns import PATTERN, Unknowns
+from paint_deposition.model.deposition_model import DepositionModel
+
+# Steps of the finite differences, in the vector's units.
+STEP = 1e-3
+SPREAD_OF_STARTS = 0.8
+SCREENING_STEPS = 6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to readings.
+
+    Attributes:
+        unknowns: what was varied.
+        vector: (k,) best values.
+        model: the model they stand for.
+        predicted_um: (P,) [um].
+        residual: (P,) measured minus predicted, over the standard deviation.
+        jacobian: (P, k) derivative of predictions over the standard deviation.
+        converged: whether the last search ended by itself.
+        extra_log_det: log determinant of the covariance of further deviations, if the fit
+            allowed for them; residual and jacobian are then whitened by it as well.
+    """
+
+    unknowns: Unknowns
+    vector: np.ndarray
+    model: DepositionModel
+    predicted_um: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    converged: bool
+    extra_log_det: float = 0.0
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of squared whitened residuals."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def penalty(self) -> float:
+        """Sum of squared deviations from the priors, in their widths."""
+        centre, width = self.unknowns.prior
+        return float(np.sum(((self.vector - centre) / width) ** 2))
+
+    @property
+    def precision(self) -> np.ndarray:
+        """(k, k) inverse covariance of the vector, priors included."""
+        _, width = self.unknowns.prior
+        return self.jacobian.T @ self.jacobian + np.diag(width**-2.0)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(k, k) covariance of the vector."""
+        return np.linalg.inv(self.precision)
+
+
+def fit_readings(
+    forward: Forward,
+    measured_um: np.ndarray,
+    sigma_um: np.ndarray,
+    unknowns: Unknowns,
+    starts: int = 1,
+    seed: int = 0,
+    extra: np.ndarray | None = None,
+) -> Fit:
+    """Find the most probable values.
+
+    Args:
+        forward: predicts the points.
+        measured_um, sigma_um: (P,) point means and their standard deviations [um].
+        unknowns: what is varied; its start model is the first start.
+        starts: how many starts; others are drawn around the first with the given seed.
+        extra: (P, n) directions, over the standard deviation, along which the readings may
+            deviate further with unit variance.
+    """
+    _, width = unknowns.prior
+    low, high = unknowns.bounds
+    lower = None
+    if extra is not None:
+        lower = cholesky(np.eye(len(measured_um)) + extra @ extra.T, lower=True)
+    problem = _Problem(forward, measured_um, sigma_um, unknowns, lower)
+    first = problem.scaled_to_mean(unknowns.encode(unknowns.start))
+    candidates = [first]
+    random = np.random.default_rng(seed)
+    pattern = np.arange(len(unknowns)) < len(PATTERN)
+    for _ in range(starts - 1):
+        away = np.where(pattern, SPREAD_OF_STARTS * width * random.normal(size=len(width)), 0.0)
+        candidates.append(problem.scaled_to_mean(np.clip(first + away, low, high)))
+
+    found = []
+    for start in candidates:
+        rough = problem.search(start, SCREENING_STEPS if starts > 1 else 60)
+        found.append((rough.cost, tuple(rough.x), rough))
+    best = min(found, key=lambda item: item[:2])[2]
+    if starts > 1:
+        best = problem.search(best.x, 60)
+    model = unknowns.decode(best.x)
+    predicted = forward.predict_um(model)
+    return Fit(
+        unknowns,
+        best.x,
+        model,
+        predicted,
+        problem.whitened((measured_um - predicted) / sigma_um),
+        problem.whitened(derivatives(forward, unknowns, best.x, sigma_um, predicted)),
+        bool(best.status > 0),
+        0.0 if lower is None else 2.0 * float(np.sum(np.log(np.diag(lower)))),
+    )
+
+
+def derivatives(
+    forward: Forward,
+    unknowns: Unknowns,
+    vector: np.ndarray,
+    sigma_um: np.ndarray,
+    predicted_um: np.ndarray | None = None,
+) -> np.ndarray:
+    """(P, k) derivative of the predictions by the vector, over the standard deviation."""
+    if predicted_um is None:
+        predicted_um = forward.predict_um(unknowns.decode(vector))
+    _, high = unknowns.bounds
+    columns = []
+    for k in range(len(vector)):
+        step = STEP if vector[k] + STEP <= high[k] else -STEP
+        moved = vector.copy()
+        moved[k] += step
+        change = forward.predict_um(unknowns.decode(moved)) - predicted_um
+        columns.append(change / step / sigma_um)
+    return np.column_stack(columns)
+
+
+class _Problem:
+    """Residuals and their derivatives for the optimiser; priors are further residuals."""
+
+    def __init__(
+        self,
+        forward: Forward,
+        measured_um: np.ndarray,
+        sigma_um: np.ndarray,
+        unknowns: Unknowns,
+        lower: np.ndarray | None,
+    ) -> None:
+        self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
+        self.unknowns, self.lower = unknowns, lower
+        self.centre, self.width = unknowns.prior
+        self.low, self.high = unknowns.bounds
+        self._last: tuple[bytes, np.ndarray] | None = None
+
+    def predict(self, vector: np.ndarray) -> np.ndarray:
+        key = vector.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, self.forward.predict_um(self.unknowns.decode(vector)))
+        return self._last[1]
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        if self.lower is None:
+            return columns
+        return solve_triangular(self.lower, columns, lower=True)
+
+    def residuals(self, vector: np.ndarray) -> np.ndarray:
+        misfit = self.whitened((self.predict(vector) - self.measured) / self.sigma)
+        return np.concatenate([misfit, (vector - self.centre) / self.width])
+
+    def jacobian(self, vector: np.ndarray) -> np.ndarray:
+        data = derivatives(self.forward, self.unknowns, vector, self.sigma, self.predict(vector))
+        return np.vstack([self.whitened(data), np.diag(1.0 / self.width)])
+
+    def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
+        """The same with K1 such that the mean film is right: the rest is then close enough."""
+        predicted = self.predict(vector)
+        weights = self.sigma**-2.0
+        most = float(np.sum(weights * predicted**2))
+        ratio = float(np.sum(weights * predicted * self.measured)) / most if most > 0 else 1.0
+        scaled = vector.copy()
+        scaled[0] += np.log(max(ratio, 1e-3))
+        return np.clip(scaled, self.low, self.high)
+
+    def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
+        margin = 1e-9 * (self.high - self.low)
+        return least_squares(
+            self.residuals,
+            np.clip(start, self.low + margin, self.high - margin),
+            jac=self.jacobian,
+            bounds=(self.low, self.high),
+            x_scale=self.width,
+            max_nfev=most_steps,
+            ftol=1e-6,
+            xtol=1e-6,
+            gtol=1e-6,
+        )

@@ -1,0 +1,114 @@
+"""Gauge readings of a painted part."""
+
+from collections.abc import Sized
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from paint_deposition.errors import ReadingsError
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Readings as taken; several may share a point.
+
+    Attributes:
+        positions_m: (N, 3) in the mesh frame [m].
+        thickness_um: (N,) [um].
+        point: (N,) labels; readings with one label were taken at one point.
+        group: (N,) labels of the column or row; '' where none.
+        sigma_um: (N,) standard deviation of one reading [um], nan where not stated.
+        normals: (N, 3) outward normals, or None.
+        source: the file they came from, for messages.
+    """
+
+    positions_m: np.ndarray
+    thickness_um: np.ndarray
+    point: np.ndarray
+    group: np.ndarray
+    sigma_um: np.ndarray
+    normals: np.ndarray | None = None
+    source: str = 'readings'
+
+    def __len__(self) -> int:
+        return len(self.thickness_um)
+
+    @staticmethod
+    def of(positions_m: ArrayLike, thickness_um: Sized, **columns: Any) -> 'Readings':
+        """Readings with defaults for the columns not given: every one a point of its own."""
+        count = len(thickness_um)
+        defaults = {
+            'point': np.array([f'{k + 1}' for k in range(count)]),
+            'group': np.full(count, ''),
+            'sigma_um': np.full(count, np.nan),
+        }
+        return Readings(
+            np.asarray(positions_m, dtype=float),
+            np.asarray(thickness_um, dtype=float),
+            **(defaults | columns),
+        )
+
+    def select(self, rows: np.ndarray | slice) -> 'Readings':
+        """The chosen rows, by mask or indices."""
+        return Readings(
+            self.positions_m[rows],
+            self.thickness_um[rows],
+            self.point[rows],
+            self.group[rows],
+            self.sigma_um[rows],
+            None if self.normals is None else self.normals[rows],
+            self.source,
+        )
+
+
+@dataclass(frozen=True)
+class PointMeans:
+    """Readings averaged over their repeats: one row a point, in order of first appearance.
+
+    Attributes:
+        first: (P,) row of the point's first reading.
+        repeats: (P,) number of readings.
+        mean_um: (P,) [um].
+        owner: (N,) point of each reading.
+    """
+
+    first: np.ndarray
+    repeats: np.ndarray
+    mean_um: np.ndarray
+    owner: np.ndarray
+
+    @staticmethod
+    def of(readings: Readings) -> 'PointMeans':
+        """Average readings that share a point."""
+        _, first, owner = np.unique(readings.point, return_index=True, return_inverse=True)
+        order = np.argsort(first)
+        rank = np.empty_like(order)
+        rank[order] = np.arange(len(order))
+        owner = rank[owner]
+        repeats = np.bincount(owner)
+        mean = np.bincount(owner, readings.thickness_um) / repeats
+        return PointMeans(first[order], repeats, mean, owner)
+
+
+# Repeats further apart than this were not taken at one point [m].
+SAME_POINT_M = 0.03
+
+
+def require_repeats_close(readings: Readings) -> None:
+    """Refuse a point label that is used at two places.
+
+    Raises:
+        ReadingsError: naming the label and the distance.
+    """
+    means = PointMeans.of(readings)
+    apart = np.linalg.norm(
+        readings.positions_m - readings.positions_m[means.first][means.owner], axis=1
+    )
+    worst = int(np.argmax(apart)) if len(apart) else 0
+    if len(apart) and apart[worst] > SAME_POINT_M:
+        raise ReadingsError(
+            f"{readings.source}: point '{readings.point[worst]}' is used {apart[worst]:.3f} m "
+            'apart; give each place a label of its own'
+        )
