@@ -1,0 +1,131 @@
+"""Evenness over the index: its curve, its minima, and the windows within a tolerance."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.optimize import brentq, minimize_scalar
+
+from paint_deposition.errors import PlanError
+from paint_deposition.model.uniformity import Raster
+
+FEWEST_POINTS, MOST_POINTS = 121, 601
+POINTS_PER_SCALE = 12.0
+# Where a window ends is found to this [m].
+PRECISION_M = 1e-7
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """A local minimum of sigma_n."""
+
+    index_m: float
+    sigma_n: float
+
+
+@dataclass(frozen=True)
+class IndexCurve:
+    """sigma_n over the index for one raster.
+
+    Attributes:
+        raster: what is evaluated.
+        index_m: (N,) increasing [m]. sigma_n: (N,).
+        minima: refined local minima inside the range, by index.
+    """
+
+    raster: Raster
+    index_m: np.ndarray
+    sigma_n: np.ndarray
+    minima: tuple[Minimum, ...]
+
+    @staticmethod
+    def of(raster: Raster, low_m: float, high_m: float) -> 'IndexCurve':
+        """Sample a range finely enough to see every minimum, and refine those."""
+        finest = min(raster.first.finest_m, raster.second.finest_m)
+        count = math.ceil((high_m - low_m) / finest * POINTS_PER_SCALE)
+        index = np.linspace(low_m, high_m, min(max(count, FEWEST_POINTS), MOST_POINTS))
+        sigma = np.array([raster.sigma_n(value) for value in index])
+        inside = np.flatnonzero((sigma[1:-1] < sigma[:-2]) & (sigma[1:-1] <= sigma[2:])) + 1
+        minima = tuple(_refined(raster, index[k - 1], index[k + 1]) for k in inside)
+        return IndexCurve(raster, index, sigma, minima)
+
+    @property
+    def best_end(self) -> Minimum:
+        """The more even end of the range."""
+        end = 0 if self.sigma_n[0] <= self.sigma_n[-1] else -1
+        return Minimum(float(self.index_m[end]), float(self.sigma_n[end]))
+
+    def windows_m(self, tolerance: float) -> list[tuple[float, float]]:
+        """Intervals of the index in the range within which sigma_n keeps to the tolerance."""
+        knots = [(float(i), float(s)) for i, s in zip(self.index_m, self.sigma_n, strict=True)]
+        knots = sorted(knots + [(m.index_m, m.sigma_n) for m in self.minima])
+        windows: list[tuple[float, float]] = []
+        start = knots[0][0] if knots[0][1] <= tolerance else None
+        for (left, before), (right, after) in pairwise(knots):
+            if (before <= tolerance) == (after <= tolerance):
+                continue
+            crossing = crossing_at(self.raster.sigma_n, left, right, tolerance)
+            if start is None:
+                start = crossing
+            else:
+                windows.append((start, crossing))
+                start = None
+        if start is not None:
+            windows.append((start, knots[-1][0]))
+        return windows
+
+
+def _refined(raster: Raster, low_m: float, high_m: float) -> Minimum:
+    found = minimize_scalar(
+        raster.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
+    )
+    return Minimum(float(found.x), float(found.fun))
+
+
+def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
+    """The index to recommend.
+
+    Without a tolerance it is the deepest minimum in the range. With one it lies in the window of
+    widest index, for that takes the fewest passes: at the deepest minimum in there.
+
+    Raises:
+        PlanError: nothing in the range keeps to the tolerance; names what comes closest.
+    """
+    minima = curve.minima
+    if tolerance is None:
+        return min(minima, key=lambda m: m.sigma_n) if minima else curve.best_end
+    windows = curve.windows_m(tolerance)
+    if not windows:
+        closest = min([*minima, curve.best_end], key=lambda m: m.sigma_n)
+        raise PlanError(
+            f'no index from {curve.index_m[0]:g} to {curve.index_m[-1]:g} m keeps sigma_n within '
+            f'{tolerance:g}; the closest is {closest.sigma_n:.4f} at {closest.index_m:.3f} m: '
+            'allow that much, or search a smaller index'
+        )
+    low, high = windows[-1]
+    inside = [m for m in minima if low <= m.index_m <= high]
+    if inside:
+        return min(inside, key=lambda m: m.sigma_n)
+    middle = 0.5 * (low + high)
+    return Minimum(middle, curve.raster.sigma_n(middle))
+
+
+def crossing_at(
+    sigma_n: Callable[[float], float], low: float, high: float, tolerance: float
+) -> float:
+    """Where a function passes the tolerance between two places on either side of it."""
+    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=PRECISION_M))
+
+
+def farthest_within(
+    sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float, steps: int
+) -> float:
+    """How far one may go from a good start toward a limit without breaking the tolerance."""
+    value = start
+    for further in np.linspace(start, limit, steps + 1)[1:].tolist():
+        if sigma_n(further) > tolerance:
+            return crossing_at(sigma_n, value, further, tolerance)
+        value = further
+    return limit

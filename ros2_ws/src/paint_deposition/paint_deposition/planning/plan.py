@@ -1,0 +1,273 @@
+"""Passes for a part: where they lie, how the gun runs along them, and the film that they lay."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import PlanError
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.raster import (
+    PlannedPass,
+    RasterStyle,
+    plan_passes,
+    trajectory_of,
+)
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.skin_map import SkinMap, part_axes
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.line_films import LineFilms
+from paint_deposition.planning.pass_count import passes_to_cover
+from paint_deposition.planning.raster_search import Placing, centred, place_passes
+from paint_deposition.planning.recommendation import Recommendation, recommend
+
+# Without a range the index is looked for about the one that is best on a plane.
+INDEX_SHARES = (0.75, 1.25)
+# The gun opens where the pattern begins to reach the part with all but this much of its volume.
+OVERSPRAY_SHARE = 0.9
+DEFAULT_SMOOTHING_RADIUS_M = 0.1
+TARGET_ROUNDS = 4
+TARGET_PRECISION = 2e-3
+
+
+@dataclass(frozen=True)
+class PlanRequest:
+    """What passes are asked for; None is not given.
+
+    Attributes:
+        direction: 'horizontal' or 'vertical'.
+        speed_m_per_s: of the passes. target_um: mean film on the painted side that the speed is
+            chosen for if it is not given.
+        index_m: fixes the index; or else index_min_m and index_max_m bound it.
+        tolerance: largest sigma_n on the part accepted.
+        standoff_m: TCP to smoothed skin; default: the skin lies on the model plane.
+        smoothing_radius_m: what is finer on the part is not followed.
+        overspray_m: the gun opens this far before the part; default: where 90 % of the
+            pattern's volume reach it.
+        acceleration_m_per_s2: of the robot.
+        one_way: every pass in the direction of the first; else they alternate. The gun keeps its
+            orientation either way.
+        travel_rad: direction of the first pass in the tool's x-y frame.
+        outward: (3,) from the part to the gun; default: the mean normal.
+    """
+
+    direction: str = 'horizontal'
+    speed_m_per_s: float | None = None
+    target_um: float | None = None
+    index_m: float | None = None
+    index_min_m: float | None = None
+    index_max_m: float | None = None
+    tolerance: float | None = None
+    standoff_m: float | None = None
+    smoothing_radius_m: float = DEFAULT_SMOOTHING_RADIUS_M
+    overspray_m: float | None = None
+    acceleration_m_per_s2: float = 2.0
+    one_way: bool = False
+    travel_rad: float = 0.0
+    outward: tuple[float, float, float] | None = None
+
+    def for_plane(self, width_m: float, length_m: float) -> Request:
+        """The same for a plane of the part's size.
+
+        Raises:
+            PlanError: a value is impossible.
+        """
+        return Request(
+            speed_m_per_s=self.speed_m_per_s,
+            target_um=self.target_um,
+            index_min_m=self.index_min_m,
+            index_max_m=self.index_max_m,
+            tolerance=self.tolerance,
+            width_m=width_m,
+            length_m=length_m,
+            one_way=self.one_way,
+            standoff_m=self.standoff_m,
+            travel_rad=self.travel_rad,
+        )
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Passes on a part with the film that the model predicts.
+
+    Attributes:
+        request: what was asked for. style: how passes are run.
+        placing: number, index and place of the passes, with sigma_n of the search.
+        passes: in running order. trajectory: their timed poses and trigger.
+        film_um: (V,) film on the refined part. painted: (V,) bool, the side that is painted.
+        statistics: of the film on the painted side.
+        sigma_n: standard deviation over mean of the film on the painted side, bare metal
+            included.
+        plane: recommendation for a plane of the part's size.
+        plane_on_part: its passes laid about the middle of this part.
+        cycle_time_s: from the first pose to the last.
+    """
+
+    request: PlanRequest
+    style: RasterStyle
+    placing: Placing
+    passes: tuple[PlannedPass, ...]
+    trajectory: Trajectory
+    film_um: np.ndarray
+    painted: np.ndarray
+    statistics: FilmStatistics
+    sigma_n: float
+    plane: Recommendation
+    plane_on_part: Placing
+
+    @property
+    def cycle_time_s(self) -> float:
+        """From the first pose to the last [s]."""
+        return self.trajectory.duration_s
+
+    @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        return (
+            f'{self.placing.passes} {self.request.direction} passes at '
+            f'{self.placing.index_m * 1e3:.0f} mm, {self.style.speed_m_per_s:.3g} m/s: mean film '
+            f'{self.statistics.mean_um:.1f} um, sigma_n {self.sigma_n * 100:.1f} %, '
+            f'{self.cycle_time_s:.1f} s'
+        )
+
+    def as_dict(self) -> dict[str, Any]:
+        """Figures of the plan."""
+        return {
+            'direction': self.request.direction,
+            'passes': self.placing.passes,
+            'index_m': self.placing.index_m,
+            'lines_m': [planned.across_m for planned in self.passes],
+            'travel': 'one_way' if self.request.one_way else 'alternating',
+            'gun_turns': False,
+            'speed_m_per_s': self.style.speed_m_per_s,
+            'standoff_m': self.style.standoff_m,
+            'overspray_m': self.style.overspray_m,
+            'acceleration_m_per_s2': self.style.acceleration_m_per_s2,
+            'smoothing_radius_m': self.request.smoothing_radius_m,
+            'cycle_time_s': self.cycle_time_s,
+            'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
+            'sigma_n': self.sigma_n,
+            'film': self.statistics.as_dict(),
+            'plane': {
+                'index_m': self.plane.index_m,
+                'passes': self.plane_on_part.passes,
+                'sigma_n': self.plane.sigma_n,
+                'sigma_n_on_part': self.plane_on_part.sigma_n,
+            },
+        }
+
+
+def plan(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    frame_id: str = '',
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> Plan:
+    """Plan passes and simulate their film.
+
+    Args:
+        surface: the part. model: what the gun sprays.
+        frame_id: frame of the poses.
+        progress: called with what is done and its share, 0 to 1.
+
+    Raises:
+        PlanError: the request has no answer; says why and what comes closest.
+    """
+    axes = part_axes(surface, request.direction, _vector(request.outward))
+    skin = SkinMap(surface, axes, request.smoothing_radius_m)
+    (first, last), extent = skin.extent_m
+    height = float(extent[1] - extent[0])
+    plane = recommend(model, request.for_plane(height, float(last - first)))
+    index_range = _index_range(request, plane)
+    style = _style(model, request, plane)
+    films = LineFilms(
+        surface, skin, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
+        lambda share: progress('single passes', share),
+    )  # fmt: skip
+    ends = float(extent[0]), float(extent[1])
+    placing = place_passes(films, ends, index_range, request.tolerance)
+    count = passes_to_cover(plane.curve.raster, plane.index_m, height)
+    on_part = centred(films, ends, count, plane.index_m)
+    # Level passes go from the top down, vertical ones from the left to the right.
+    lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
+    target = None if request.speed_m_per_s else request.target_um
+    for round_ in range(TARGET_ROUNDS):
+        passes = plan_passes(skin, lines, style)
+        trajectory = trajectory_of(passes, style, frame_id)
+        film, emitted = _simulated(
+            surface, model, trajectory, lambda share: progress('film', share)
+        )
+        mean, sigma_n = _evenness(film[skin.painted], surface.vertex_areas_m2[skin.painted])
+        ratio = mean / target if target else 1.0
+        if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
+            break
+        style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
+    statistics = film_statistics(
+        film[skin.painted],
+        surface.vertex_areas_m2[skin.painted],
+        emitted,
+        target_um=request.target_um or 0.0,
+        target_tolerance_um=0.1 * (request.target_um or 0.0),
+    )
+    return Plan(
+        request, style, placing, passes, trajectory, film, skin.painted, statistics, sigma_n,
+        plane, on_part,
+    )  # fmt: skip
+
+
+def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> RasterStyle:
+    overspray = request.overspray_m
+    if overspray is None:
+        distance = plane.setup.standoff_m + model.projection.emission_offset_m
+        widening = distance / model.projection.model_plane_m
+        radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
+        enclosed = model.planar.enclosed_fraction(radii)
+        overspray = widening * float(np.interp(OVERSPRAY_SHARE, enclosed, radii))
+    return RasterStyle(
+        standoff_m=plane.setup.standoff_m,
+        speed_m_per_s=plane.speed_m_per_s,
+        acceleration_m_per_s2=request.acceleration_m_per_s2,
+        overspray_m=overspray,
+        band_m=0.25 * plane.half_width_m,
+        travel_rad=request.travel_rad,
+        one_way=request.one_way,
+    )
+
+
+def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, float]:
+    if request.index_m is not None:
+        if not (math.isfinite(request.index_m) and request.index_m > 0.0):
+            raise PlanError(f'index_m is {request.index_m:g}; give a number above 0')
+        return request.index_m, request.index_m
+    low, high = (share * plane.index_m for share in INDEX_SHARES)
+    return request.index_min_m or low, request.index_max_m or high
+
+
+def _simulated(
+    surface: Surface,
+    model: DepositionModel,
+    trajectory: Trajectory,
+    progress: Callable[[float], None],
+) -> tuple[np.ndarray, float]:
+    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
+    occluder = surface.occluder if model.shadow > 0.0 else None
+    integrator = FilmIntegrator(surface.points(), model, occluder=occluder)
+    integrator.add(path, progress=lambda done: progress(min(done / max(len(path), 1), 1.0)))
+    return integrator.film_um, integrator.emitted_cm3
+
+
+def _evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
+    weight = area_m2 / area_m2.sum()
+    mean = float(weight @ film_um)
+    return mean, math.sqrt(float(weight @ (film_um - mean) ** 2)) / mean
+
+
+def _vector(values: tuple[float, float, float] | None) -> np.ndarray | None:
+    return None if values is None else np.asarray(values, dtype=float)

@@ -1,0 +1,282 @@
+"""Which index lays an even film: a search over eq. (5) for the model's own collapse."""
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.errors import PlanError
+from paint_deposition.model.collapse import Collapse, half_width_m, nominal_standoff_m
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pass_setup import PassSetup
+from paint_deposition.model.uniformity import Raster
+from paint_deposition.planning.drift import index_drift_m, standoff_drift_m
+from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
+from paint_deposition.planning.index_search import IndexCurve, Minimum, choose
+from paint_deposition.planning.pass_count import (
+    cycle_time_s,
+    passes_to_cover,
+    variation_over_width,
+)
+
+# Film below this share of the mean, between passes, is a bare stripe.
+BARE = 0.01
+SLOWEST_M_PER_S = 0.005
+FIRST_GUESS_M_PER_S = 0.2
+SPEED_ROUNDS = 6
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """An index, and how far it can be trusted; lengths in m, thicknesses in um.
+
+    Attributes:
+        index_m, sigma_n: the recommended index and eq. (5) there.
+        index_range_m: range searched.
+        tolerance: largest sigma_n accepted, or None.
+        windows_m: index intervals in the range within tolerance.
+        minima: all local minima inside the range.
+        mean_um: mean film at index and speed.
+        speed_m_per_s: of the passes. target_um: film it was chosen for, or None.
+        passes, cycle_time_s: for the width asked for, or None. The time runs from the first
+            opening of the gun to its last closing, ways between passes included.
+        width_m, length_m: what they were counted for.
+        sigma_n_over_width: of these passes from edge to edge, or None.
+        curve: sigma_n over the range.
+        setup: how gun and passes were assumed.
+        half_width_m: SB50 of one pass.
+        index_drift_m: least and largest index that keep to the tolerance, or None.
+        standoff_drift_m: least and largest change of standoff that do, negative is nearer.
+        notes: what the reader should know besides.
+    """
+
+    index_m: float
+    sigma_n: float
+    index_range_m: tuple[float, float]
+    tolerance: float | None
+    windows_m: tuple[tuple[float, float], ...]
+    minima: tuple[Minimum, ...]
+    mean_um: float
+    speed_m_per_s: float
+    target_um: float | None
+    passes: int | None
+    cycle_time_s: float | None
+    width_m: float | None
+    length_m: float | None
+    sigma_n_over_width: float | None
+    curve: IndexCurve
+    setup: PassSetup
+    half_width_m: float
+    index_drift_m: tuple[float, float] | None
+    standoff_drift_m: tuple[float, float] | None
+    notes: tuple[str, ...]
+
+    @property
+    def travel(self) -> str:
+        """'alternating' or 'one_way'."""
+        return self.setup.travel
+
+    @property
+    def collapse(self) -> Collapse:
+        """Film of one pass at the speed."""
+        return self.curve.raster.first
+
+    @property
+    def sentence(self) -> str:
+        """The recommendation in a sentence."""
+        text = (
+            f'index {self.index_m * 1e3:.0f} mm: sigma_n {self.sigma_n * 100:.2f} %, '
+            f'mean film {self.mean_um:.1f} um at {self.speed_m_per_s:.3g} m/s'
+        )
+        if self.passes:
+            text += f', {self.passes} passes in {self.cycle_time_s:.1f} s'
+        return text
+
+    def as_dict(self) -> dict[str, Any]:
+        """The content of ``recommendation.json``."""
+        return {
+            'index_m': self.index_m,
+            'sigma_n': self.sigma_n,
+            'index_range_m': list(self.index_range_m),
+            'tolerance': self.tolerance,
+            'windows_m': [list(window) for window in self.windows_m],
+            'minima': [{'index_m': m.index_m, 'sigma_n': m.sigma_n} for m in self.minima],
+            'mean_um': self.mean_um,
+            'speed_m_per_s': self.speed_m_per_s,
+            'target_um': self.target_um,
+            'passes': self.passes,
+            'cycle_time_s': self.cycle_time_s,
+            'width_m': self.width_m,
+            'length_m': self.length_m,
+            'sigma_n_over_width': self.sigma_n_over_width,
+            'travel': self.travel,
+            'gun_turns': self.setup.gun_turns,
+            'travel_rad': self.setup.travel_rad,
+            'standoff_m': self.setup.standoff_m,
+            'half_width_m': self.half_width_m,
+            'index_drift_m': self.index_drift_m and list(self.index_drift_m),
+            'standoff_drift_m': self.standoff_drift_m and list(self.standoff_drift_m),
+            'assumption': self.setup.assumption,
+            'notes': list(self.notes),
+            'curve': {
+                'index_m': self.curve.index_m.tolist(),
+                'sigma_n': self.curve.sigma_n.tolist(),
+            },
+        }
+
+
+def recommend(model: DepositionModel, request: Request) -> Recommendation:
+    """Find the index that lays the most even film, or the widest one within the tolerance.
+
+    Without a tolerance it is the deepest local minimum in the range. With one it lies in the
+    window of widest index, for that takes the fewest passes: at the deepest minimum in there.
+
+    Raises:
+        PlanError: there is no such index or speed; says why and what comes closest.
+    """
+    standoff = request.standoff_m or nominal_standoff_m(model)
+    if not standoff > 0.0:
+        raise PlanError(
+            f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'
+        )
+    setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
+    speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
+    raster = setup.raster(model, speed)
+    width = half_width_m(raster.first)
+    curve = IndexCurve.of(raster, *request.index_range_m(width))
+    best = choose(curve, request.tolerance)
+    _refuse_stripes(raster, best, width)
+    if request.speed_m_per_s is None:
+        curve, best, speed = _at_target(model, setup, request, curve, best, speed)
+    tolerance = request.tolerance
+    index_drift = standoff_drift = None
+    if tolerance is not None:
+        index_drift = index_drift_m(curve.raster, best.index_m, tolerance)
+        standoff_drift = standoff_drift_m(
+            model, setup, speed, best.index_m, tolerance, index_drift
+        )
+    passes = cycle_time = length = over_width = None
+    if request.width_m is not None:
+        passes = passes_to_cover(curve.raster, best.index_m, request.width_m)
+        length = request.length_m or request.width_m
+        cycle_time = cycle_time_s(passes, length, best.index_m, speed, request.one_way)
+        over_width = variation_over_width(
+            curve.raster, best.index_m, passes, request.width_m
+        ).sigma_n
+    return Recommendation(
+        index_m=best.index_m,
+        sigma_n=best.sigma_n,
+        index_range_m=(float(curve.index_m[0]), float(curve.index_m[-1])),
+        tolerance=tolerance,
+        windows_m=tuple(curve.windows_m(tolerance)) if tolerance is not None else (),
+        minima=curve.minima,
+        mean_um=curve.raster.mean_um(best.index_m),
+        speed_m_per_s=speed,
+        target_um=request.target_um,
+        passes=passes,
+        cycle_time_s=cycle_time,
+        width_m=request.width_m,
+        length_m=length,
+        sigma_n_over_width=over_width,
+        curve=curve,
+        setup=setup,
+        half_width_m=width,
+        index_drift_m=index_drift,
+        standoff_drift_m=standoff_drift,
+        notes=tuple(_notes(model, setup, request, curve, best, speed)),
+    )
+
+
+def _refuse_stripes(raster: Raster, best: Minimum, half_width_m: float) -> None:
+    period = raster.period_m(best.index_m)
+    least = raster.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
+    if least < BARE * raster.mean_um(best.index_m):
+        raise PlanError(
+            f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
+            f'{half_width_m:.3f} m wide at half its height; search about that index'
+        )
+
+
+def _at_target(
+    model: DepositionModel,
+    setup: PassSetup,
+    request: Request,
+    curve: IndexCurve,
+    best: Minimum,
+    speed: float,
+) -> tuple[IndexCurve, Minimum, float]:
+    """Choose the speed: film goes as 1 / speed, unless an effect depends on the speed."""
+    assert request.target_um is not None
+    low, high = float(curve.index_m[0]), float(curve.index_m[-1])
+    for _ in range(SPEED_ROUNDS):
+        wanted = speed * curve.raster.mean_um(best.index_m) / request.target_um
+        if not SLOWEST_M_PER_S <= wanted <= FASTEST_M_PER_S:
+            nearest = min(max(wanted, SLOWEST_M_PER_S), FASTEST_M_PER_S)
+            raise PlanError(
+                f'target_um {request.target_um:g} at an index of {best.index_m:.3f} m needs '
+                f'{wanted:.3g} m/s, outside {SLOWEST_M_PER_S:g} to {FASTEST_M_PER_S:g} m/s; the '
+                f'closest is {request.target_um * wanted / nearest:.3g} um at {nearest:g} m/s'
+            )
+        if abs(wanted - speed) <= 1e-9 * speed:
+            break
+        if not model.effects:
+            raster = curve.raster
+            first = raster.first.scaled(speed / wanted)
+            second = first if raster.alike else raster.second.scaled(speed / wanted)
+            return replace(curve, raster=Raster(first, second)), best, wanted
+        speed = wanted
+        curve = IndexCurve.of(setup.raster(model, speed), low, high)
+        best = choose(curve, request.tolerance)
+    return curve, best, speed
+
+
+def _notes(
+    model: DepositionModel,
+    setup: PassSetup,
+    request: Request,
+    curve: IndexCurve,
+    best: Minimum,
+    speed: float,
+) -> list[str]:
+    notes = [setup.assumption]
+    if not setup.one_way:
+        there = _held_otherwise(model, setup, curve.raster, speed).sigma_n(best.index_m)
+        if abs(there - best.sigma_n) > 1e-4:
+            how = (
+                'keeping its orientation'
+                if setup.gun_turns
+                else 'turned by 180 deg every way back'
+            )
+            notes.append(f'with the gun {how} sigma_n there would be {there:.4f}')
+    end = curve.best_end
+    if best not in curve.minima:
+        notes.append('there is no minimum of sigma_n here; it is more even at a smaller index')
+    elif request.tolerance is None and end.sigma_n < best.sigma_n:
+        notes.append(
+            f'the end of the range is more even still: {end.sigma_n:.4f} at {end.index_m:g} m'
+        )
+    mean = curve.raster.mean_um(best.index_m)
+    if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:
+        right = speed * mean / request.target_um
+        notes.append(f'the target of {request.target_um:g} um would need {right:.3g} m/s')
+    if request.width_m is not None and request.length_m is None:
+        notes.append('cycle time is for passes as long as the width')
+    on_film = [e.id for e in model.effects if _acts_on_film(e)]
+    if on_film:
+        notes.append(f'left out, for they act on the finished film: {", ".join(on_film)}')
+    return notes
+
+
+def _held_otherwise(
+    model: DepositionModel, setup: PassSetup, raster: Raster, speed: float
+) -> Raster:
+    if model.effects:
+        return replace(setup, gun_turns=not setup.gun_turns).raster(model, speed)
+    first = raster.first
+    return Raster.one_way(first) if setup.gun_turns else Raster(first, first.mirrored())
+
+
+def _acts_on_film(effect: Effect) -> bool:
+    own = type(effect)
+    return own.on_film is not Effect.on_film or own.on_gauge is not Effect.on_gauge
