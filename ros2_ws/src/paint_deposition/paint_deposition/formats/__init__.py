@@ -1,0 +1,1 @@
+"""Files in and out: recordings, meshes, tables, models, campaigns, robot programs."""

@@ -1,0 +1,112 @@
+"""Message definitions as rosbag2 stores them beside the messages: text with dependencies, hash."""
+
+from __future__ import annotations
+
+import functools
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from rosbags.typesys import Stores, get_typestore
+
+from paint_deposition.errors import RecordingError
+
+SEPARATOR = '=' * 80
+# The layout of messages that this package serialises itself, without a ROS installation.
+STANDARD_STORE = Stores.ROS2_KILTED
+PRIMITIVES = frozenset(
+    {'bool', 'byte', 'char', 'float32', 'float64', 'int8', 'uint8', 'int16', 'uint16'}
+    | {'int32', 'uint32', 'int64', 'uint64', 'string', 'wstring'}
+)
+# "pkg/Type[<=5] name", "Type name" or "string<=8 name"; a constant has NAME=value instead.
+FIELD = re.compile(r'^\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+\s*(?P<rest>.*)$')
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A message type's definition.
+
+    Attributes:
+        text: its own .msg text, then that of each type it uses behind a separator (`ros2msg`).
+        type_hash: `RIHS01_...` of REP-2016, '' when unknown.
+        encoding: MCAP schema encoding of the text.
+    """
+
+    text: str
+    type_hash: str = ''
+    encoding: str = 'ros2msg'
+
+
+@functools.cache
+def installed(message_type: str) -> Definition:
+    """Definition of `pkg/msg/Type` from the installation that serialises it.
+
+    Raises RecordingError when the installation has no such message.
+    """
+    own = _share_file(message_type, '.msg').read_text()
+    parts = [own]
+    for dependency in _dependencies(message_type):
+        package, _, name = dependency.split('/')
+        text = _share_file(dependency, '.msg').read_text()
+        parts.append(f'{SEPARATOR}\nMSG: {package}/{name}\n{text}')
+    return Definition('\n'.join(parts), _installed_hash(message_type))
+
+
+@functools.cache
+def standard(message_type: str) -> Definition:
+    """Definition of a message of the ROS 2 common interfaces, known without any installation."""
+    store = get_typestore(STANDARD_STORE)
+    text, _ = store.generate_msgdef(message_type, ros_version=2)
+    return Definition(text, store.hash_rihs01(message_type))
+
+
+def _dependencies(message_type: str) -> list[str]:
+    """Types used by a type, each once, depth first, as rosbag2 orders them."""
+    found: dict[str, None] = {}
+
+    def collect(name: str) -> None:
+        package = name.split('/')[0]
+        for used in sorted(_used_types(_share_file(name, '.msg').read_text(), package)):
+            if used not in found:
+                found[used] = None
+                collect(used)
+
+    collect(message_type)
+    return list(found)
+
+
+def _used_types(text: str, package: str) -> set[str]:
+    used = set()
+    for line in text.splitlines():
+        field = FIELD.match(line.split('#', 1)[0])
+        if not field or field['rest'].startswith('=') or field['type'] in PRIMITIVES:
+            continue
+        parts = field['type'].split('/')
+        used.add(f'{parts[0]}/msg/{parts[-1]}' if len(parts) > 1 else f'{package}/msg/{parts[0]}')
+    return used
+
+
+def _share_file(message_type: str, suffix: str) -> Path:
+    # ROS is imported where it is used: reading and writing bags must work without it.
+    from ament_index_python.packages import (
+        PackageNotFoundError,
+        get_package_share_directory,
+    )
+
+    try:
+        package, kind, name = message_type.split('/')
+        path = Path(get_package_share_directory(package)) / kind / f'{name}{suffix}'
+    except (ValueError, PackageNotFoundError):
+        raise RecordingError(
+            f'{message_type} is not installed; source the workspace that defines it'
+        ) from None
+    if not path.is_file():
+        raise RecordingError(f'{message_type} is not installed: {path} is missing')
+    return path
+
+
+def _installed_hash(message_type: str) -> str:
+    description = json.loads(_share_file(message_type, '.json').read_text())
+    hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
+    return hashes.get(message_type, '')

@@ -1,0 +1,52 @@
+"""What a run was made with: kept in its metadata, so that a film can be explained years later."""
+
+from __future__ import annotations
+
+import hashlib
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+from paint_deposition.errors import PaintError
+
+PACKAGE = 'paint_deposition'
+
+
+def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
+    """Texts by name: versions, the mesh's digest, the model in full. Empty paths are left out."""
+    notes = {'package_version': package_version(), 'git_version': git_version()}
+    if mesh_file:
+        digest = hashlib.sha256(_content(mesh_file, 'mesh_file')).hexdigest()
+        notes |= {'mesh_file': mesh_file, 'mesh_sha256': digest}
+    if model_file:
+        text = _content(model_file, 'model_file').decode('utf-8', errors='replace')
+        notes |= {'model_file': model_file, 'model_yaml': text}
+    return {key: value for key, value in notes.items() if value}
+
+
+def package_version() -> str:
+    """Installed version of this package, '' when it runs from its sources alone."""
+    try:
+        return metadata.version(PACKAGE)
+    except metadata.PackageNotFoundError:
+        return ''
+
+
+def git_version() -> str:
+    """`git describe` of the sources, '' where they are installed away from their repository."""
+    command = ['git', 'describe', '--always', '--dirty', '--tags']
+    folder = Path(__file__).resolve().parent
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, timeout=10, check=False
+        )
+    except (OSError, subprocess.TimeoutExpired):
+        return ''
+    return done.stdout.strip() if done.returncode == 0 else ''
+
+
+def _content(path: str, parameter: str) -> bytes:
+    try:
+        return Path(path).read_bytes()
+    except OSError as error:
+        raise PaintError(f'{parameter} {path}: {error.strerror}') from None

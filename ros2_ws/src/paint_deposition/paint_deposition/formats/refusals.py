@@ -1,0 +1,68 @@
+"""Why a checked value was refused, in one line: the key, its value, the range, the remedy."""
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from annotated_types import Ge, Gt, Le, Lt
+from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
+
+
+def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
+    """One line for the first error of a validation.
+
+    Args:
+        model: what was to be made.
+        where: how the user calls it.
+        error: as pydantic raised it.
+    """
+    first, others = error.errors()[0], error.error_count() - 1
+    more = f' (and {others} more)' if others else ''
+    key = '.'.join(str(part) for part in first['loc'])
+    if first['type'] == 'extra_forbidden':
+        return f'{where}: unknown key {key!r}; {nearest(key, model.model_fields)}{more}'
+    field = model.model_fields.get(key)
+    if field is None:
+        return f'{where}: {first["msg"]}{more}'
+    return f'{where}: {key} is {first["input"]!r}; expected {_expected(field)}{more}'
+
+
+def nearest(key: object, known: Iterable[str]) -> str:
+    """A hint at the known key that looks most like this one."""
+    known = list(known)
+    if not known:
+        return 'it takes none'
+    # A forgotten unit is likelier than a wrong letter: K1 is meant for K1_cm3_per_s, not K2.
+    begun = [name for name in known if name.lower().startswith(f'{key}_'.lower())]
+    found = begun or difflib.get_close_matches(str(key), known, n=1, cutoff=0.0)
+    return f'the nearest known key is {found[0]!r}'
+
+
+def boolean_number(model: type[BaseModel], where: str, values: dict[str, Any]) -> str | None:
+    """One line where true, yes or on stands for a number, which would pass as 1; else None."""
+    for key, value in values.items():
+        field = model.model_fields.get(key)
+        if field is not None and field.annotation is float and isinstance(value, bool):
+            return f'{where}: {key} is {value!r}; expected {_expected(field)}'
+    return None
+
+
+def _expected(field: FieldInfo) -> str:
+    if field.annotation is bool:
+        return f'true or false: {field.description}'
+    limits = {
+        kind: getattr(bound, name)
+        for bound in field.metadata
+        for kind, name in ((Ge, 'ge'), (Gt, 'gt'), (Le, 'le'), (Lt, 'lt'))
+        if isinstance(bound, kind)
+    }
+    words = [f'above {limits[Gt]:g}' if Gt in limits else '']
+    if Ge in limits and Le in limits:
+        words.append(f'{limits[Ge]:g} to {limits[Le]:g}')
+    elif Le in limits:
+        words.append(f'up to {limits[Le]:g}')
+    elif Ge in limits:
+        words.append(f'at least {limits[Ge]:g}')
+    number = ' and '.join(filter(None, words))
+    return f'a number {number}: {field.description}'
