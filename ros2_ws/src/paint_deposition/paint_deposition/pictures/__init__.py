@@ -1,0 +1,1 @@
+"""Pictures and reports of films, residuals and recommendations."""
