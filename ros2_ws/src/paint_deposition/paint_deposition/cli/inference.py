@@ -1,0 +1,298 @@
+"""Commands that set the model against readings: `compare`, `diagnose` and `refit`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from tqdm import tqdm
+
+if TYPE_CHECKING:
+    from paint_deposition.effects.base import Effect
+    from paint_deposition.formats.model_file import ModelFile
+    from paint_deposition.inference.campaign import Campaign
+    from paint_deposition.inference.comparison import Comparison
+    from paint_deposition.inference.study import Study
+    from paint_deposition.inference.verdict import Diagnosis
+    from paint_deposition.model.deposition_model import DepositionModel
+
+CAMPAIGN = click.argument('campaign', type=click.Path(path_type=Path))
+OUTPUT = click.option(
+    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
+    help='Folder for the results; made if it is not there, results in it are replaced.',
+)  # fmt: skip
+MODEL = click.option(
+    '--model', 'model_file', type=click.Path(path_type=Path),
+    help="Model to start from; default: the campaign's, else a 50 mm bell.",
+)  # fmt: skip
+JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+SEED = click.option('--seed', default=0, show_default=True, help='Of all random draws.')
+OWN_EFFECTS = click.option(
+    '--effect-file', 'effect_files', multiple=True, type=click.Path(path_type=Path),
+    help='Python file with an effect of your own to consider as well; may be repeated.',
+)  # fmt: skip
+
+
+@click.command('compare')
+@CAMPAIGN
+@click.option(
+    '--model', 'model_file', type=click.Path(path_type=Path),
+    help="Model to judge, as it is; default: the campaign's, else one fitted to it.",
+)  # fmt: skip
+@OUTPUT
+@JSON
+def compare_command(campaign: Path, model_file: Path | None, output: Path, as_json: bool) -> None:
+    """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
+
+    Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
+    report.html.
+    """
+    from paint_deposition.formats.inference_files import comparison_as_dict, write_residuals
+    from paint_deposition.formats.json_files import json_text, write_json
+    from paint_deposition.inference.comparison import compare
+    from paint_deposition.inference.study import Study
+    from paint_deposition.inference.unknowns import Unknowns
+    from paint_deposition.model.deposition_model import DepositionModel
+    from paint_deposition.pictures.report import write_report
+
+    with _Steps('compare') as tell:
+        data = _campaign(campaign, tell)
+        start = _start(data, model_file)
+        study = Study.of(data, start.model.effects if start else ())
+        if start:
+            model = start.model
+        else:
+            tell('fitting the pattern')
+            model = study.fit(Unknowns.of(DepositionModel()), starts=10).model
+        tell('comparing')
+        comparison = compare(study, model)
+        content = comparison_as_dict(comparison)
+        tell('writing the report')
+        write_json(output / 'comparison.json', content)
+        write_residuals(output / 'residuals.csv', study, comparison)
+        _write_pictures(output, study, [(model, comparison)])
+        write_report(output / 'report.html', study, [(model, comparison)])
+    if as_json:
+        click.echo(json_text(content))
+    else:
+        _say_comparison(comparison, output)
+
+
+def _say_comparison(comparison: Comparison, output: Path) -> None:
+    for misfit in comparison.misfits:
+        indent = '' if misfit.kind == 'experiment' else '  '
+        click.echo(
+            f'{indent}{misfit.label}: {misfit.readings} readings, bias {misfit.bias_um:+.2f} um, '
+            f'RMSE {misfit.rmse_um:.2f} um, chi2 per reading {misfit.chi_square_per_reading:.2f}'
+        )
+    click.echo(f'gauge noise {comparison.noise_um:.2f} um ({comparison.noise_source})')
+    for region in comparison.regions:
+        click.echo(f'misfit: {region.experiment}: {region.description}')
+    if not comparison.regions:
+        click.echo('no region of significant misfit')
+    click.echo(f'report: {output / "report.html"}')
+
+
+@click.command('diagnose')
+@CAMPAIGN
+@MODEL
+@OUTPUT
+@OWN_EFFECTS
+@SEED
+@JSON
+def diagnose_command(
+    campaign: Path,
+    model_file: Path | None,
+    output: Path,
+    effect_files: tuple[Path, ...],
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
+
+    Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
+    residuals.csv, the residual as coloured meshes and report.html.
+    """
+    from paint_deposition.effects.catalogue import EFFECTS
+    from paint_deposition.inference.diagnosis import diagnose
+
+    library = dict(EFFECTS) | {e.id: e for e in _own(effect_files)}
+    with _Steps('diagnose') as tell:
+        data = _campaign(campaign, tell)
+        start = _start_or_default(data, model_file)
+        diagnosis = diagnose(data, start.model, library, seed, tell)
+        content = _write_diagnosis(output, diagnosis, library, start, tell)
+    _say(diagnosis, content, output, as_json)
+
+
+@click.command('refit')
+@CAMPAIGN
+@click.option(
+    '--add', 'effect', required=True,
+    help="Effect to add: an id, or a Python file with one of your own; 'none' refits only.",
+)  # fmt: skip
+@MODEL
+@OUTPUT
+@SEED
+@JSON
+def refit_command(
+    campaign: Path, effect: str, model_file: Path | None, output: Path, seed: int, as_json: bool
+) -> None:
+    """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
+
+    Writes model.yaml with its history, residuals.csv, the residual as coloured meshes,
+    comparison.png and report.html. To go on from there, give that model.yaml as --model.
+    """
+    from paint_deposition.effects.catalogue import effect_class
+    from paint_deposition.inference.refit import refit
+
+    if effect == 'none':
+        added = None
+    elif effect.endswith('.py'):
+        (added,) = _own((Path(effect),))
+    else:
+        added = effect_class(effect)
+    with _Steps('refit') as tell:
+        data = _campaign(campaign, tell)
+        start = _start_or_default(data, model_file)
+        diagnosis = refit(data, start.model, added, seed, tell)
+        content = _write_diagnosis(output, diagnosis, {}, start, tell)
+    _say(diagnosis, content, output, as_json)
+
+
+class _Steps:
+    """Progress of work in steps of unknown length; nothing when piped."""
+
+    def __init__(self, name: str) -> None:
+        self._bar = tqdm(
+            desc=name, bar_format='{desc}: {postfix} [{elapsed}]', disable=None, delay=1,
+            leave=False, file=sys.stderr,
+        )  # fmt: skip
+
+    def __enter__(self) -> Callable[[str], None]:
+        return self._tell
+
+    def __exit__(self, *error: object) -> None:
+        self._bar.close()
+
+    def _tell(self, line: str) -> None:
+        self._bar.set_postfix_str(line)
+        self._bar.update()
+
+
+def _campaign(path: Path, tell: Callable[[str], None]) -> Campaign:
+    from paint_deposition.formats.campaign_file import read_campaign
+
+    def show(line: str) -> None:
+        tell(line)
+        if not line.startswith('reading '):
+            click.echo(f'note: {line}', err=True)
+
+    return read_campaign(path, show)
+
+
+def _start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:
+    """The model named with --model, else the campaign's, if it names one."""
+    from paint_deposition.formats.model_file import read_model_file
+
+    chosen = model_file or campaign.model_file
+    return read_model_file(chosen) if chosen else None
+
+
+def _start_or_default(campaign: Campaign, model_file: Path | None) -> ModelFile:
+    from paint_deposition.formats.model_file import ModelFile
+    from paint_deposition.model.deposition_model import DepositionModel
+
+    return _start(campaign, model_file) or ModelFile(DepositionModel())
+
+
+def _own(files: tuple[Path, ...]) -> list[type[Effect]]:
+    from paint_deposition.effects.catalogue import load_effect_file
+
+    return [load_effect_file(file) for file in files]
+
+
+def _write_pictures(
+    output: Path, study: Study, models: list[tuple[DepositionModel, Comparison]]
+) -> None:
+    from paint_deposition.formats.residual_mesh import write_residual_meshes
+    from paint_deposition.pictures.comparison import write_comparison_picture
+
+    write_residual_meshes(output, study, models[-1][1])
+    write_comparison_picture(output / 'comparison.png', study, models)
+
+
+def _write_diagnosis(
+    output: Path,
+    diagnosis: Diagnosis,
+    library: dict[str, type[Effect]],
+    start: ModelFile,
+    tell: Callable[[str], None],
+) -> dict[str, Any]:
+    from paint_deposition.formats.inference_files import (
+        diagnosis_as_dict,
+        history_as_list,
+        write_residuals,
+    )
+    from paint_deposition.formats.json_files import write_json
+    from paint_deposition.formats.model_file import write_model
+    from paint_deposition.inference.comparison import compare
+    from paint_deposition.inference.next_experiment import propose_for
+    from paint_deposition.pictures.report import write_report
+
+    tell('comparing before and after')
+    study = diagnosis.study
+    comparisons = [(step.model, compare(study, step.model)) for step in diagnosis.history]
+    tell('looking for what to measure and spray next')
+    places, sprays = propose_for(diagnosis, library)
+    content = diagnosis_as_dict(diagnosis, comparisons[0][1].regions, places, sprays)
+    tell('writing the report')
+    history = history_as_list(diagnosis.history, start.history)
+    write_json(output / 'diagnosis.json', content)
+    write_model(output / 'model_before.yaml', diagnosis.history[0].model)
+    write_model(output / 'model.yaml', diagnosis.model, history=history)
+    write_residuals(output / 'residuals.csv', study, comparisons[-1][1])
+    _write_pictures(output, study, comparisons)
+    write_report(output / 'report.html', study, comparisons, diagnosis, places, sprays)
+    return content
+
+
+def _say(diagnosis: Diagnosis, content: dict[str, Any], output: Path, as_json: bool) -> None:
+    from paint_deposition.formats.json_files import json_text
+
+    if as_json:
+        click.echo(json_text(content))
+        return
+    click.echo(f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}')
+    if diagnosis.p_value < 1.0:
+        click.echo(f'p-value of nothing missing: {diagnosis.p_value:.4f}')
+    for effects in diagnosis.classes:
+        mark = 'added ' if effects.best in diagnosis.accepted else ''
+        click.echo(
+            f'  {mark}{effects.best}: {100 * effects.probability:.0f} %'
+            + (f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else '')
+        )
+        for name, value in effects.parameters.items():
+            click.echo(f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})')
+    errors = content['rmse_um']
+    click.echo(
+        f'RMSE {errors["before"]:.2f} -> {errors["after"]:.2f} um on the fitted points, '
+        f'{errors["holdout_before"]:.2f} -> {errors["holdout_after"]:.2f} um on points left out; '
+        f'gauge noise {errors["noise_floor"]:.2f} um'
+    )
+    for region in content['regions']:
+        click.echo(f'misfit before: {region["experiment"]}: {region["description"]}')
+    for spray in content['next']['spray'][:2]:
+        click.echo(
+            f'next: {spray["what"]}: {" and ".join(spray["separates"])} then differ by '
+            f'{spray["separation_sigma"]:.1f} standard deviations, now '
+            f'{spray["separation_now_sigma"]:.1f}'
+        )
+    if diagnosis.not_testable:
+        click.echo(f'not testable with these readings: {", ".join(diagnosis.not_testable)}')
+    for note in diagnosis.notes:
+        click.echo(f'note: {note}')
+    click.echo(f'model: {output / "model.yaml"}\nreport: {output / "report.html"}')

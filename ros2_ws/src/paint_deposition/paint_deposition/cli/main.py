@@ -1,0 +1,118 @@
+"""The command `paint`: simulate, measure up, find what is missing, plan."""
+
+from __future__ import annotations
+
+import difflib
+import importlib
+import os
+import sys
+
+import click
+
+from paint_deposition.errors import PaintError
+
+# Threads that share matrices as small as ours mostly wait for each other, on a busy machine ten
+# times as long as the work takes. To be set before NumPy is loaded.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+PACKAGE = 'paint_deposition.cli'
+# Command, module, attribute, and what the list of commands says; modules are only loaded when
+# their command is used, so that help comes at once.
+COMMANDS = {
+    'simulate': ('simulate', 'simulate_command', 'Film on a part from a recorded trajectory.'),
+    'calibrate': ('planning', 'calibrate', "Fit the bell's pattern to gauge readings."),
+    'recommend': ('planning', 'recommend', 'Recommend the index between passes.'),
+    'plan': ('planning', 'plan', 'Lay passes over a part; write bag, CSV and RAPID module.'),
+    'compare': ('inference', 'compare_command', 'Set the model beside gauge readings.'),
+    'diagnose': ('inference', 'diagnose_command', 'Find which effect the model lacks; add it.'),
+    'refit': ('inference', 'refit_command', 'Add an effect of your choice and fit anew.'),
+    'inspect': ('recordings', 'inspect_command', 'Show what a bag holds.'),
+    'recover': ('recordings', 'recover_command', 'Make a whole bag of an unfinished run.'),
+}
+
+
+class Commands(click.Group):
+    """The commands above, loaded when used."""
+
+    def list_commands(self, context: click.Context) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, context: click.Context, name: str) -> click.Command | None:
+        if name not in COMMANDS:
+            return None
+        module, attribute, _ = COMMANDS[name]
+        return getattr(importlib.import_module(f'{PACKAGE}.{module}'), attribute)
+
+    def resolve_command(
+        self, context: click.Context, arguments: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        name = arguments[0]
+        if name not in COMMANDS:
+            near = difflib.get_close_matches(name, COMMANDS, n=1)
+            remedy = f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(COMMANDS)}'
+            raise click.UsageError(f'no command is called {name!r}; {remedy}')
+        return super().resolve_command(context, arguments)
+
+    def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section('Commands'):
+            formatter.write_dl([(name, summary) for name, (*_, summary) in COMMANDS.items()])
+
+
+def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
+    if wanted:
+        from paint_deposition.formats.provenance import git_version, package_version
+
+        known = [version for version in (package_version(), git_version()) if version]
+        click.echo(f'paint {" ".join(known) or "of unknown version"}')
+        context.exit()
+
+
+@click.group(
+    cls=Commands,
+    invoke_without_command=True,
+    context_settings={'help_option_names': ['-h', '--help'], 'max_content_width': 100},
+)
+@click.option(
+    '--version', is_flag=True, expose_value=False, is_eager=True, callback=_show_version,
+    help='Show the version and exit.',
+)  # fmt: skip
+@click.pass_context
+def paint(context: click.Context) -> None:
+    """Film build of robotic bells: from recordings and gauge readings to a model that fits.
+
+    Lengths are in metres, film in micrometres. `paint COMMAND --help` tells more.
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command: exit code 0, 2 with one line on stderr for bad input, 130 for Ctrl-C."""
+    sys.exit(run(arguments))
+
+
+def run(arguments: list[str] | None = None) -> int:
+    """Run a command and return its exit code."""
+    try:
+        paint.main(args=arguments, prog_name='paint', standalone_mode=False)
+    except (PaintError, click.ClickException) as error:
+        text = error.format_message() if isinstance(error, click.ClickException) else str(error)
+        return _refuse(text)
+    except OSError as error:
+        return _refuse(f'{error.filename or "output"}: {error.strerror or error}')
+    except (click.Abort, KeyboardInterrupt):
+        click.echo('paint: interrupted', err=True)
+        return 130
+    except click.exceptions.Exit as leaving:
+        return leaving.exit_code
+    return 0
+
+
+def _refuse(text: str) -> int:
+    """Say in one line what was wrong."""
+    click.echo(f'paint: {" ".join(text.split())}', err=True)
+    return 2
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,294 @@
+"""Commands that prepare a job: `calibrate`, `recommend` and `plan`."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Callable, Iterable
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+POSITIVE = click.FloatRange(min=0.0, min_open=True)
+NOT_NEGATIVE = click.FloatRange(min=0.0)
+SHOW_PROGRESS_AFTER_S = 2.0
+MODEL = click.option(
+    '--model', 'model_file', type=click.Path(path_type=Path),
+    help='Deposition model, YAML; default: a 50 mm bell.',
+)  # fmt: skip
+JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+SPEED = click.option('--speed', 'speed_m_per_s', type=float, help='Speed of the passes [m/s].')
+TARGET = click.option(
+    '--target-um', type=float, help='Mean film; the speed is chosen for it [um].'
+)
+INDEX_MIN = click.option('--index-min', 'index_min_m', type=float, help='Least index [m].')
+INDEX_MAX = click.option('--index-max', 'index_max_m', type=float, help='Greatest index [m].')
+TOLERANCE = click.option('--tolerance', type=float, help='Largest sigma_n accepted, 0.05 for 5 %.')
+ONE_WAY = click.option(
+    '--one-way', is_flag=True, help='Every pass in one direction; default: they alternate.'
+)
+STANDOFF = click.option(
+    '--standoff', 'standoff_m', type=float,
+    help='Distance of the TCP from the part [m]; default: the part lies on the model plane.',
+)  # fmt: skip
+TRAVEL = click.option(
+    '--travel-deg', default=0.0, show_default=True,
+    help="Direction of the first pass in the tool's x-y frame, from x to y.",
+)  # fmt: skip
+
+
+@click.command('calibrate')
+@click.argument('campaign', type=click.Path(path_type=Path))
+@click.option(
+    '--model', 'model_file', type=click.Path(path_type=Path),
+    help="Model to start from; default: the campaign's, else a 50 mm bell.",
+)  # fmt: skip
+@click.option(
+    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
+    help='Folder for model.yaml, calibration.json and pictures; older ones are replaced.',
+)  # fmt: skip
+@click.option('--seed', default=0, show_default=True, help='Of the starts of the fit.')
+@JSON
+def calibrate(
+    campaign: Path, model_file: Path | None, output: Path, seed: int, as_json: bool
+) -> None:
+    """Fit the bell's pattern to the gauge readings of CAMPAIGN.
+
+    Any number of panels and parts; a flat panel painted by a few passes is best. Effects of the
+    model to start from are fitted along, its projection is kept.
+    """
+    from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
+    from paint_deposition.formats.campaign_file import read_campaign
+    from paint_deposition.formats.model_file import read_model
+    from paint_deposition.inference import calibration as calibrating
+    from paint_deposition.pictures.calibration import write_calibration_pictures
+
+    with tqdm(
+        desc='calibrate', bar_format='{desc}: {postfix} [{elapsed}]', disable=None,
+        delay=SHOW_PROGRESS_AFTER_S, leave=False,
+    ) as bar:  # fmt: skip
+
+        def tell(line: str) -> None:
+            bar.set_postfix_str(line)
+            bar.update()
+
+        data = read_campaign(campaign, tell)
+        chosen = model_file or data.model_file
+        start = read_model(chosen) if chosen else None
+        result = calibrating.calibrate(data, start, seed, tell)
+        tell('writing')
+        files = write_calibration(output, result)
+        files += write_calibration_pictures(output, result)
+    if as_json:
+        click.echo(json.dumps(calibration_as_dict(result), indent=2))
+        return
+    for value in result.parameters:
+        mark = '' if value.determined else '   not determined'
+        click.echo(
+            f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
+        )
+    for agreement in result.agreements:
+        click.echo(
+            f'{agreement.experiment}: {agreement.points} points, mean '
+            f'{agreement.measured_mean_um:.2f} um measured, {agreement.predicted_mean_um:.2f} '
+            f'predicted, residual SD {agreement.residual_sd_um:.2f} um'
+        )
+    noise = result.study.noise
+    click.echo(
+        f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
+        f'{noise.typical_um:.2f} um ({noise.source})'
+    )
+    _tell_warnings(result.warnings)
+    _tell_files(files)
+
+
+@click.command('recommend')
+@MODEL
+@SPEED
+@TARGET
+@INDEX_MIN
+@INDEX_MAX
+@TOLERANCE
+@click.option('--width', 'width_m', type=float, help='Width to paint across the passes [m].')
+@click.option('--length', 'length_m', type=float, help='Length of a pass [m]; default: the width.')
+@ONE_WAY
+@click.option(
+    '--gun-turns', is_flag=True,
+    help='The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
+)  # fmt: skip
+@STANDOFF
+@TRAVEL
+@click.option(
+    '-o', '--output', default='.', type=click.Path(path_type=Path, file_okay=False),
+    help='Folder for recommendation.json and uniformity.png; default: here.',
+)  # fmt: skip
+@JSON
+def recommend(
+    model_file: Path | None,
+    output: Path,
+    as_json: bool,
+    gun_turns: bool,
+    travel_deg: float,
+    **wanted: float | bool | None,
+) -> None:
+    """Recommend the index between passes for an even film, at --speed or for --target-um."""
+    from paint_deposition.formats.json_files import write_json
+    from paint_deposition.pictures.uniformity import write_uniformity
+    from paint_deposition.planning import recommendation
+    from paint_deposition.planning.index_request import Request
+
+    answer = recommendation.recommend(
+        _model(model_file),
+        Request(gun_turns=gun_turns, travel_rad=math.radians(travel_deg), **wanted),
+    )
+    files = [output / 'recommendation.json', output / 'uniformity.png']
+    write_json(files[0], answer.as_dict())
+    write_uniformity(files[1], answer)
+    if as_json:
+        click.echo(json.dumps(answer.as_dict(), indent=2))
+        return
+    click.echo(answer.sentence)
+    for minimum in answer.minima:
+        click.echo(f'minimum: sigma_n {minimum.sigma_n:.4f} at {minimum.index_m:.4f} m')
+    for low, high in answer.windows_m:
+        click.echo(f'within tolerance: {low:.4f} to {high:.4f} m')
+    if answer.index_drift_m and answer.standoff_drift_m:
+        click.echo(
+            f'the index may drift to {answer.index_drift_m[0]:.3f} and '
+            f'{answer.index_drift_m[1]:.3f} m, the standoff by '
+            f'{answer.standoff_drift_m[0] * 1e3:+.0f} and '
+            f'{answer.standoff_drift_m[1] * 1e3:+.0f} mm'
+        )
+    for note in answer.notes:
+        click.echo(f'note: {note}')
+    _tell_files(files)
+
+
+@click.command('plan')
+@click.option('--mesh', required=True, type=click.Path(path_type=Path), help='STL, PLY or OBJ.')
+@MODEL
+@SPEED
+@TARGET
+@click.option(
+    '--direction', default='horizontal', show_default=True,
+    type=click.Choice(['horizontal', 'vertical']), help='How the passes run.',
+)  # fmt: skip
+@click.option('--index', 'index_m', type=float, help='Fixes the index [m]; default: most even.')
+@INDEX_MIN
+@INDEX_MAX
+@TOLERANCE
+@STANDOFF
+@click.option('--smoothing-radius-m', default=0.1, show_default=True, type=POSITIVE,
+              help='What is finer than this on the part is not followed.')  # fmt: skip
+@click.option(
+    '--overspray-m', type=NOT_NEGATIVE,
+    help='The gun opens this far before the part; default: where 90 % of the pattern reach.',
+)  # fmt: skip
+@click.option('--acceleration', 'acceleration_m_per_s2', default=2.0, show_default=True,
+              type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
+@ONE_WAY
+@TRAVEL
+@click.option('--outward', nargs=3, type=float, metavar='X Y Z',
+              help='From the part to the gun; default: the mean normal of the mesh.')  # fmt: skip
+@click.option('--down', nargs=3, type=float, metavar='X Y Z',
+              help='Gravity in the mesh frame; default: -z, or -y for a lying part.')  # fmt: skip
+@click.option('--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
+              help='Metres per unit of the mesh file.')  # fmt: skip
+@click.option('--max-edge-length-m', default=0.02, show_default=True, type=POSITIVE,
+              help='The mesh is refined to this.')  # fmt: skip
+@click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
+@click.option(
+    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
+    help='Folder for the bag, passes.csv, passes.mod, plan.json and the film; older ones are '
+    'replaced.',
+)  # fmt: skip
+@JSON
+def plan(
+    mesh: Path,
+    model_file: Path | None,
+    output: Path,
+    travel_deg: float,
+    down: tuple[float, float, float] | None,
+    mesh_scale: float,
+    max_edge_length_m: float,
+    frame_id: str,
+    as_json: bool,
+    **wanted: float | bool | str | tuple | None,
+) -> None:
+    """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
+    import numpy as np
+
+    from paint_deposition.formats.meshes import read_mesh
+    from paint_deposition.formats.plan_files import write_plan
+    from paint_deposition.motion.path_builder import spray_path
+    from paint_deposition.pictures.door import write_door_picture
+    from paint_deposition.planning import plan as planning
+
+    model = _model(model_file)
+    request = planning.PlanRequest(travel_rad=math.radians(travel_deg), **wanted)
+    gravity = None if down is None else np.array(down)
+    surface = read_mesh(mesh, mesh_scale, max_edge_length_m, gravity)
+    with tqdm(
+        total=1.0, desc='plan', disable=None, delay=SHOW_PROGRESS_AFTER_S,
+        bar_format='{desc}: {percentage:3.0f}%|{bar}| [{elapsed}]', leave=False,
+    ) as bar:  # fmt: skip
+        result = planning.plan(surface, model, request, frame_id, _shown_on(bar))
+    details = {
+        'mesh': str(mesh),
+        'model': str(model_file) if model_file else 'default',
+        'frame_id': frame_id,
+        'down': surface.down,
+        'notes': list(surface.notes),
+    }
+    files = write_plan(output, result, surface, details)
+    files.append(
+        write_door_picture(
+            output / 'film.png', surface, result.film_um, spray_path(result.trajectory)[0],
+            result.statistics, 'Planned passes and their film', result.sentence,
+        )
+    )  # fmt: skip
+    for note in surface.notes:
+        click.echo(f'note: {note}', err=True)
+    if as_json:
+        click.echo((output / 'plan.json').read_text(), nl=False)
+        return
+    click.echo(result.sentence)
+    click.echo(
+        f'on a plane: sigma_n {100 * result.plane.sigma_n:.1f} % at '
+        f'{result.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
+        f'{100 * result.plane_on_part.sigma_n:.1f} %'
+    )
+    click.echo(
+        f'film {result.statistics.min_um:.1f} to {result.statistics.max_um:.1f} um, coverage '
+        f'{100 * result.statistics.coverage:.0f} %, '
+        f'{100 * result.statistics.transfer_efficiency:.0f} % of the solids on the part'
+    )
+    _tell_files(files)
+
+
+def _model(model_file: Path | None):
+    from paint_deposition.formats.model_file import read_model
+    from paint_deposition.model.deposition_model import DepositionModel
+
+    return read_model(model_file) if model_file else DepositionModel()
+
+
+def _shown_on(bar: tqdm) -> Callable[[str, float], None]:
+    """Progress of one step after the other on one bar."""
+
+    def show(what: str, share: float) -> None:
+        bar.set_description(what, refresh=False)
+        bar.update(share - bar.n)
+
+    return show
+
+
+def _tell_warnings(warnings: Iterable[str]) -> None:
+    for warning in warnings:
+        click.echo(f'warning: {warning}', err=True)
+
+
+def _tell_files(files: Iterable[Path]) -> None:
+    for file in files:
+        click.echo(f'  {file}')

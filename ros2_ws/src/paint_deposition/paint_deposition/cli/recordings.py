@@ -1,0 +1,101 @@
+"""Commands on recordings: `inspect` and `recover`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import click
+from tqdm import tqdm
+
+from paint_deposition.formats.bag_summary import BagSummary, summarise
+from paint_deposition.formats.mcap_recovery import Recovery, mcap_files, recover
+
+SHOW_PROGRESS_AFTER_S = 2.0
+
+
+@click.command('inspect')
+@click.argument('bag', type=click.Path(path_type=Path))
+@click.option(
+    '--max-pose-gap-s',
+    default=0.25,
+    show_default=True,
+    type=click.FloatRange(min=0.0, min_open=True),
+    help='Longest interval between poses that is no gap [s].',
+)
+@click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+def inspect_command(bag: Path, max_pose_gap_s: float, as_json: bool) -> None:
+    """Show what BAG holds: topics, streams of poses and their gaps, triggers."""
+    summary = summarise(bag, max_pose_gap_s)
+    if as_json:
+        click.echo(json.dumps(summary.as_dict(), indent=2))
+    else:
+        click.echo(_table(summary))
+
+
+@click.command('recover')
+@click.argument('run', type=click.Path(path_type=Path))
+@click.option(
+    '-o',
+    '--output',
+    type=click.Path(path_type=Path),
+    help='Folder to make; default: RUN with _recovered behind its name.',
+)
+@click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
+    """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.
+
+    RUN is a run's folder or its .mcap file.
+    """
+    output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
+    size = sum(file.stat().st_size for file in mcap_files(run))
+    # The bar shows itself only for work that takes time, and never when piped.
+    with tqdm(
+        total=size,
+        unit='B',
+        unit_scale=True,
+        desc='recover',
+        delay=SHOW_PROGRESS_AFTER_S,
+        disable=None,
+    ) as bar:
+        recovery = recover(run, output, on_bytes=bar.update)
+    if as_json:
+        click.echo(json.dumps(_figures(recovery), indent=2))
+        return
+    for line in recovery.breaks:
+        click.echo(line)
+    if recovery.damaged_chunks:
+        click.echo(f'{recovery.damaged_chunks} damaged chunks left out')
+    if recovery.skipped_topics:
+        click.echo(f'left out, not CDR or without a schema: {" ".join(recovery.skipped_topics)}')
+    for topic, count in recovery.counts.items():
+        click.echo(f'{count:10d}  {topic}')
+    click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
+
+
+def _figures(recovery: Recovery) -> dict:
+    return {
+        'folder': str(recovery.folder),
+        'messages': recovery.message_count,
+        'topics': recovery.counts,
+        'damaged_chunks': recovery.damaged_chunks,
+        'breaks': recovery.breaks,
+        'skipped_topics': recovery.skipped_topics,
+    }
+
+
+def _table(summary: BagSummary) -> str:
+    lines = [summary.path]
+    width = max((len(topic.name) for topic in summary.topics), default=0)
+    lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
+    lines += [
+        f"poses on {stream.topic}: {stream.poses} in frame '{stream.frame_id}' over "
+        f'{stream.duration_s:.3f} s, {stream.mean_rate_hz:.1f} a second, {stream.gaps} gaps, '
+        f'longest interval {stream.longest_gap_s:.3f} s, '
+        f'{stream.repeated_stamps} repeated and {stream.backward_stamps} backward stamps'
+        for stream in summary.pose_streams
+    ]
+    if not summary.pose_streams:
+        lines.append('no poses: there is no PoseStamped topic with messages')
+    lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
+    return '\n'.join(lines)
