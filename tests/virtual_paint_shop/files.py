@@ -1,0 +1,111 @@
+"""A campaign as files: what a user would have, and apart from it, in `truth/`, what is hidden."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import yaml
+from rosbags.rosbag2 import StoragePlugin, Writer
+from rosbags.typesys import Stores, get_typestore
+
+from .gauge import Readings
+from .jobs import Log
+from .shop import Campaign
+
+POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
+
+
+def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False) -> Path:
+    """Write the campaign and return the path of its campaign.yaml.
+
+    `truth/` holds truth.json, the held-out readings and the true films; campaign.yaml does not
+    mention it. Raises FileExistsError when the folder exists and is not empty.
+    """
+    folder = Path(folder)
+    if folder.exists() and any(folder.iterdir()):
+        raise FileExistsError(f'{folder} is not empty; choose another folder')
+    (folder / 'truth').mkdir(parents=True, exist_ok=True)
+    entries = []
+    for experiment in campaign.experiments:
+        mesh = f'{experiment.part.kind}.stl'
+        trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
+            folder / mesh
+        )
+        write_bag(experiment.log, folder / experiment.name)
+        write_readings(experiment.readings, folder / f'{experiment.name}.csv', sigma_column)
+        write_readings(
+            experiment.heldout, folder / 'truth' / f'heldout_{experiment.name}.csv', sigma_column
+        )
+        for name, table in (('readings', experiment.readings), ('heldout', experiment.heldout)):
+            _write_films(table, folder / 'truth' / f'films_{name}_{experiment.name}.csv')
+        entries.append(
+            {
+                'name': experiment.name,
+                'mesh': mesh,
+                'trajectory': experiment.name,
+                'pose_topic': POSE_TOPIC,
+                'state_topic': STATE_TOPIC,
+                'measurements': f'{experiment.name}.csv',
+            }
+        )
+    (folder / 'truth' / 'truth.json').write_text(json.dumps(campaign.truth, indent=1) + '\n')
+    path = folder / 'campaign.yaml'
+    path.write_text(yaml.safe_dump({'experiments': entries}, sort_keys=False))
+    return path
+
+
+def write_bag(log: Log, folder: Path) -> None:
+    """A rosbag2 folder (MCAP): PoseStamped poses, Bool triggers at their log time."""
+    types = get_typestore(Stores.ROS2_JAZZY)
+    time_type = types.types['builtin_interfaces/msg/Time']
+    header_type = types.types['std_msgs/msg/Header']
+    pose_type = types.types['geometry_msgs/msg/PoseStamped']
+    bool_type = types.types['std_msgs/msg/Bool']
+    inner, point, quaternion = (
+        types.types[f'geometry_msgs/msg/{name}'] for name in ('Pose', 'Point', 'Quaternion')
+    )
+    queue = []
+    with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
+        poses = bag.add_connection(POSE_TOPIC, pose_type.__msgtype__, typestore=types)
+        states = bag.add_connection(STATE_TOPIC, bool_type.__msgtype__, typestore=types)
+        for stamp, p, q in zip(
+            log.stamps_ns.tolist(),
+            log.positions_m.tolist(),
+            log.quaternions_xyzw.tolist(),
+            strict=True,
+        ):
+            header = header_type(time_type(stamp // 10**9, stamp % 10**9), 'part')
+            message = pose_type(header, inner(point(*p), quaternion(*q)))
+            queue.append((stamp, poses, types.serialize_cdr(message, pose_type.__msgtype__)))
+        for stamp, on in zip(log.trigger_stamps_ns.tolist(), log.trigger_on.tolist(), strict=True):
+            queue.append(
+                (stamp, states, types.serialize_cdr(bool_type(on), bool_type.__msgtype__))
+            )
+        for stamp, connection, data in sorted(queue, key=lambda entry: entry[0]):
+            bag.write(connection, stamp, data)
+
+
+def write_readings(table: Readings, path: Path, sigma_column: bool) -> None:
+    head = ['x_m', 'y_m', 'z_m', 'thickness_um', 'point']
+    columns = [*(np.round(table.positions_m, 4).T), table.thickness_um, table.point]
+    if any(table.group):
+        head, columns = [*head, 'group'], [*columns, table.group]
+    if sigma_column:
+        head, columns = [*head, 'sigma_um'], [*columns, np.round(table.sigma_um, 3)]
+    _write_csv(path, head, columns)
+
+
+def _write_films(table: Readings, path: Path) -> None:
+    films = [np.round(f, 4) for f in (table.film_um, table.expected_um, table.clean_um)]
+    _write_csv(path, ['point', 'film_um', 'expected_um', 'clean_um'], [table.point, *films])
+
+
+def _write_csv(path: Path, head: list[str], columns: list) -> None:
+    with path.open('w', newline='') as file:
+        out = csv.writer(file)
+        out.writerow(head)
+        out.writerows(zip(*(column.tolist() for column in columns), strict=True))

@@ -1,0 +1,164 @@
+"""Film-thickness readings: where they are taken and what the gauge says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import qmc
+
+from .doors import Part
+
+
+@dataclass(frozen=True)
+class GaugeNoise:
+    """sigma = sqrt(floor^2 + (relative T)^2) um per reading, and what real gauges add."""
+
+    floor_um: float = 0.7
+    relative: float = 0.01
+    heavy_tails: bool = False  # Student t, 4 degrees of freedom, same sigma
+    outlier_fraction: float = 0.0  # gross errors of 4 to 10 sigma
+    session_offset_um: float = 0.0  # standard deviation of one offset per experiment
+
+    def sigma_um(self, film_um: np.ndarray) -> np.ndarray:
+        return np.hypot(self.floor_um, self.relative * film_um)
+
+    def read(self, film_um: np.ndarray, rng: np.random.Generator, offset_um: float) -> np.ndarray:
+        """One noisy reading of each film, to the gauge's 0.01 um."""
+        shape = np.shape(film_um)
+        noise = rng.normal(size=shape)
+        tails = rng.standard_t(4, size=shape) / np.sqrt(2.0)
+        gross = rng.choice([-1.0, 1.0], shape) * rng.uniform(4.0, 10.0, shape)
+        struck = rng.random(shape) < self.outlier_fraction
+        noise = np.where(struck, gross, tails if self.heavy_tails else noise)
+        reading = film_um + self.sigma_um(film_um) * noise + offset_um
+        return np.round(np.maximum(reading, 0.0), 2)
+
+
+@dataclass(frozen=True)
+class Spots:
+    """Gauge points on a part, each possibly read more than once."""
+
+    x_m: np.ndarray
+    z_m: np.ndarray
+    group: np.ndarray  # (s,) str, '' if none
+    repeats: np.ndarray  # (s,) how many readings
+
+
+@dataclass(frozen=True)
+class Readings:
+    """A table, one row per reading; the last four columns are the shop's secret."""
+
+    point: np.ndarray
+    group: np.ndarray
+    positions_m: np.ndarray
+    normals: np.ndarray
+    thickness_um: np.ndarray
+    sigma_um: np.ndarray  # the gauge's true sigma there
+    film_um: np.ndarray  # true dry film
+    expected_um: np.ndarray  # what a noise-free gauge would say
+    clean_um: np.ndarray  # the film without the hidden effect
+
+    def __len__(self) -> int:
+        return self.thickness_um.size
+
+
+def layout(
+    part: Part,
+    style: str,
+    readings: int,
+    repeats: int,
+    rng: np.random.Generator,
+    keep_off_m: float = 0.015,
+) -> Spots:
+    """`readings` in all, of which `repeats` are second and third visits to some of the points."""
+    points = max(readings - repeats, 3)
+    if style == 'random':
+        x, z = scatter(part, points, rng, keep_off_m)
+        group = np.full(x.size, '')
+    else:
+        x, z, group = _lines(part, style, points, rng, keep_off_m)
+    times = np.ones(x.size, int)
+    again = rng.permutation(x.size)[: max(int(np.ceil(repeats / 2)), 1)]
+    for n in range(repeats):
+        times[again[n % again.size]] += 1
+    return Spots(x, z, group, times)
+
+
+def scatter(
+    part: Part, count: int, rng: np.random.Generator, keep_off_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Quasi-random points on the skin, away from free edges."""
+    cube = qmc.Sobol(2, scramble=True, seed=int(rng.integers(2**31))).random(1024)
+    x, z = (cube[:, 0] - 0.5) * part.width_m, cube[:, 1] * part.height_m
+    free = part.edge_distance(x, z) > keep_off_m
+    return x[free][:count], z[free][:count]
+
+
+def tabulate(
+    part: Part,
+    spots: Spots,
+    film: np.ndarray,
+    expected: np.ndarray,
+    clean: np.ndarray,
+    noise: GaugeNoise,
+    offset: float,
+    rng: np.random.Generator,
+) -> Readings:
+    """One row per reading: first every point once, then the repeats."""
+    rounds = [np.flatnonzero(spots.repeats > n) for n in range(spots.repeats.max())]
+    row = np.concatenate(rounds)
+    positions = part.point(spots.x_m, spots.z_m)
+    normals = part.normal(spots.x_m, spots.z_m)
+    names = np.array([f'P{n + 1:03d}' for n in range(spots.x_m.size)])
+    return Readings(
+        names[row],
+        spots.group[row],
+        positions[row],
+        normals[row],
+        noise.read(expected[row], rng, offset),
+        noise.sigma_um(expected[row]),
+        film[row],
+        expected[row],
+        clean[row],
+    )
+
+
+def keep_clear(part: Part, spots: Spots) -> Spots:
+    """Where a body on the skin is nearer than 18 mm the gauge cannot stand; leave these out."""
+    if part.obstacle is None:
+        return spots
+    body = part.obstacle[0]
+    on_skin = body[np.abs(body[:, 1] - part.height(body[:, 0], body[:, 2])) < 0.02]
+    if not on_skin.size:
+        return spots
+    foot = np.hypot(
+        spots.x_m[:, None] - on_skin[None, :, 0], spots.z_m[:, None] - on_skin[None, :, 2]
+    )
+    free = foot.min(axis=1) > 0.018
+    return Spots(spots.x_m[free], spots.z_m[free], spots.group[free], spots.repeats[free])
+
+
+def _lines(
+    part: Part, style: str, points: int, rng: np.random.Generator, keep_off_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Four or five columns, or five to seven rows, as one tapes them on a door."""
+    lines = int(rng.integers(4, 6)) if style == 'columns' else int(rng.integers(5, 8))
+    number = np.arange(points) % lines
+    place = np.arange(points) // lines
+    across = np.linspace(0.08, 0.92, lines)[number]
+    each = np.bincount(number, minlength=lines)[number]
+    share = place / np.maximum(each - 1, 1)
+    room = keep_off_m + 0.001
+    if style == 'columns':
+        z = room + share * (part.height_m - 2 * room)
+        x = part.left(z) + room + across * (0.5 * part.width_m - part.left(z) - 2 * room)
+        name = 'column'
+    else:
+        z = room + across * (part.height_m - 2 * room)
+        x = part.left(z) + room + share * (0.5 * part.width_m - part.left(z) - 2 * room)
+        name = 'row'
+    wobble = rng.normal(0.0, 0.003, (2, points))
+    free = part.edge_distance(x + wobble[0], z + wobble[1]) > 0.013
+    x, z = np.where(free, x + wobble[0], x), np.where(free, z + wobble[1], z)
+    return x, z, np.array([f'{name} {n + 1}' for n in number])

@@ -1,0 +1,246 @@
+"""Paint jobs: passes over a part, the gun's motion in time, and what the controller logs of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
+
+from .doors import Part
+from .flight import Slices
+
+STEP_M = 0.003
+SLICE_M = 0.012
+_AFTER_TRIGGER_S = np.array([0.01, 0.02, 0.04, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5])
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a part is to be painted; lengths in metres, angles in radians."""
+
+    direction: str = 'horizontal'
+    index_m: float = 0.30
+    passes: int = 4
+    standoff_m: float = 0.25
+    speed_m_per_s: float = 0.2
+    overrun_m: float = 0.25  # TCP travel beyond the part's edges
+    gun_margin_m: float = 0.20  # gun opens this far before the edge; < 0: on the part
+    follow: float = 0.6  # 0 fixed tool axis, 1 along the normal
+    roll_rad: float = 0.0
+    teach_error_m: float = 0.004
+    sample_s: float = 0.024
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Gun motion and trigger commands. n samples about 3 mm apart, e trigger events."""
+
+    time_s: np.ndarray
+    tcp_m: np.ndarray  # (n, 3)
+    turn: np.ndarray  # (n, 3, 3), columns are the tool's axes
+    pass_number: np.ndarray  # (n,), -1 between passes
+    reversal_m: np.ndarray  # (n,) path to the nearest end of a pass
+    trigger_s: np.ndarray  # (e,)
+    trigger_on: np.ndarray  # (e,) bool
+
+    def pose(self, time_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """TCP (m, 3) and axes (m, 3, 3) at the times, linear between samples."""
+        flat = np.concatenate([self.tcp_m, self.turn.reshape(-1, 9)], axis=1)
+        at = np.stack([np.interp(time_s, self.time_s, column) for column in flat.T], axis=1)
+        return at[:, :3], orthonormal(at[:, 3:].reshape(-1, 3, 3))
+
+    def commanded(self, time_s: np.ndarray) -> np.ndarray:
+        """1 where the trigger is on."""
+        last = np.searchsorted(self.trigger_s, time_s, side='right') - 1
+        return np.where(last < 0, False, self.trigger_on[np.maximum(last, 0)]).astype(float)
+
+
+@dataclass(frozen=True)
+class Log:
+    """What the robot controller recorded."""
+
+    stamps_ns: np.ndarray  # (p,) int64
+    positions_m: np.ndarray  # (p, 3)
+    quaternions_xyzw: np.ndarray  # (p, 4)
+    trigger_stamps_ns: np.ndarray  # (e,) int64
+    trigger_on: np.ndarray  # (e,) bool
+
+
+@dataclass(frozen=True)
+class Job:
+    """An experiment before painting."""
+
+    name: str
+    part: Part
+    plan: Plan
+    motion: Motion
+
+
+def draw_plan(
+    rng: np.random.Generator,
+    part: Part,
+    index_m: float,
+    half_width_m: float,
+    direction: str,
+    gun: str,
+) -> Plan:
+    """A believable plan; `gun` is 'outside' (spraying well past the edges) or 'near_edge'."""
+    across = part.height_m if direction == 'horizontal' else part.width_m
+    outside = rng.uniform(0.35, 0.60) * half_width_m
+    margin = rng.uniform(0.03, 0.08) * rng.choice([-1.0, 1.0])
+    return Plan(
+        direction,
+        index_m,
+        int(np.clip(np.rint(across / index_m) + 1, 3, 6)),
+        standoff_m=rng.uniform(0.20, 0.30),
+        follow=rng.uniform(0.3, 0.9),
+        overrun_m=outside + 0.04 if gun == 'outside' else rng.uniform(0.10, 0.20),
+        gun_margin_m=outside if gun == 'outside' else margin,
+        roll_rad=rng.choice([0.0, np.pi / 2, np.pi, rng.uniform(-np.pi, np.pi)]),
+        teach_error_m=rng.uniform(0.001, 0.006),
+    )
+
+
+def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
+    """Serpentine passes from the top down (or the left on), joined by rounded links."""
+    stretches, ends = [], []
+    along = (
+        (-0.5 * part.width_m, 0.5 * part.width_m)
+        if plan.direction == 'horizontal'
+        else (0.0, part.height_m)
+    )
+    for number in range(plan.passes):
+        place = (0.5 * (plan.passes - 1) - number) * plan.index_m
+        start, stop = along[0] - plan.overrun_m, along[1] + plan.overrun_m
+        forward = number % 2 == 0
+        path = np.arange(start, stop, STEP_M)
+        path = path if forward else path[::-1]
+        tcp, axis = _pass(part, plan, rng, path, place)
+        opens = (along[0] - plan.gun_margin_m, along[1] + plan.gun_margin_m)
+        inside = np.flatnonzero((path > opens[0]) & (path < opens[1]))
+        stretches.append((tcp, axis, number))
+        ends.append((inside[0], inside[-1]))
+    return _in_time(stretches, ends, plan)
+
+
+def slices(motion: Motion, flow_cm3_per_s, slice_m: float = SLICE_M) -> Slices:
+    """Cut the spraying into short slices; `flow_cm3_per_s(times)` is the true flow."""
+    travelled = np.concatenate([[0.0], np.cumsum(_steps(motion.tcp_m))])
+    cuts = np.interp(np.arange(0.0, travelled[-1], slice_m), travelled, motion.time_s)
+    after = (motion.trigger_s[:, None] + np.concatenate([[0.0], _AFTER_TRIGGER_S])).ravel()
+    cuts = np.unique(np.concatenate([cuts, after[after < motion.time_s[-1]]]))
+    first, last = cuts[:-1], cuts[1:]
+    inner = np.minimum(1e-6, 0.25 * (last - first))
+    flow_0, flow_1 = flow_cm3_per_s(first + inner), flow_cm3_per_s(last - inner)
+    on = (flow_0 + flow_1) > 1e-9
+    tcp_0, turn_0 = motion.pose(first[on])
+    tcp_1, turn_1 = motion.pose(last[on])
+    return Slices(first[on], last[on], tcp_0, tcp_1, turn_0, turn_1, flow_0[on], flow_1[on])
+
+
+def record(motion: Motion, sample_s: float, rng: np.random.Generator) -> Log:
+    """Stamps like a robot controller's: a nominal cycle, jitter, now and then a lost sample."""
+    epoch = 1_700_000_000_000_000_000 + int(rng.integers(0, 10**15))
+    ticks = np.arange(motion.time_s[0] + 0.001, motion.time_s[-1] - 0.001, sample_s)
+    ticks = ticks + rng.uniform(-0.08, 0.08, ticks.size) * sample_s
+    ticks = ticks[(rng.random(ticks.size) > 0.01) | (np.arange(ticks.size) == 0)]
+    tcp, turn = motion.pose(ticks)
+    quaternions = Rotation.from_matrix(turn).as_quat()
+    flips = np.cumprod(np.where(np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0, -1, 1))
+    quaternions[1:] *= flips[:, None]
+    events = np.concatenate([[ticks[0]], motion.trigger_s])
+    return Log(
+        epoch + np.rint(ticks * 1e9).astype(np.int64),
+        tcp,
+        quaternions,
+        epoch + np.rint(events * 1e9).astype(np.int64),
+        np.concatenate([[False], motion.trigger_on]),
+    )
+
+
+def moved(
+    motion: Motion, tcp_m: np.ndarray | None = None, turn: np.ndarray | None = None
+) -> Motion:
+    """The same timing with other poses."""
+    return replace(
+        motion,
+        tcp_m=motion.tcp_m if tcp_m is None else tcp_m,
+        turn=motion.turn if turn is None else turn,
+    )
+
+
+def orthonormal(turn: np.ndarray) -> np.ndarray:
+    z = turn[..., 2] / np.linalg.norm(turn[..., 2], axis=-1, keepdims=True)
+    x = turn[..., 0] - np.sum(turn[..., 0] * z, axis=-1, keepdims=True) * z
+    x = x / np.linalg.norm(x, axis=-1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=-1)
+
+
+def _pass(
+    part: Part, plan: Plan, rng: np.random.Generator, path: np.ndarray, place: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """TCP and tool axis along one pass: taught every 0.25 m or so, splined in between."""
+    knots = np.linspace(path.min(), path.max(), max(int(np.ptp(path) / 0.25), 4))
+    if plan.direction == 'horizontal':
+        x, z = knots, np.full_like(knots, 0.5 * part.height_m + place)
+    else:
+        x, z = np.full_like(knots, -place), knots
+    on_x = np.clip(x, -0.5 * part.width_m, 0.5 * part.width_m)
+    on_z = np.clip(z, 0.0, part.height_m)
+    normal = np.mean(
+        [
+            part.normal(on_x, np.clip(on_z + d, 0.0, part.height_m))
+            for d in (-0.06, -0.03, 0.0, 0.03, 0.06)
+        ],
+        axis=0,
+    )
+    square = np.array([0.0, 1.0, 0.0])
+    axis = -((1.0 - plan.follow) * square + plan.follow * normal)
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    aim = np.stack([x, part.height(on_x, on_z), z], axis=1)
+    away = plan.standoff_m + rng.normal(0.0, plan.teach_error_m, knots.size)
+    tcp = aim - away[:, None] * axis
+    return CubicSpline(knots, tcp)(path), CubicSpline(knots, axis)(path)
+
+
+def _in_time(stretches: list, ends: list, plan: Plan) -> Motion:
+    tcps, axes, numbers, fires = [], [], [], []
+    total = 0
+    for k, (tcp, axis, number) in enumerate(stretches):
+        if k:
+            link = int(np.linalg.norm(tcp[0] - tcps[-1][-1]) / STEP_M) + 2
+            share = np.linspace(0.0, 1.0, link)[1:-1, None]
+            tcps.append((1 - share) * tcps[-1][-1] + share * tcp[0])
+            axes.append((1 - share) * axes[-1][-1] + share * axis[0])
+            numbers.append(np.full(len(share), -1))
+            total += len(share)
+        fires.append((total + ends[k][0], total + ends[k][1]))
+        tcps.append(tcp)
+        axes.append(axis)
+        numbers.append(np.full(len(tcp), number))
+        total += len(tcp)
+    number = np.concatenate(numbers)
+    tcp = gaussian_filter1d(np.concatenate(tcps), 5.0, axis=0, mode='nearest')
+    axis = gaussian_filter1d(np.concatenate(axes), 12.0, axis=0, mode='nearest')
+    path = np.concatenate([[0.0], np.cumsum(_steps(tcp))])
+    corners = path[np.flatnonzero(np.diff(number) != 0)]
+    reversal = (
+        np.min(np.abs(path[:, None] - corners[None, :]), axis=1)
+        if corners.size
+        else (np.full(path.size, np.inf))
+    )
+    speed = plan.speed_m_per_s * (1.0 - 0.5 * np.exp(-((reversal / 0.03) ** 2)))
+    time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
+    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
+    turn = orthonormal(np.stack([np.broadcast_to(across, axis.shape), axis, axis], axis=-1))
+    trigger = np.array(fires).ravel()
+    return Motion(
+        time, tcp, turn, number, reversal, time[trigger], np.arange(trigger.size) % 2 == 0
+    )
+
+
+def _steps(tcp_m: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(np.diff(tcp_m, axis=0), axis=1)

@@ -1,0 +1,131 @@
+"""What is written can be read back by others' tools, and gives nothing away."""
+
+from __future__ import annotations
+
+import csv
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from click.testing import CliRunner
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+from .__main__ import main
+from .files import write
+from .gauge import GaugeNoise, layout
+from .shop import generate
+
+
+@pytest.fixture(scope='module')
+def campaign():
+    return generate(4, 'edge_build', experiments=('panel', 'door'), parcels=300_000, heldout=20)
+
+
+@pytest.fixture(scope='module')
+def folder(campaign, tmp_path_factory):
+    return write(campaign, tmp_path_factory.mktemp('shop') / 'out').parent
+
+
+def test_campaign_file_names_what_exists_and_hides_the_truth(folder):
+    text = (folder / 'campaign.yaml').read_text()
+    assert 'truth' not in text
+    assert 'edge' not in text
+    for entry in yaml.safe_load(text)['experiments']:
+        for key in ('mesh', 'trajectory', 'measurements'):
+            assert (folder / entry[key]).exists()
+    assert json.loads((folder / 'truth' / 'truth.json').read_text())['id'] == 'edge_build'
+
+
+def test_bag_holds_the_log(campaign, folder):
+    log = campaign.experiments[1].log
+    poses, triggers = [], []
+    types = get_typestore(Stores.ROS2_JAZZY)
+    with AnyReader([folder / 'door'], default_typestore=types) as bag:
+        for connection, stamp, data in bag.messages():
+            message = bag.deserialize(data, connection.msgtype)
+            if connection.topic == '/atomizer/pose':
+                p, q, t = message.pose.position, message.pose.orientation, message.header.stamp
+                poses.append([t.sec * 10**9 + t.nanosec, p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+            else:
+                triggers.append((stamp, message.data))
+    poses = np.array(poses, dtype=object)
+    assert np.array_equal(poses[:, 0].astype(np.int64), log.stamps_ns)
+    assert np.allclose(poses[:, 1:4].astype(float), log.positions_m)
+    assert np.allclose(poses[:, 4:].astype(float), log.quaternions_xyzw)
+    assert np.array_equal([t[0] for t in triggers], log.trigger_stamps_ns)
+    assert np.array_equal([t[1] for t in triggers], log.trigger_on)
+
+
+def test_readings_and_mesh_read_back(campaign, folder):
+    with (folder / 'door.csv').open() as file:
+        rows = list(csv.DictReader(file))
+    table = campaign.experiments[1].readings
+    assert len(rows) == len(table) == 100
+    assert [float(r['thickness_um']) for r in rows] == table.thickness_um.tolist()
+    assert len({r['point'] for r in rows}) == 75
+    mesh = trimesh.load(folder / 'door.stl')
+    spots = np.array([[float(r[c]) for c in ('x_m', 'y_m', 'z_m')] for r in rows])
+    _, distance, face = trimesh.proximity.closest_point(mesh, spots)
+    assert distance.max() < 5e-4
+    assert np.min(np.sum(mesh.face_normals[face] * table.normals, axis=1)) > 0.97
+
+
+def test_tool_axis_points_at_the_part(campaign):
+    log = campaign.experiments[1].log
+    x, y, z, w = log.quaternions_xyzw.T
+    axis_y = 2 * (y * z - x * w)
+    assert axis_y.max() < -0.7
+    assert np.allclose(x * x + y * y + z * z + w * w, 1.0)
+
+
+def test_existing_files_are_not_overwritten(campaign, folder):
+    with pytest.raises(FileExistsError, match='not empty'):
+        write(campaign, folder)
+
+
+def test_gauge_noise_is_what_it_says():
+    rng = np.random.default_rng(1)
+    film = np.full(20_000, 20.0)
+    for noise in (GaugeNoise(), GaugeNoise(heavy_tails=True)):
+        assert np.std(noise.read(film, rng, 0.0)) == pytest.approx(np.hypot(0.7, 0.2), rel=0.06)
+    rough = GaugeNoise(outlier_fraction=0.02).read(film, rng, 0.0)
+    assert np.mean(np.abs(rough - 20.0) > 3.9 * np.hypot(0.7, 0.2)) == pytest.approx(0.02, rel=0.2)
+
+
+@pytest.mark.parametrize('style', ['columns', 'rows', 'random'])
+def test_layouts_stay_on_the_part_and_repeat(campaign, style):
+    part = campaign.experiments[1].part
+    spots = layout(part, style, 120, 30, np.random.default_rng(3))
+    assert spots.x_m.size == 90
+    assert spots.repeats.sum() == 120
+    assert spots.repeats.max() == 3
+    assert part.edge_distance(spots.x_m, spots.z_m).min() > 0.0125
+
+
+def test_command_writes_a_campaign(tmp_path):
+    command = (
+        f'-m tests.virtual_paint_shop --seed 7 --truth gauge_zero --readings 30 --out {tmp_path}'
+    )
+    done = subprocess.run(
+        [sys.executable, *command.split(), '--parcels', '200000'],
+        cwd=Path(__file__).parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert Path(done.stdout.strip()) == tmp_path / 'campaign.yaml'
+
+
+def test_command_refuses_an_unknown_truth_in_one_line(tmp_path):
+    command = ['--seed', '7', '--truth', 'gravity', '--out', str(tmp_path)]
+    done = CliRunner().invoke(main, command)
+    assert done.exit_code == 2
+    assert len(done.stderr.strip().splitlines()) == 1
+    assert 'gravity' in done.stderr

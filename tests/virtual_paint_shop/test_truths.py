@@ -1,0 +1,262 @@
+"""Every hidden effect changes the film the way its physics says."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from .bench import Bench
+from .doors import Bend, Part
+from .jobs import Job, Plan, drive
+from .parcels import Pattern
+from .truths import DOWN, library
+from .truths_film import run_down
+
+FLAT = Part('door', 1.0, 1.0)
+DOOR = Part(
+    'door',
+    1.1,
+    0.9,
+    5.0,
+    3.0,
+    bends=(Bend('z', 0.50, -1.0, -0.20, 0.012), Bend('z', 0.25, -1.0, 0.35, 0.02)),
+)
+ROUND = Pattern(1.5, K2=0.2, K3=0.0, phi_rad=0.0, r_m=0.09, sigma1_m=0.04, sigma2_m=0.06)
+CONTRACT_IDS = {
+    'incidence_attraction',
+    'convex_attraction',
+    'faraday_shielding',
+    'gauge_curvature_bias',
+    'edge_build',
+    'corner_slowdown',
+    'trigger_lag',
+    'standoff_efficiency',
+    'pattern_spread',
+    'tcp_standoff',
+    'air_drift',
+    'tcp_offset',
+    'tcp_tilt',
+    'part_misalignment',
+    'sag',
+    'flow_drift',
+    'fog_gradient',
+    'overspray_fog',
+    'gauge_gain',
+    'gauge_zero',
+    'pose_lag',
+    'gun_wake',
+    'occlusion',
+}
+COLUMN = np.zeros(61), np.linspace(0.02, 0.98, 61)
+ROW = np.linspace(-0.48, 0.48, 97), np.full(97, 0.5)
+
+
+def change(truth_id, points, amplitude, part=FLAT, drawn=None, **plan):
+    """(clean, with the effect) readings of a job with one horizontal pass in mid-height."""
+    settings = {
+        'passes': 1,
+        'standoff_m': 0.25,
+        'follow': 0.0,
+        'teach_error_m': 0.0,
+        'overrun_m': 0.3,
+        'gun_margin_m': 0.25,
+        **plan,
+    }
+    plan = Plan(**settings)
+    known = library()[truth_id]
+    truth = known(amplitude, {**known.details(np.random.default_rng(0)), **(drawn or {})})
+    motion = drive(part, plan, np.random.default_rng(0))
+    bench = Bench(1, Job('door', truth.on_part(part), plan, motion), ROUND, 1_500_000)
+    return bench.readings([], *points)[1], bench.readings([truth], *points)[1]
+
+
+def relative(clean, film):
+    """Change where there is paint to change, 0 elsewhere."""
+    painted = clean > 1.0
+    return np.where(painted, film / np.where(painted, clean, 1.0) - 1.0, 0.0)
+
+
+def centre(film, along):
+    return np.sum(film * along) / np.sum(film)
+
+
+def width(film, along):
+    return np.sqrt(np.sum(film * (along - centre(film, along)) ** 2) / np.sum(film))
+
+
+def test_there_is_a_truth_for_every_effect_of_the_contract():
+    known = library()
+    assert not CONTRACT_IDS - set(known)
+    extra = set(known) - CONTRACT_IDS
+    assert all(name.startswith(('unknown:', 'footprint:')) for name in extra)
+    assert sum(name.startswith('unknown:') for name in extra) >= 2
+
+
+@pytest.mark.parametrize(
+    ('truth_id', 'drawn', 'shift_m'),
+    [
+        ('air_drift', {'direction': DOWN}, -0.020),
+        ('tcp_offset', {'direction_rad': np.pi / 2}, 0.020),
+        ('tcp_tilt', {'axis_rad': 0.0}, -0.25 * 0.020),
+        ('part_misalignment', {'direction': DOWN, 'turn_rad': np.zeros(3)}, 0.020),
+    ],
+)
+def test_lateral_effects_shift_the_pass(truth_id, drawn, shift_m):
+    """Tool y points up here; a tilt turns the axis about the bell, 0.25 m from the panel."""
+    clean, film = change(truth_id, COLUMN, 0.020, drawn=drawn)
+    moved = centre(film, COLUMN[1]) - centre(clean, COLUMN[1])
+    assert moved == pytest.approx(shift_m, abs=0.0006)
+    assert film.sum() == pytest.approx(clean.sum(), rel=0.01)
+
+
+@pytest.mark.parametrize(('truth_id', 'sign'), [('pose_lag', 1), ('gun_wake', -1)])
+def test_time_effects_shift_a_stroke_along_its_travel(truth_id, sign):
+    clean, film = change(truth_id, ROW, 0.05, gun_margin_m=-0.35, speed_m_per_s=0.2)
+    assert centre(film, ROW[0]) - centre(clean, ROW[0]) == pytest.approx(sign * 0.01, abs=0.001)
+
+
+def test_trigger_lag_starts_late_and_ends_late():
+    clean, film = change('trigger_lag', ROW, 0.15, drawn={'fall_ratio': 0.6}, gun_margin_m=-0.3)
+    start, end = (film - clean)[:48].sum(), (film - clean)[49:].sum()
+    assert start < 0 < end
+    assert start + end == pytest.approx(-0.2 * 0.15 * 0.4 * clean[48] / 0.01, rel=0.1)
+
+
+def test_corner_slowdown_adds_paint_near_the_reversals_only():
+    clean, film = change(
+        'corner_slowdown', ROW, 0.5, passes=2, index_m=0.02, overrun_m=0.1, drawn={'reach_m': 0.25}
+    )
+    assert film[-1] > 1.05 * clean[-1]
+    assert film[48] == pytest.approx(clean[48], rel=0.002)
+
+
+def test_flow_drift_grows_from_pass_to_pass():
+    clean, film = change('flow_drift', COLUMN, 0.03, passes=3, index_m=0.3)
+    gain = relative(clean, film)
+    top, middle, bottom = gain[np.searchsorted(COLUMN[1], [0.8, 0.5, 0.2])]
+    assert bottom - middle == pytest.approx(0.03, abs=0.005)
+    assert middle - top == pytest.approx(0.03, abs=0.005)
+
+
+@pytest.mark.parametrize(('amplitude', 'sign'), [(1.0, 1), (-1.0, -1)])
+def test_incidence_acts_where_skin_turns_away(amplitude, sign):
+    tilted = Part('door', 1.0, 1.0, bends=(Bend('z', 0.5, -1.0, -0.4, 0.005),))
+    clean, film = change('incidence_attraction', COLUMN, amplitude, tilted)
+    gain = relative(clean, film)
+    assert sign * gain[24] > sign * gain[36] > 0
+
+
+def test_convex_attraction_paints_the_convex_line():
+    clean, film = change('convex_attraction', COLUMN, 0.15, DOOR)
+    gain = relative(clean, film)
+    assert np.argmax(gain) == np.argmin(np.abs(COLUMN[1] - 0.5))
+    assert gain.min() >= 0.0
+    assert gain.max() > 0.12
+
+
+def test_faraday_shields_the_hollow():
+    clean, film = change('faraday_shielding', COLUMN, 0.15, DOOR, passes=2)
+    gain = relative(clean, film)
+    assert abs(COLUMN[1][np.argmin(gain)] - 0.25) < 0.03
+    assert gain.max() <= 0.0
+    assert gain.min() < -0.10
+
+
+def test_gauge_bias_follows_the_sign_of_curvature():
+    clean, film = change('gauge_curvature_bias', COLUMN, 1.5, DOOR, passes=2)
+    bias = film - clean
+    assert bias[np.argmin(np.abs(COLUMN[1] - 0.50))] > 1.0
+    assert bias[np.argmin(np.abs(COLUMN[1] - 0.25))] < -1.0
+
+
+def test_edges_build_up_on_all_four_sides():
+    clean, film = change('edge_build', COLUMN, 0.25, passes=4, index_m=0.3)
+    gain = relative(clean, film)
+    assert gain[0] > 0.1
+    assert gain[-1] > 0.1
+    assert 0.0 <= gain[30] < 0.001
+    clean, film = change('edge_build', ROW, 0.25)
+    assert relative(clean, film)[[0, -1]].min() > 0.1
+
+
+@pytest.mark.parametrize(('standoff', 'sign'), [(0.30, -1), (0.20, 1)])
+def test_distance_costs_paint(standoff, sign):
+    clean, film = change('standoff_efficiency', COLUMN, 0.5, standoff_m=standoff)
+    assert film.sum() / clean.sum() == pytest.approx(np.exp(sign * 0.5 * 0.05 / 0.3), rel=0.03)
+
+
+@pytest.mark.parametrize(('standoff', 'sign'), [(0.30, -1), (0.20, 1)])
+def test_shaping_air_holds_the_plume_together(standoff, sign):
+    clean, film = change('pattern_spread', COLUMN, 0.4, standoff_m=standoff)
+    assert sign * (width(film, COLUMN[1]) / width(clean, COLUMN[1]) - 1.0) > 0.04
+    assert film.sum() == pytest.approx(clean.sum(), rel=0.01)
+
+
+def test_a_nearer_bell_paints_a_narrower_stripe():
+    clean, film = change('tcp_standoff', COLUMN, 0.015)
+    assert width(film, COLUMN[1]) / width(clean, COLUMN[1]) == pytest.approx(0.95, abs=0.005)
+
+
+@pytest.mark.parametrize('kind', ['ledge', 'trim', 'bar'])
+def test_obstacles_only_take_paint(kind):
+    points, passes, index = {
+        'ledge': ((np.zeros(20), np.linspace(0.02, 0.4, 20)), 4, 0.36),
+        'trim': ((np.zeros(20), np.linspace(0.30, 0.48, 20)), 2, 0.30),
+        'bar': ((np.linspace(-0.2, 0.2, 20), np.full(20, 0.4)), 3, 0.30),
+    }[kind]
+    clean, film = change(
+        'occlusion', points, 0.09, drawn={'kind': kind, 'at': 0.5}, passes=passes, index_m=index
+    )
+    gain = relative(clean, film)
+    assert gain.max() <= 1e-9
+    assert -1.0 < gain.min() < -0.1
+    assert np.median(gain) > gain.min() / 2
+
+
+def test_fog_adds_and_settles_below():
+    clean, film = change('overspray_fog', COLUMN, 1.2)
+    assert np.allclose(film - clean, 1.2)
+    clean, film = change('fog_gradient', COLUMN, 1.5)
+    assert np.all(np.diff(film - clean) < 0)
+    assert (film - clean)[0] == pytest.approx(1.5, rel=0.05)
+
+
+def test_gauge_gain_and_zero():
+    clean, film = change('gauge_gain', COLUMN, 0.03)
+    assert np.allclose(film, 1.03 * clean)
+    clean, film = change('gauge_zero', COLUMN, -1.0)
+    assert np.allclose(film, clean - 1.0)
+
+
+def test_wet_film_runs_down_and_is_not_lost():
+    clean, film = change('sag', COLUMN, 0.3)
+    assert centre(film, COLUMN[1]) < centre(clean, COLUMN[1]) - 0.002
+    bump = 20.0 * np.exp(-(((np.linspace(0, 1, 401) - 0.6) / 0.1) ** 2))[None, :]
+    after = run_down(bump, 1 / 400, 0.2)
+    assert after.sum() == pytest.approx(bump.sum(), rel=1e-6)
+    assert np.argmax(after) < np.argmax(bump)
+
+
+@pytest.mark.parametrize('name', ['unknown:masking_tape', 'unknown:poor_ground'])
+def test_local_causes_only_take_paint(name):
+    grid = np.meshgrid(np.linspace(-0.4, 0.4, 15), np.linspace(0.1, 0.9, 15))
+    clean, film = change(name, (grid[0].ravel(), grid[1].ravel()), 0.3, passes=3)
+    gain = film / np.maximum(clean, 1e-6)
+    assert gain.max() <= 1.0
+    assert 0.65 < gain.min() < 0.8
+
+
+def test_ripples():
+    clean, film = change('unknown:thermal_stripe', ROW, 0.1, drawn={'wavelength_m': 0.3})
+    assert np.ptp(film / clean) == pytest.approx(0.2, abs=0.01)
+    clean, film = change('unknown:pump_pulsation', ROW, 0.3)
+    assert 0.02 < np.ptp(film / clean) < 0.6
+    clean, film = change('unknown:charge_swirl', ROW, 0.03)
+    assert np.std(film - clean) > 0.01
+
+
+@pytest.mark.parametrize('name', sorted(n for n in library() if n.startswith('footprint:')))
+def test_other_bells_keep_the_solids_and_change_the_shape(name):
+    clean, film = change(name, COLUMN, 0.5, drawn={'angle_rad': 0.3})
+    assert film.sum() == pytest.approx(clean.sum(), rel=0.02)
+    assert np.sqrt(np.mean((film - clean) ** 2)) > 0.02 * clean.max()

@@ -1,0 +1,160 @@
+"""What a hidden effect can change, and the register of all of them.
+
+A truth acts on the parcels' way: the plume they leave in, the gun's true motion and flow, the air
+they fly through, whether they stay where they land, what the wet film does, what the gauge says.
+Amplitudes are in the units of the effect's usual parameter; they are drawn as typical x U(0.7, 2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from .doors import Part
+from .flight import Air, Landings, Slices
+from .jobs import Motion
+from .parcels import Parcels, Pattern
+
+DOWN = np.array([0.0, 0.0, -1.0])
+KAPPA_REF_PER_M = 1.0 / 0.250
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One experiment as a truth sees it."""
+
+    part: Part
+    pattern: Pattern
+    nominal: Motion  # as logged
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The neutral truth: nothing is hidden."""
+
+    amplitude: float = 0.0
+    drawn: dict = field(default_factory=dict)  # further parameters, by name
+
+    id = 'clean'
+    family = 'none'
+    typical = 0.0
+    unit = ''
+    sign = 'positive'  # 'positive', 'negative' or 'either'
+
+    @classmethod
+    def draw(
+        cls, rng: np.random.Generator, amplitude: float | None = None, scale: float = 1.0
+    ) -> Truth:
+        """A truth of physics-typical size, or of the given amplitude."""
+        size = cls.typical * rng.uniform(0.7, 2.0) * scale
+        flip = rng.choice([-1.0, 1.0])
+        signed = {'positive': size, 'negative': -size, 'either': flip * size}[cls.sign]
+        return cls(signed if amplitude is None else amplitude, cls.details(rng))
+
+    @classmethod
+    def details(cls, rng: np.random.Generator) -> dict:
+        return {}
+
+    def staging(self) -> dict:
+        """What the shop must arrange so that the effect can occur at all."""
+        return {}
+
+    def on_part(self, part: Part) -> Part:
+        return part
+
+    def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
+        return parcels
+
+    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+        return motion
+
+    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+        """flow(times) -> cm^3/s."""
+        return flow
+
+    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+        return air
+
+    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+        """Share of each landing that stays (may exceed 1: paint that would have been lost)."""
+        return 1.0
+
+    def on_film(
+        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene, film_at: Callable
+    ) -> np.ndarray:
+        """film_at(x, z) -> film of the parcels at any points of the part."""
+        return film_um
+
+    def on_gauge(
+        self, film_um: np.ndarray, x: np.ndarray, z: np.ndarray, scene: Scene
+    ) -> np.ndarray:
+        return film_um
+
+    def as_dict(self) -> dict:
+        return {
+            'id': self.id,
+            'family': self.family,
+            'amplitude': float(self.amplitude),
+            'unit': self.unit,
+            **{k: plain(v) for k, v in self.drawn.items()},
+        }
+
+
+def changes_flight(truth: Truth) -> bool:
+    """Whether the parcels land elsewhere or in other numbers than in the clean job."""
+    return any(
+        getattr(type(truth), name) is not getattr(Truth, name)
+        for name in ('on_plume', 'on_motion', 'on_flow', 'on_air')
+    )
+
+
+def library() -> dict[str, type[Truth]]:
+    """All truths by name: contract ids, 'unknown:...' and 'footprint:...'."""
+    from . import footprints, truths_film, truths_gun, truths_landing, unknowns
+
+    modules = (truths_gun, truths_landing, truths_film, unknowns, footprints)
+    found = [
+        c
+        for m in modules
+        for c in vars(m).values()
+        if isinstance(c, type)
+        and issubclass(c, Truth)
+        and c.__module__ == m.__name__
+        and c.id != 'clean'
+    ]
+    return {c.id: c for c in found}
+
+
+def choose(
+    spec: str | list[str] | None,
+    rng: np.random.Generator,
+    amplitude: float | dict | None = None,
+    scale: float = 1.0,
+) -> list[Truth]:
+    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag', 'unknown:*', a list of ids."""
+    if spec is None or spec == 'clean':
+        return []
+    known = library()
+    names = spec.split('+') if isinstance(spec, str) else list(spec)
+    truths = []
+    for name in names:
+        if name.endswith('*'):
+            name = str(rng.choice(sorted(k for k in known if k.startswith(name[:-1]))))
+        if name not in known:
+            raise ValueError(f'no truth {name!r}; there are: {", ".join(sorted(known))}')
+        wanted = amplitude.get(name) if isinstance(amplitude, dict) else amplitude
+        truths.append(known[name].draw(rng, wanted, scale))
+    return truths
+
+
+def with_drift(air: Air, drift_m: np.ndarray) -> Air:
+    return replace(air, drift_m=air.drift_m + drift_m)
+
+
+def plain(value: object) -> object:
+    """NumPy values as what JSON knows."""
+    if isinstance(value, dict):
+        return {k: plain(v) for k, v in value.items()}
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

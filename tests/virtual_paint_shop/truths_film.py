@@ -1,0 +1,93 @@
+"""Hidden effects after landing: fog that settles, wet film that runs, and what the gauge says."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import RectBivariateSpline
+
+from .truths import KAPPA_REF_PER_M, Truth
+
+SAG_REFERENCE_UM = 20.0
+
+
+class Sag(Truth):
+    """Wet film runs down: flux ~ T^3, integrated in time on a grid (upwind, bottom drains).
+
+    `amplitude` is the volume per width that crosses a horizontal line of 20 um film (um m).
+    """
+
+    id, family, typical, unit = 'sag', 'lateral shift', 0.06, 'um m'
+
+    def on_film(self, film_um, x, z, scene, film_at):
+        part = scene.part
+        xs = np.linspace(-0.5 * part.width_m, 0.5 * part.width_m, 22)
+        zs = np.linspace(-0.02, part.height_m + 0.02, 36)
+        gx, gz = np.meshgrid(xs, zs, indexing='ij')
+        coarse = film_at(gx.ravel(), gz.ravel()).reshape(gx.shape)
+        fine_z = np.linspace(0.0, part.height_m, 361)
+        before = np.maximum(RectBivariateSpline(xs, zs, coarse)(xs, fine_z), 0.0)
+        after = run_down(before, fine_z[1] - fine_z[0], self.amplitude)
+        change = RectBivariateSpline(xs, fine_z, after - before, kx=3, ky=1)
+        return film_um + change.ev(x, z)
+
+
+def run_down(film_um: np.ndarray, dz_m: float, volume_um_m: float) -> np.ndarray:
+    """Film (columns, heights bottom to top) after running down."""
+    total = volume_um_m / SAG_REFERENCE_UM**3
+    fastest = 3.0 * total * film_um.max() ** 2
+    steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
+    for weight in np.full(steps, 1.0 / steps):
+        crossing = total * weight * film_um**3
+        arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
+        film_um = film_um + (arriving - crossing) / dz_m
+    return film_um
+
+
+class OversprayFog(Truth):
+    """Fine overspray settles everywhere alike."""
+
+    id, family, typical, unit = 'overspray_fog', 'level', 1.0, 'um'
+
+    def on_film(self, film_um, x, z, scene, film_at):
+        return film_um + self.amplitude
+
+
+class FogGradient(Truth):
+    """Overspray that settles more below: a (1 - height share)^1.5."""
+
+    id, family, typical, unit = 'fog_gradient', 'order', 1.5, 'um'
+
+    def on_film(self, film_um, x, z, scene, film_at):
+        share = np.clip(z / scene.part.height_m, 0.0, 1.0)
+        return film_um + self.amplitude * (1.0 - share) ** 1.5
+
+
+class GaugeGain(Truth):
+    """The gauge reads (1 + a) times the film."""
+
+    id, family, typical, unit, sign = 'gauge_gain', 'level', 0.02, '1', 'either'
+
+    def on_gauge(self, film_um, x, z, scene):
+        return (1.0 + self.amplitude) * film_um
+
+
+class GaugeZero(Truth):
+    """The gauge reads `amplitude` too much."""
+
+    id, family, typical, unit, sign = 'gauge_zero', 'level', 1.2, 'um', 'either'
+
+    def on_gauge(self, film_um, x, z, scene):
+        return film_um + self.amplitude
+
+
+class GaugeCurvatureBias(Truth):
+    """The probe rocks on convex skin and reads high, low in hollows.
+
+    2a tanh(k / 2), k = -(sum of the principal curvatures over the 5 mm probe) x 250 mm.
+    """
+
+    id, family, typical, unit = 'gauge_curvature_bias', 'curvature', 1.2, 'um'
+
+    def on_gauge(self, film_um, x, z, scene):
+        low, high = scene.part.curvature_over(x, z, 0.005)
+        return film_um - 2.0 * self.amplitude * np.tanh(0.5 * (low + high) / KAPPA_REF_PER_M)
