@@ -1,0 +1,188 @@
+"""`paint compare`, `paint diagnose` and `paint refit` as a user runs them, on the sample door."""
+
+import csv
+import json
+import shutil
+
+import pytest
+import yaml
+
+from booth import SAMPLES
+from cli.command import assert_refused, paint
+from paint_deposition.formats.model_file import read_model_file
+
+CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
+HIDDEN = 'incidence_attraction'
+
+
+@pytest.fixture(scope='module')
+def diagnosed(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('diagnosed')
+    return paint('diagnose', CAMPAIGN, '-o', folder), folder
+
+
+@pytest.fixture(scope='module')
+def door_alone(tmp_path_factory):
+    """The door without its panel, and a model to start from, as a campaign: less to compute."""
+    folder = tmp_path_factory.mktemp('door')
+    shutil.copytree(SAMPLES / 'measured_door', folder, dirs_exist_ok=True)
+    content = yaml.safe_load((folder / 'campaign.yaml').read_text())
+    content = {'experiments': content['experiments'][1:], 'model': 'start.yaml'}
+    (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
+    (folder / 'start.yaml').write_text(
+        'planar: {K1_cm3_per_s: 1.0}\n'
+        'history: [{added: pattern, rmse_um: 9}, {added: a wish, rmse_um: 8}]\n'
+    )
+    return folder / 'campaign.yaml'
+
+
+def table(path) -> list[dict[str, str]]:
+    with path.open(newline='') as file:
+        return list(csv.DictReader(file))
+
+
+# --- diagnose
+
+
+def test_diagnose_names_the_hidden_effect(diagnosed):
+    done, folder = diagnosed
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f'effect missing: The readings show {HIDDEN}.')
+    assert f'added {HIDDEN}: ' in done.stdout
+    assert str(folder / 'report.html') in done.stdout
+    content = json.loads((folder / 'diagnosis.json').read_text())
+    assert content['verdict'] == 'effect_missing'
+    assert content['accepted'] == [HIDDEN]
+    assert content['rmse_um']['holdout_after'] < 0.8 * content['rmse_um']['holdout_before']
+    # A model with it is expected beside one without: both can be simulated.
+    before, after = (
+        read_model_file(folder / f'{name}.yaml') for name in ('model_before', 'model')
+    )
+    assert before.model.effects == ()
+    assert [effect.id for effect in after.model.effects] == [HIDDEN]
+    assert [step['added'] for step in after.history] == ['pattern', HIDDEN]
+
+
+def test_diagnose_writes_all_that_it_says(diagnosed):
+    _, folder = diagnosed
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv', 'report.html',
+        'comparison.png', 'residual_panel.ply', 'residual_door.ply',
+    }  # fmt: skip
+    rows = table(folder / 'residuals.csv')
+    readings = table(SAMPLES / 'measured_door/panel.csv') + table(
+        SAMPLES / 'measured_door/door.csv'
+    )
+    measured = [f'{float(reading["thickness_um"]):.3f}' for reading in readings]
+    assert [row['thickness_um'] for row in rows] == measured
+    residual = [float(row['thickness_um']) - float(row['predicted_um']) for row in rows]
+    assert [float(row['residual_um']) for row in rows] == pytest.approx(residual, abs=2e-3)
+
+
+def test_a_diagnosed_model_predicts_readings_never_seen(diagnosed, tmp_path):
+    _, folder = diagnosed
+    errors = {}
+    for name in ('model_before', 'model'):
+        done = paint('compare', SAMPLES / 'measured_door/unseen.yaml', '--model',
+                     folder / f'{name}.yaml', '-o', tmp_path / name, '--json')  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        content = json.loads(done.stdout)
+        assert content == json.loads((tmp_path / name / 'comparison.json').read_text())
+        errors[name] = next(m for m in content['misfits'] if m['kind'] == 'experiment')['rmse_um']
+    assert errors['model'] < 0.85 * errors['model_before']
+
+
+# --- compare
+
+
+def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
+    done = paint('compare', door_alone, '-o', tmp_path)
+    assert done.returncode == 0, done.stderr
+    content = json.loads((tmp_path / 'comparison.json').read_text())
+    assert set(content) == {'readings', 'noise', 'misfits', 'regions', 'dependences'}
+    assert content['noise']['source'] == 'repeats'
+    door = content['misfits'][0]
+    assert (door['experiment'], door['kind'], door['readings']) == ('door', 'experiment', 72)
+    # The start model sprays half of what the bell did, and is taken as it is.
+    assert door['bias_um'] > 5.0
+    squares = door['bias_um'] ** 2 + door['std_um'] ** 2 * 71 / 72
+    assert door['rmse_um'] ** 2 == pytest.approx(squares)
+    kinds = [misfit['kind'] for misfit in content['misfits']]
+    assert {'group', 'pass'} <= set(kinds)
+    assert f'door: 72 readings, bias +{door["bias_um"]:.2f} um' in done.stdout
+    assert 'misfit: door: ' in done.stdout
+    p_values = [dependence['p_value'] for dependence in content['dependences']]
+    assert p_values == sorted(p_values)
+
+
+# --- refit
+
+
+def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, tmp_path):
+    done = paint('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
+    assert done.returncode == 0, done.stderr
+    content = json.loads(done.stdout)
+    assert content['accepted'] == [HIDDEN]
+    assert content['classes'][0]['parameters']['attraction']['value'] > 0.5
+    model = read_model_file(tmp_path / 'model.yaml')
+    assert [step['added'] for step in model.history] == ['pattern', 'a wish', HIDDEN]
+    assert model.history[1]['rmse_um'] == pytest.approx(content['rmse_um']['before'], abs=1e-4)
+    again = paint(
+        'refit', door_alone, '--model', tmp_path / 'model.yaml', '--add', HIDDEN, '-o', tmp_path
+    )
+    assert_refused(again, f'{HIDDEN} is in the model already')
+
+
+def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
+    own = shutil.copy(SAMPLES / 'my_effect.py', tmp_path)
+    done = paint('refit', door_alone, '--add', own, '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert 'added wake_loss' in done.stdout
+    entry = yaml.safe_load((tmp_path / 'out/model.yaml').read_text())['effects'][0]
+    assert entry['file'].endswith('my_effect.py')
+    compared = paint(
+        'compare', door_alone, '--model', tmp_path / 'out/model.yaml', '-o', tmp_path / 'compared'
+    )
+    assert compared.returncode == 0, compared.stderr
+
+
+# --- bad input
+
+
+def test_help_tells_what_each_command_writes():
+    for command in ('compare', 'diagnose', 'refit'):
+        done = paint(command, '--help')
+        assert done.returncode == 0
+        assert 'report.html' in ' '.join(done.stdout.split())
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (('diagnose', 'nowhere.yaml'), ('nowhere.yaml: no such file', 'give a campaign YAML')),
+        (('compare', CAMPAIGN, '--model', 'none.yaml'), ('none.yaml: no such file',)),
+        (('refit', CAMPAIGN, '--add', 'air_drft'), ("'air_drft'", "did you mean 'air_drift'?")),
+        (('refit', CAMPAIGN, '--add', 'mine.py'), ('mine.py',)),
+        (('refit', CAMPAIGN), ("Missing option '--add'",)),
+        (('diagnose', CAMPAIGN, '--effect-file', 'mine.py'), ('mine.py',)),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(arguments, words, tmp_path):
+    assert_refused(paint(*arguments, '-o', tmp_path / 'out', cwd=tmp_path), *words)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_faulty_reading_is_told_by_file_and_line(door_alone, tmp_path):
+    shutil.copytree(door_alone.parent, tmp_path / 'door')
+    lines = (tmp_path / 'door/door.csv').read_text().splitlines()
+    lines[4] = lines[4].replace(lines[4].split(',')[3], 'thick')
+    (tmp_path / 'door/door.csv').write_text('\n'.join(lines) + '\n')
+    done = paint('diagnose', tmp_path / 'door/campaign.yaml', '-o', tmp_path / 'out')
+    assert_refused(done, "experiment 'door'", "door.csv: line 5: thickness_um is 'thick'")
+
+
+def test_a_folder_that_is_a_file_is_refused(tmp_path):
+    (tmp_path / 'out').write_text('')
+    assert_refused(paint('compare', CAMPAIGN, '-o', tmp_path / 'out'), 'out')
+    assert (tmp_path / 'out').read_text() == ''

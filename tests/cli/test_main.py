@@ -1,0 +1,84 @@
+"""The command as a whole: help, mistakes, interruption."""
+
+import os
+import signal
+import subprocess
+import sys
+
+import pytest
+
+from cli.command import COMMAND, assert_refused, environment, paint
+from paint_deposition.cli.main import COMMANDS
+
+
+def in_python(program: str) -> subprocess.CompletedProcess:
+    return subprocess.run(
+        [sys.executable, '-c', program], capture_output=True, text=True, env=environment(),
+        check=False,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize('arguments', [[], ['--help'], ['-h']])
+def test_help_lists_every_command_in_a_line(arguments):
+    done = paint(*arguments)
+    assert done.returncode == 0
+    assert done.stderr == ''
+    listed = done.stdout.split('Commands:\n')[1].splitlines()
+    assert [line.split()[0] for line in listed] == list(COMMANDS)
+
+
+def test_help_comes_at_once():
+    """What takes seconds to load is not loaded for it."""
+    done = in_python(
+        'import sys\n'
+        'from paint_deposition.cli.main import COMMANDS, run\n'
+        'codes = [run(["--help"]), run(["--version"]), run(["simulate", "--help"])]\n'
+        'slow = {"numpy", "numba", "scipy", "pydantic", "matplotlib", "rosbags", "rclpy"}\n'
+        'print("loaded", sorted(slow & set(sys.modules)), codes)\n'
+    )
+    assert done.stdout.splitlines()[-1] == 'loaded [] [0, 0, 0]'
+
+
+def test_every_command_explains_itself():
+    done = in_python(
+        'from paint_deposition.cli.main import COMMANDS, run\n'
+        'for name in COMMANDS:\n'
+        '    print("==", name, run([name, "--help"]))\n'
+    )
+    assert done.returncode == 0, done.stderr
+    codes = [line.split()[1:] for line in done.stdout.splitlines() if line.startswith('==')]
+    assert codes == [[name, '0'] for name in COMMANDS]
+
+
+def test_version():
+    done = paint('--version')
+    assert done.returncode == 0
+    assert done.stdout.startswith('paint ')
+
+
+def test_a_command_that_is_none_is_refused_with_the_nearest():
+    assert_refused(paint('simulat'), "no command is called 'simulat'", "did you mean 'simulate'?")
+    assert_refused(paint('xyz'), 'there are: simulate, ')
+
+
+def test_wrong_options_are_refused_in_a_line():
+    assert_refused(paint('simulate'), "Missing option '--mesh'")
+    assert_refused(paint('simulate', '--mesh-scale', 'big'), '--mesh-scale', 'big')
+    assert_refused(paint('--mesh', 'door.stl'), '--mesh')
+
+
+def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
+    pipe = tmp_path / 'readings.csv'
+    os.mkfifo(pipe)
+    process = subprocess.Popen(
+        [*COMMAND, 'simulate', '--mesh', 'door.stl', '--trajectory', 'bag', '--at', str(pipe),
+         '-o', str(tmp_path / 'out')],
+        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(),
+    )  # fmt: skip
+    with pipe.open('w'):  # opens once the command reads
+        process.send_signal(signal.SIGINT)
+        output, errors = process.communicate(timeout=60)
+    assert process.returncode == 130
+    assert output == ''
+    assert errors.split() == ['paint:', 'interrupted']
+    assert not (tmp_path / 'out').exists()

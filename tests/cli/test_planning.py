@@ -1,0 +1,202 @@
+"""`paint calibrate`, `paint recommend` and `paint plan` as a user runs them."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from booth import SAMPLES
+from cli.command import assert_refused, paint
+from paint_deposition.formats.bags import read_trajectory
+from paint_deposition.formats.model_file import read_model, write_model
+from paint_deposition.formats.rapid import read_program
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.recommendation import recommend
+
+STUDY = SAMPLES / 'panel_study'
+MODEL = DepositionModel(planar=PlanarPattern(K3=0.1))
+
+
+@pytest.fixture(scope='module')
+def model_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp('model') / 'model.yaml'
+    write_model(path, MODEL)
+    return path
+
+
+@pytest.fixture(scope='module')
+def calibrated(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('calibrated')
+    return paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
+
+
+def is_picture(path) -> bool:
+    with Image.open(path) as image:
+        return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
+
+
+# --- recommend
+
+
+def test_recommendation_is_printed_and_written(model_file, tmp_path):
+    arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
+    done = paint('recommend', *arguments, '-o', tmp_path)
+    assert done.returncode == 0, done.stderr
+    expected = recommend(MODEL, Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
+    written = json.loads((tmp_path / 'recommendation.json').read_text())
+    assert written == json.loads(json.dumps(expected.as_dict()))
+    assert expected.sentence in done.stdout
+    assert 'keeps its orientation' in done.stdout
+    assert is_picture(tmp_path / 'uniformity.png')
+
+
+def test_every_option_of_a_recommendation(model_file, tmp_path):
+    done = paint(
+        'recommend', '--model', model_file, '--target-um', 20, '--index-min', 0.4,
+        '--index-max', 0.7, '--tolerance', 0.2, '--width', 1.2, '--length', 2.0, '--one-way',
+        '--standoff', 0.3, '--travel-deg', 90, '-o', tmp_path, '--json',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    content = json.loads(done.stdout)
+    assert content == json.loads((tmp_path / 'recommendation.json').read_text())
+    assert content['index_range_m'] == [0.4, 0.7]
+    assert 0.4 < content['index_m'] < 0.7
+    assert content['mean_um'] == pytest.approx(20.0)
+    assert (content['travel'], content['standoff_m']) == ('one_way', 0.3)
+    assert content['length_m'] == 2.0
+
+
+def test_recommendation_lands_here_without_a_folder(tmp_path):
+    done = paint('recommend', '--speed', 0.3, '--gun-turns', cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        'recommendation.json',
+        'uniformity.png',
+    ]
+    assert json.loads((tmp_path / 'recommendation.json').read_text())['gun_turns'] is True
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        ((), 'neither speed_m_per_s nor target_um'),
+        (('--speed', -1), 'speed_m_per_s is -1'),
+        (('--speed', 'fast'), '--speed'),
+        (('--speed', 0.2, '--tolerance', 1e-6), 'the closest is'),
+        (('--speed', 0.2, '--model', 'nowhere.yaml'), 'nowhere.yaml: no such file'),
+    ],
+)
+def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
+    assert_refused(paint('recommend', *arguments, cwd=tmp_path), words)
+    assert list(tmp_path.iterdir()) == []
+
+
+# --- calibrate
+
+
+def test_calibration_writes_model_figures_and_pictures(calibrated):
+    done, folder = calibrated
+    assert done.returncode == 0, done.stderr
+    model = read_model(folder / 'model.yaml')
+    assert model.planar.K1_cm3_per_s == pytest.approx(0.653, rel=0.02)
+    content = json.loads((folder / 'calibration.json').read_text())
+    assert content['experiments'][0]['residual_sd_um'] < 0.75
+    assert content['parameters']['r_m']['low'] < 0.231 < content['parameters']['r_m']['high']
+    for name in ('collapse.png', 'profiles.png', 'agreement.png'):
+        assert is_picture(folder / name)
+    assert 'panel_577: 70 points' in done.stdout
+    assert 'warning: phi_rad is not determined' in done.stderr
+
+
+def test_calibrated_model_predicts_the_other_panels(calibrated, tmp_path):
+    _, folder = calibrated
+    model = folder / 'model.yaml'
+    done = paint('compare', STUDY / 'unseen.yaml', '--model', model, '-o', tmp_path, '--json')
+    assert done.returncode == 0, done.stderr
+    panels = [m for m in json.loads(done.stdout)['misfits'] if m['kind'] == 'experiment']
+    assert [panel['experiment'] for panel in panels] == ['panel_525', 'panel_625']
+    for panel in panels:
+        assert abs(panel['bias_um']) < 0.2
+        assert panel['rmse_um'] < 0.85
+
+
+def test_calibration_as_json(tmp_path):
+    done = paint('calibrate', STUDY / 'campaign.yaml', '-o', tmp_path, '--json')
+    assert done.returncode == 0, done.stderr
+    content = json.loads(done.stdout)
+    assert content['converged'] is True
+    assert content['readings'] == 90
+
+
+def test_readings_in_mixed_units_are_refused(tmp_path):
+    for name in ('panel.stl', 'campaign.yaml'):
+        (tmp_path / name).write_bytes((STUDY / name).read_bytes())
+    (tmp_path / 'panel_577').symlink_to(STUDY / 'panel_577')
+    lines = (STUDY / 'panel_577.csv').read_text().splitlines()
+    for row in range(20, 26):
+        values = lines[row].split(',')
+        values[3] = f'{float(values[3]) / 25.4:.3f}'
+        lines[row] = ','.join(values)
+    (tmp_path / 'panel_577.csv').write_text('\n'.join(lines) + '\n')
+    done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
+    assert_refused(done, 'panel_577.csv', 'look like mils, multiply them by 25.4')
+    assert not (tmp_path / 'out').exists()
+
+
+# --- plan
+
+
+def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
+    door = SAMPLES / 'door.stl'
+    arguments = ('--mesh', door, '--model', model_file, '--target-um', 20)
+    done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json')
+    assert done.returncode == 0, done.stderr
+    content = json.loads(done.stdout)
+    assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
+    assert content['film']['mean_um'] == pytest.approx(20.0, rel=5e-3)
+    assert content['sigma_n'] < content['plane']['sigma_n_on_part']
+    names = {path.name for path in (tmp_path / 'plan').iterdir()}
+    assert names == {
+        'film.csv', 'film.ply', 'film.png', 'passes.csv', 'passes.mod', 'plan.json', 'stats.json',
+        'trajectory',
+    }  # fmt: skip
+    assert read_program(tmp_path / 'plan' / 'passes.mod').moves
+    assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000
+    assert is_picture(tmp_path / 'plan' / 'film.png')
+
+    simulated = paint(
+        'simulate', '--mesh', door, '--model', model_file, '--max-edge-length-m', 0.02,
+        '--trajectory', tmp_path / 'plan' / 'trajectory', '--state-topic', '/atomizer/state',
+        '-o', tmp_path / 'film', '--json',
+    )  # fmt: skip
+    assert simulated.returncode == 0, simulated.stderr
+    film = json.loads(simulated.stdout)
+    for name in ('mean_um', 'std_dev_um', 'coverage'):
+        assert film[name] == pytest.approx(content['film'][name], rel=1e-3), name
+
+
+def test_plan_tells_in_words_and_replaces_an_older_one(tmp_path):
+    arguments = ('plan', '--mesh', SAMPLES / 'panel.stl', '--speed', 0.3, '-o', tmp_path)
+    done = paint(*arguments, '--direction', 'vertical', '--index', 0.3)
+    assert done.returncode == 0, done.stderr
+    assert 'vertical passes at 300 mm' in done.stdout
+    assert 'on a plane: sigma_n' in done.stdout
+    assert paint(*arguments, '--one-way').returncode == 0
+    assert json.loads((tmp_path / 'plan.json').read_text())['travel'] == 'one_way'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (('--mesh', 'nowhere.stl', '--speed', 0.3), 'nowhere.stl: no such mesh file'),
+        (('--mesh', SAMPLES / 'door.stl'), 'neither speed_m_per_s nor target_um'),
+        (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), 'index_m is -1'),
+        (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--direction', 'up'), '--direction'),
+    ],
+)
+def test_impossible_plans_are_refused(arguments, words, tmp_path):
+    assert_refused(paint('plan', *arguments, '-o', tmp_path / 'plan'), words)
+    assert not (tmp_path / 'plan').exists()

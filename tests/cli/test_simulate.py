@@ -1,0 +1,309 @@
+"""`paint simulate` over real files, as a user runs it."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+import trimesh
+
+from booth import LOOKING_ALONG_Y, SAMPLES
+from cli.command import assert_refused, paint
+from formats.recordings import Messages, pose_entries, write_bag
+from paint_deposition.formats.bags import read_trajectory, write_pose_bag
+from paint_deposition.formats.model_file import write_model
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+from reference import reference_film_um
+from scenes import straight_pass
+
+DOOR, DOOR_BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
+TRIGGER = ('--state-topic', '/atomizer/state')
+COARSE = ('--max-edge-length-m', 0.05)
+FILES = ['film.csv', 'film.ply', 'film.png', 'stats.json']
+
+
+@pytest.fixture(scope='module')
+def panel(tmp_path_factory):
+    """A standing panel of 1.2 m by 0.8 m that looks to -y, as an STL."""
+    corners = np.array([[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]])
+    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
+    return path
+
+
+def level_pass(**changes) -> Trajectory:
+    """One pass over the panel."""
+    times = np.arange(0.0, 3.0, 0.02)
+    return straight_pass(
+        times, (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y, **changes
+    )
+
+
+@pytest.fixture(scope='module')
+def one_pass(tmp_path_factory):
+    return write_pose_bag(tmp_path_factory.mktemp('bags') / 'one_pass', level_pass())
+
+
+@pytest.fixture(scope='module')
+def painted_door(tmp_path_factory):
+    """The sample door, painted along the sample recording, and what the command printed."""
+    folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
+    done = paint(
+        'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
+        '--target-um', 18, '--tolerance-um', 4,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ''
+    return folder, json.loads(done.stdout)
+
+
+def test_the_door_is_painted(painted_door):
+    folder, figures = painted_door
+    assert sorted(file.name for file in folder.iterdir()) == FILES
+    assert json.loads((folder / 'stats.json').read_text()) == figures
+    table = np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)
+    assert table.dtype.names == ('x_m', 'y_m', 'z_m', 'thickness_um')
+    film = table['thickness_um']
+    assert film.max() == pytest.approx(figures['max_um'])
+    assert 10.0 < figures['mean_um'] < 30.0
+    assert figures['coverage'] > 0.99
+    assert 0.0 < figures['within_target'] < 1.0
+    mesh = trimesh.load_mesh(folder / 'film.ply', process=False)
+    in_mesh = np.ravel(mesh.metadata['_ply_raw']['vertex']['data']['thickness_um'])
+    assert np.allclose(in_mesh, film, rtol=1e-6)
+    assert (folder / 'film.png').read_bytes().startswith(b'\x89PNG')
+
+
+def test_the_figures_say_how_it_was_painted(painted_door):
+    _, figures = painted_door
+    recorded = read_trajectory(DOOR_BAG, None, '/atomizer/state')
+    assert figures['poses']['received'] == len(recorded)
+    assert figures['poses']['rejected'] == 0
+    changes = recorded.trigger_stamps_ns[1:]
+    on_s = np.sum(changes[1::2] - changes[0::2]) * 1e-9
+    assert figures['spraying_time_s'] == pytest.approx(on_s, rel=1e-9)
+    emitted = DepositionModel().planar.K1_cm3_per_s * on_s
+    assert figures['emitted_volume_cm3'] == pytest.approx(emitted, rel=1e-9)
+    assert figures['transfer_efficiency'] == pytest.approx(
+        figures['painted_volume_cm3'] / emitted, rel=1e-9
+    )
+    assert figures['down'] == [0.0, 0.0, -1.0]
+    assert figures['mesh_file'] == str(DOOR)
+
+
+def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
+    """On a flat panel against eqs. (1) and (2) summed in NumPy; other columns are kept."""
+    rng = np.random.default_rng(8)
+    x, z = rng.uniform(-0.5, 0.5, 12), rng.uniform(-0.3, 0.3, 12)
+    x[1], z[1] = x[0], z[0]  # a repeat
+    readings = tmp_path / 'readings.csv'
+    readings.write_text(
+        'point,x_m,y_m,z_m,thickness_um,remark\n'
+        + ''.join(
+            f'p{max(k, 1)},{a:.6f},0.004,{b:.6f},{k + 1},"a, b"\n'
+            for k, (a, b) in enumerate(zip(x, z, strict=True))
+        )
+    )
+    model = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
+    write_model(tmp_path / 'model.yaml', model)
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
+        '--at', readings, *COARSE, '-o', tmp_path / 'out',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    lines = (tmp_path / 'out/predicted.csv').read_text().splitlines()
+    assert lines[0] == 'point,x_m,y_m,z_m,thickness_um,remark,predicted_um'
+    assert [line.rsplit(',', 1)[0] for line in lines] == readings.read_text().splitlines()
+    predicted = np.array([float(line.rsplit(',', 1)[1]) for line in lines[1:]])
+    points = SurfacePoints(
+        np.stack([np.round(x, 6), 0 * x, np.round(z, 6)], axis=1), np.tile([0, -1.0, 0], (12, 1))
+    )
+    expected = reference_film_um(points, spray_path(level_pass())[0], model)
+    assert expected.max() > 5.0
+    assert np.abs(predicted - expected).max() < 1e-4
+
+
+def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel, one_pass, tmp_path):
+    readings = tmp_path / 'readings.csv'
+    readings.write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0.1,0,0.1,9\n')
+    (tmp_path / 'gauge.yaml').write_text('effects: [{id: gauge_gain, gain: 0.1}]\n')
+    results = []
+    for model in ((), ('--model', tmp_path / 'gauge.yaml')):
+        out = tmp_path / f'out{len(results)}'
+        done = paint(
+            'simulate', '--mesh', panel, '--trajectory', one_pass, '--at', readings, *COARSE,
+            *model, '-o', out,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        predicted = np.genfromtxt(out / 'predicted.csv', delimiter=',', names=True)
+        results.append((predicted['predicted_um'], (out / 'film.csv').read_text()))
+    assert np.allclose(results[1][0], 1.1 * results[0][0], atol=2e-4)
+    assert results[1][1] == results[0][1]
+
+
+def test_older_results_are_replaced_whole(panel, one_pass, tmp_path):
+    out = tmp_path / 'out'
+    out.mkdir()
+    (out / 'film.csv').write_text('older')
+    (out / 'notes.txt').write_text('mine')
+    done = paint('simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE, '-o', out)
+    assert done.returncode == 0
+    assert sorted(file.name for file in out.iterdir()) == sorted([*FILES, 'notes.txt'])
+    assert (out / 'film.csv').read_text().startswith('x_m,y_m,z_m,thickness_um\n')
+    assert 'film' in done.stdout
+    assert str(out / 'film.png') in done.stdout
+
+
+def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_path):
+    big = trimesh.load_mesh(panel, process=False)
+    big.apply_scale(1000.0)
+    big.export(tmp_path / 'mm.stl')
+    arguments = ('simulate', '--mesh', tmp_path / 'mm.stl', '--trajectory', one_pass, *COARSE)
+    assert_refused(paint(*arguments, '-o', tmp_path / 'out'), 'mm.stl', '--mesh-scale 0.001')
+    assert not (tmp_path / 'out').exists()
+    scaled = paint(*arguments, '--mesh-scale', 0.001, '--json', '-o', tmp_path / 'out')
+    assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
+
+
+def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_path):
+    inside_out = trimesh.load_mesh(panel, process=False)
+    inside_out.invert()
+    inside_out.export(tmp_path / 'inside_out.stl')
+    films = []
+    for number, mesh in enumerate((panel, tmp_path / 'inside_out.stl')):
+        done = paint(
+            'simulate', '--mesh', mesh, '--trajectory', one_pass, *COARSE, '--json',
+            '-o', tmp_path / str(number),
+        )  # fmt: skip
+        assert done.returncode == 0
+        films.append((json.loads(done.stdout)['painted_volume_cm3'], done.stderr))
+    assert films[1][0] == pytest.approx(films[0][0], rel=1e-6)
+    assert films[0][1] == ''
+    assert 'note: ' in films[1][1]
+    assert 'turned round' in films[1][1]
+
+
+def test_a_bare_part_is_told_with_the_reason(panel, one_pass, tmp_path):
+    away = trimesh.load_mesh(panel, process=False)
+    away.apply_translation([0.0, 0.0, 9.0])
+    away.export(tmp_path / 'away.stl')
+    done = paint(
+        'simulate', '--mesh', tmp_path / 'away.stl', '--trajectory', one_pass, *COARSE,
+        '-o', tmp_path / 'out',
+    )  # fmt: skip
+    assert done.returncode == 0
+    (line,) = done.stderr.splitlines()
+    assert line.startswith('warning: the part stays bare: the gun never looks at it and stays 8.9')
+    never = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([0.0]))
+    bag = write_pose_bag(tmp_path / 'off', never)
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', bag, *TRIGGER, *COARSE, '--json',
+        '-o', tmp_path / 'out',
+    )  # fmt: skip
+    assert done.returncode == 0
+    assert 'the gun never sprays; check --state-topic' in done.stderr
+    assert json.loads(done.stdout)['transfer_efficiency'] is None
+
+
+def refused(tmp_path, *arguments):
+    """What `paint simulate` says; nothing may have been written."""
+    done = paint('simulate', *arguments, '-o', tmp_path / 'out')
+    assert not (tmp_path / 'out').exists()
+    return done
+
+
+def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
+    inputs = ('--mesh', panel, '--trajectory', DOOR_BAG)
+    done = refused(tmp_path, *inputs, '--pose-topic', '/robot/tcp')
+    assert_refused(done, '/robot/tcp', '/atomizer/pose')
+    done = refused(tmp_path, *inputs, '--state-topic', '/gun')
+    assert_refused(done, '/gun', '/atomizer/state')
+
+
+def test_a_misspelt_key_is_refused_with_the_nearest(panel, one_pass, tmp_path):
+    (tmp_path / 'model.yaml').write_text('planar: {K1_cm3_per_s: 1.9, sigma_1_m: 0.09}\n')
+    done = refused(
+        tmp_path, '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml'
+    )
+    assert_refused(done, 'model.yaml', 'sigma_1_m', 'sigma1_m')
+
+
+def test_poses_without_numbers_are_refused(panel, tmp_path):
+    log = level_pass()
+    broken = Trajectory(
+        log.stamps_ns, np.full_like(log.positions_m, np.nan), log.quaternions_xyzw, 'part'
+    )
+    bag = write_bag(tmp_path / 'nan', pose_entries(broken))
+    assert_refused(
+        refused(tmp_path, '--mesh', panel, '--trajectory', bag), str(bag), '150 not finite'
+    )
+
+
+def test_some_bad_poses_are_dropped_and_counted(panel, one_pass, tmp_path):
+    entries = pose_entries(level_pass())
+    messages = Messages()
+    for row in (10, 60, 110):
+        topic, stamp, _ = entries[row]
+        nowhere = messages.pose(stamp + 1_000_000, [np.nan, 0, 0], LOOKING_ALONG_Y, '')
+        entries.insert(row + 1, (topic, stamp + 1_000_000, nowhere))
+    bag = write_bag(tmp_path / 'some', entries)
+    films = []
+    for trajectory in (one_pass, bag):
+        done = paint(
+            'simulate', '--mesh', panel, '--trajectory', trajectory, *COARSE, '--json',
+            '-o', tmp_path / 'out',
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        films.append(json.loads(done.stdout))
+    assert films[1]['poses']['not_finite'] == 3
+    assert films[1]['mean_um'] == films[0]['mean_um']
+
+
+def test_a_truncated_bag_is_refused_with_the_remedy(panel, tmp_path):
+    bag = shutil.copytree(DOOR_BAG, tmp_path / 'cut')
+    file = next(bag.glob('*.mcap'))
+    file.write_bytes(file.read_bytes()[:-5000])
+    done = refused(tmp_path, '--mesh', panel, '--trajectory', bag)
+    assert_refused(done, str(bag), 'paint recover')
+
+
+@pytest.mark.parametrize(
+    ('option', 'value', 'words'),
+    [
+        ('--mesh', 'nowhere.stl', ['nowhere.stl', 'no such mesh file']),
+        ('--mesh', __file__, ['.py', '.stl']),
+        ('--trajectory', 'nowhere', ['no bag at nowhere']),
+        ('--model', 'nowhere.yaml', ['nowhere.yaml', 'no such file']),
+        ('--at', 'nowhere.csv', ['nowhere.csv', 'no such file']),
+        ('--mesh-scale', '-1', ['--mesh-scale', '-1']),
+        ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
+        ('--tolerance-um', '3', ['--target-um']),
+        ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
+    ],
+)
+def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):
+    options = {'--mesh': (panel,), '--trajectory': (one_pass,)}
+    options[option] = value if isinstance(value, tuple) else (value,)
+    arguments = [part for name, values in options.items() for part in (name, *values)]
+    assert_refused(refused(tmp_path, *arguments), *words)
+
+
+def test_readings_off_the_part_are_refused_before_anything_is_written(panel, one_pass, tmp_path):
+    (tmp_path / 'readings.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0,0.5,0,9\n')
+    done = refused(
+        tmp_path, '--mesh', panel, '--trajectory', one_pass, *COARSE,
+        '--at', tmp_path / 'readings.csv',
+    )  # fmt: skip
+    assert_refused(done, 'readings.csv', "off the part's skin", '0.5')
+
+
+def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):
+    (tmp_path / 'out').write_text('a file')
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', one_pass, '-o', tmp_path / 'out'
+    )  # fmt: skip
+    assert_refused(done, '-o', 'is a file')

@@ -1,0 +1,100 @@
+"""Fixtures that every test may use: shared data, a DDS domain of its own, nodes that spin."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import hypothesis
+import pytest
+
+# As the command does, before NumPy is loaded: see cli/main.py.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
+
+# The same examples on every run, and no deadline: the first call of a kernel compiles it.
+hypothesis.settings.register_profile('project', deadline=None, derandomize=True)
+hypothesis.settings.load_profile('project')
+
+
+@pytest.fixture(scope='session')
+def repository() -> Path:
+    return REPOSITORY
+
+
+@pytest.fixture(scope='session')
+def shared_data() -> Path:
+    """Folder of real recordings and measurements kept beside the repository."""
+    if not SHARED_DATA.is_dir():
+        pytest.skip(f'recordings and measurements kept beside the repository: no {SHARED_DATA}')
+    return SHARED_DATA
+
+
+@pytest.fixture(scope='session')
+def ros_domain() -> Iterator[int]:
+    """A ROS domain no other test run on this machine uses; child processes inherit it."""
+    domain_coordinator = pytest.importorskip('domain_coordinator')
+    with domain_coordinator.domain_id() as domain, pytest.MonkeyPatch.context() as environment:
+        environment.setenv('ROS_DOMAIN_ID', str(domain))
+        environment.setenv('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+        yield domain
+
+
+@pytest.fixture
+def ros_context(ros_domain: int) -> Iterator[object]:
+    """An initialised rclpy context for this test alone; pass it to nodes as `context`."""
+    import rclpy
+    from rclpy.context import Context
+
+    context = Context()
+    rclpy.init(context=context, domain_id=ros_domain)
+    yield context
+    context.try_shutdown()
+
+
+@pytest.fixture
+def executor(ros_context: object) -> Iterator[object]:
+    """What runs the callbacks of this test's nodes, which it destroys at the end."""
+    from rclpy.executors import SingleThreadedExecutor
+
+    executor = SingleThreadedExecutor(context=ros_context)
+    yield executor
+    nodes = executor.get_nodes()
+    executor.shutdown()
+    for node in nodes:
+        node.destroy_node()
+
+
+@pytest.fixture
+def spin(executor: object) -> Callable[..., None]:
+    """`spin(node, ...)`: let `wait_until` run the callbacks of these nodes."""
+
+    def spin(*nodes: object) -> None:
+        for node in nodes:
+            executor.add_node(node)
+
+    return spin
+
+
+@pytest.fixture
+def wait_until(executor: object) -> Callable[..., None]:
+    """`wait_until(condition, timeout_s=10.0, what='...')`: run callbacks until it holds.
+
+    Fails the test when it does not hold in time. The condition is looked at after every
+    callback and at least every 20 ms, so it may also watch other processes and files.
+    """
+
+    def wait_until(
+        condition: Callable[[], object], timeout_s: float = 10.0, what: str = 'the condition'
+    ) -> None:
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            if time.monotonic() > deadline:
+                pytest.fail(f'{what} did not hold within {timeout_s} s')
+            executor.spin_once(timeout_sec=0.02)
+
+    return wait_until

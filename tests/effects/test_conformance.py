@@ -1,0 +1,204 @@
+"""What every effect must do, whatever its physics."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from booth import (
+    MODEL,
+    SAMPLES,
+    door,
+    in_batches,
+    painted,
+    panel,
+    panel_with_screen,
+    path_of,
+    serpentine,
+    spot,
+)
+from paint_deposition.effects.base import Effect, PathContext, Ray
+from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, load_effect_file
+from paint_deposition.film.deposition import FilmIntegrator
+from reference import reference_film_um
+
+ALL = [*EFFECTS.values(), load_effect_file(SAMPLES / 'my_effect.py')]
+AMPLITUDES = [(effect, name) for effect in ALL for name in effect.amplitudes()]
+TWO_SIDED = [
+    (effect, name)
+    for effect, name in AMPLITUDES
+    if effect.parameters()[name]['low'] < effect.parameters()[name]['neutral']
+]
+WITH_LAW = [e for e in ALL if e.flux_factor is not None or e.pattern_scale is not None]
+UNIT_SUFFIXES = {
+    'm': '_m', 's': '_s', 'rad': '_rad', 'um': '_um', '1/pass': '_per_pass',
+    '1/(m/s)': '_per_m_per_s', '1': '',
+}  # fmt: skip
+EFFECT = pytest.mark.parametrize('effect', ALL, ids=lambda effect: effect.id)
+AMPLITUDE = pytest.mark.parametrize(
+    ('effect', 'name'), AMPLITUDES, ids=[f'{effect.id}-{name}' for effect, name in AMPLITUDES]
+)
+
+
+@pytest.fixture(scope='module')
+def passes():
+    """Two passes over the panel, gun opening and closing on it."""
+    return path_of(serpentine((0.08, -0.08)))
+
+
+@EFFECT
+def test_it_says_what_it_is(effect: type[Effect]):
+    assert effect.__doc__
+    assert effect.family
+    assert effect.signature
+    assert effect.amplitudes()
+    if effect.file is None:
+        assert effect.source
+        assert effect.family in FAMILIES
+        assert set(effect.rivals) <= set(EFFECTS) - {effect.id}
+
+
+@EFFECT
+def test_every_parameter_states_its_unit_bounds_and_size(effect: type[Effect]):
+    for name, described in effect.parameters().items():
+        assert name.endswith(UNIT_SUFFIXES[described['unit']]), name
+        assert described['low'] <= described['neutral'] < described['high']
+        assert described['low'] <= described['typical'] <= described['high']
+        assert described['description'].endswith(f'[{described["unit"]}]')
+        if described['role'] == 'amplitude':
+            assert described['typical'] != described['neutral']
+            assert 'positive' in described['description']
+
+
+@EFFECT
+def test_values_outside_the_bounds_are_refused(effect: type[Effect]):
+    for name, described in effect.parameters().items():
+        span = described['high'] - described['low']
+        for bound, outward in ((described['low'], -1), (described['high'], 1)):
+            effect(**{name: bound})
+            with pytest.raises(ValidationError):
+                effect(**{name: bound + 1e-6 * outward * span})
+        with pytest.raises(ValidationError):
+            effect(**{name: float('nan')})
+    with pytest.raises(ValidationError):
+        effect(no_such_parameter=0.0)
+
+
+@EFFECT
+def test_neutral_changes_nothing(effect: type[Effect], passes):
+    assert effect().is_neutral
+    base = painted(door(), passes)
+    with_effect = painted(door(), passes, effect())
+    assert np.array_equal(with_effect.raw_um, base.raw_um)
+    assert np.array_equal(with_effect.gauge_um, base.gauge_um)
+
+
+@EFFECT
+def test_its_laws_change_nothing_at_neutral_values(effect: type[Effect], passes):
+    points, neutral = door().points(), effect()
+    film = np.linspace(0.0, 30.0, len(points))
+    context = PathContext(MODEL.projection, points.down, points.outward, points.centre_m)
+    assert np.array_equal(neutral.on_film(film, points), film)
+    assert np.array_equal(neutral.on_gauge(film, points), film)
+    path = neutral.on_path(passes, context)
+    for column in fields(path):
+        before, after = getattr(passes, column.name), getattr(path, column.name)
+        np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-14, err_msg=column.name)
+    for law in (effect.flux_factor, effect.pattern_scale):
+        if law is not None:
+            assert law(Ray(0.1, 0.2, 1.7, 0.6, 0.4), *neutral.values()) == 1.0
+    assert neutral.reach() == 1.0
+    assert neutral.shadow() == 0.0
+
+
+@EFFECT
+@pytest.mark.parametrize('end', ['low', 'high'])
+def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect], end: str, passes):
+    extreme = effect(**{name: at[end] for name, at in effect.parameters().items()})
+    film = painted(door(), passes, extreme)
+    assert np.isfinite(film.gauge_um).all()
+    assert film.raw_um.min() >= 0.0
+
+
+@AMPLITUDE
+def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str, passes):
+    described = effect.parameters()[name]
+    neutral, step = described['neutral'], 1e-3 * described['typical']
+    surface = panel_with_screen() if effect.id == 'occlusion' else door()
+
+    def slope(before: float, after: float) -> np.ndarray:
+        films = [
+            painted(surface, passes, effect(**{name: value})).gauge_um for value in (before, after)
+        ]
+        return (films[1] - films[0]) / (after - before)
+
+    forward = slope(neutral, neutral + step)
+    if (effect, name) in TWO_SIDED:
+        other = slope(neutral - step, neutral)
+    else:
+        other = slope(neutral, neutral + 0.5 * step)
+    scale = np.linalg.norm(forward)
+    assert scale > 0.0
+    # One kernel's rounding against another's: shadows are another kernel.
+    assert np.linalg.norm(forward - other) <= 0.02 * scale + 1e-8
+
+
+@pytest.mark.parametrize('effect', WITH_LAW, ids=lambda effect: effect.id)
+@pytest.mark.parametrize(('precision', 'tolerance'), [('double', 2e-9), ('single', 3e-6)])
+def test_the_kernel_computes_the_law(effect: type[Effect], precision: str, tolerance: float):
+    points = door().points().select(slice(None, None, 7))
+    path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
+    model = MODEL.with_effect(effect.typical())
+    integrator = FilmIntegrator(points, model, precision)
+    integrator.add(path)
+    expected = reference_film_um(points, path, model)
+    np.testing.assert_allclose(
+        integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
+    )
+
+
+@EFFECT
+@pytest.mark.parametrize('poses', [1, 7, 40])
+def test_a_stream_paints_what_the_recording_does(effect: type[Effect], poses: int):
+    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
+    model = MODEL.with_effect(effect.typical())
+    whole = painted(panel(0.3, 0.05), trajectory, effect.typical())
+    live = FilmIntegrator(panel(0.3, 0.05).points(), model, 'double', panel(0.3, 0.05).occluder)
+    for piece in in_batches(trajectory, poses, model.needs_whole_strokes):
+        live.add(piece)
+    assert np.array_equal(live.gauge_um, whole.gauge_um)
+    assert live.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
+
+
+@EFFECT
+def test_readings_are_predicted_as_the_skin_they_lie_on(effect: type[Effect], passes):
+    skin = painted(door(), passes, effect.typical()).gauge_um
+    some = slice(11, None, 97)
+    stencil_m = 0.01 if effect.needs_slope else None
+    at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
+    integrator = FilmIntegrator(at, MODEL.with_effect(effect.typical()), 'double', door().occluder)
+    integrator.add(passes)
+    readings = integrator.gauge_um[: len(skin[some])]
+    # A stencil sees more than the triangles around a vertex.
+    tolerance = 0.02 if effect.needs_slope else 1e-6
+    np.testing.assert_allclose(readings, skin[some], rtol=0, atol=tolerance * skin.max())
+
+
+def test_two_effects_with_laws_multiply():
+    points = door().points().select(slice(None, None, 7))
+    path = path_of(spot(z_m=0.45, standoff_m=0.35))
+    chosen = [effect.typical() for effect in WITH_LAW]
+    model = MODEL.model_copy(update={'effects': tuple(chosen)})
+    integrator = FilmIntegrator(points, model, 'double')
+    integrator.add(path)
+    expected = reference_film_um(points, path, model)
+    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0, atol=2e-9 * expected.max())
+
+
+def test_laws_of_absent_effects_kept_for_a_fit_change_nothing(passes):
+    model = MODEL.model_copy(update={'effects': tuple(effect() for effect in WITH_LAW)})
+    base = painted(door(), passes).raw_um
+    kept = FilmIntegrator(door().points(), model, 'double', keep_absent_laws=True)
+    kept.add(passes)
+    np.testing.assert_allclose(kept.raw_um, base, rtol=0.0, atol=1e-13 * base.max())

@@ -1,0 +1,157 @@
+"""Effects that move the pattern aside: how far, and with what the shift turns."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from booth import LOOKING_ALONG_Y, MODEL, STANDOFF_M, painted, panel, path_of, serpentine, spot
+from paint_deposition.effects.air_drift import AirDrift
+from paint_deposition.effects.part_misalignment import PartMisalignment
+from paint_deposition.effects.sag import Sag
+from paint_deposition.effects.tcp_offset import TcpOffset
+from paint_deposition.effects.tcp_tilt import TcpTilt
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+
+OMEGA_M = MODEL.projection.model_plane_m
+OFFSET_M = MODEL.projection.emission_offset_m
+
+
+def rolled(trajectory: Trajectory, angle_rad: float) -> Trajectory:
+    """The same motion with the gun turned about its axis."""
+    turned = Rotation.from_quat(LOOKING_ALONG_Y) * Rotation.from_euler('z', angle_rad)
+    return replace(trajectory, quaternions_xyzw=np.tile(turned.as_quat(), (len(trajectory), 1)))
+
+
+def centroid_m(film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+    weight = film_um * points.area_m2
+    return weight @ points.positions_m / weight.sum()
+
+
+def moved_by_m(trajectory: Trajectory, effect) -> np.ndarray:
+    """How the spot's centroid moves: right and down [m]."""
+    points = panel().points()
+    before, after = (
+        centroid_m(painted(panel(), trajectory, *effects).raw_um, points)
+        for effects in ((), (effect,))
+    )
+    return (after - before)[[0, 2]] * [1.0, -1.0]
+
+
+@pytest.mark.parametrize('standoff_m', [0.2, 0.25, 0.35])
+@pytest.mark.parametrize('roll_rad', [0.0, 1.0, np.pi])
+def test_drift_grows_with_the_distance_and_does_not_turn_with_the_gun(standoff_m, roll_rad):
+    motion = rolled(spot(standoff_m=standoff_m), roll_rad)
+    moved = moved_by_m(motion, AirDrift(shift_down_m=0.02, shift_across_m=-0.01))
+    longer = (standoff_m + OFFSET_M) / OMEGA_M
+    np.testing.assert_allclose(moved, [-0.01 * longer, 0.02 * longer], atol=2e-5)
+
+
+@pytest.mark.parametrize('roll_rad', [0.0, 0.5 * np.pi, np.pi])
+def test_an_offset_turns_with_the_gun(roll_rad):
+    moved = moved_by_m(rolled(spot(), roll_rad), TcpOffset(offset_x_m=0.01, offset_y_m=0.004))
+    # Right-handed about the view of the gun: clockwise with x to the right and y down.
+    cos, sin = np.cos(roll_rad), np.sin(roll_rad)
+    np.testing.assert_allclose(
+        moved, [0.01 * cos - 0.004 * sin, 0.01 * sin + 0.004 * cos], atol=1e-5
+    )
+
+
+@pytest.mark.parametrize('standoff_m', [0.2, 0.3])
+def test_a_tilt_moves_the_spot_by_the_standoff_times_its_tangent(standoff_m):
+    # The axis pierces the panel there; the centroid of an inclined spot lies beside its axis.
+    motion = spot(standoff_m=standoff_m)
+    narrow = MODEL.model_copy(
+        update={
+            'planar': MODEL.planar.model_copy(
+                update={'K3': 0.0, 'r_m': 0.0, 'sigma1_m': 0.01, 'sigma2_m': 0.01}
+            )
+        }
+    )
+    fine = panel(0.1, 0.004)
+    film = painted(fine, motion, TcpTilt(tilt_y_rad=0.08), model=narrow).raw_um
+    x_m = centroid_m(film, fine.points())[0]
+    assert x_m == pytest.approx(standoff_m * np.tan(0.08), rel=0.01)
+    film = painted(fine, motion, TcpTilt(tilt_x_rad=0.08), model=narrow).raw_um
+    assert -centroid_m(film, fine.points())[2] == pytest.approx(-standoff_m * np.tan(0.08), 0.01)
+
+
+def test_misalignment_is_the_part_moved():
+    drawn = panel(0.4, 0.04)
+    fault = PartMisalignment(shift_down_m=0.03, shift_across_m=-0.02, yaw_rad=0.09)
+    seen_by_gun = Rotation.from_rotvec([0.0, -0.09, 0.0])  # about the outward normal, -y
+    hung = Surface(
+        seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.0, -0.03]),
+        drawn.faces,
+        seen_by_gun.apply(drawn.normals),
+        drawn.vertex_areas_m2,
+        drawn.down,
+    )
+    motion = serpentine((0.1, -0.1))
+    expected = painted(hung, motion).raw_um
+    film = painted(drawn, motion, fault).raw_um
+    np.testing.assert_allclose(film, expected, atol=1e-10 * expected.max())
+
+
+def film_on(surface: Surface) -> np.ndarray:
+    """A smooth hill of 30 um in the middle, nothing at the edges."""
+    x, _, z = surface.vertices_m.T
+    return 30.0 * np.exp(-(x**2 + z**2) / (2.0 * 0.08**2))
+
+
+def test_sag_keeps_the_volume():
+    points, film = panel().points(), film_on(panel())
+    sagged = Sag(run_m=0.01).on_film(film, points)
+    assert sagged @ points.area_m2 == pytest.approx(film @ points.area_m2, rel=1e-6)
+
+
+def test_sag_moves_the_paint_down_by_the_run_of_its_thickness():
+    points, film = panel(0.5, 0.01).points(), film_on(panel(0.5, 0.01))
+    sagged = Sag(run_m=0.004).on_film(film, points)
+    fallen_um_m3 = (film - sagged) @ (points.area_m2 * points.positions_m[:, 2])
+    expected_um_m3 = (0.004 * film * (film / 20.0) ** 2) @ points.area_m2
+    assert fallen_um_m3 == pytest.approx(expected_um_m3, rel=0.01)
+
+
+def test_sag_follows_the_closed_form_of_a_thin_film_on_a_wall():
+    points = panel(0.5, 0.01).points()
+    z = points.positions_m[:, 2]
+    film = 20.0 + 5.0 * np.sin(2.0 * np.pi * z / 0.5)
+    sagged = Sag(run_m=0.002).on_film(film, points)
+    gradient_down = -5.0 * np.cos(2.0 * np.pi * z / 0.5) * 2.0 * np.pi / 0.5
+    expected = film - 0.002 * 3.0 * (film / 20.0) ** 2 * gradient_down
+    inside = np.abs(z) < 0.48  # at the ends the slope is one-sided
+    moved_um = np.abs(expected - film).max()
+    np.testing.assert_allclose(sagged[inside], expected[inside], atol=0.04 * moved_um)
+
+
+def test_an_even_film_and_a_lying_panel_do_not_sag():
+    points = panel().points()
+    even = np.full(len(points), 30.0)
+    np.testing.assert_allclose(Sag(run_m=0.03).on_film(even, points), even, rtol=1e-12)
+    lying = Surface.from_triangles(
+        panel().vertices_m, panel().faces, 0.04, down=np.array([0.0, 1.0, 0.0])
+    )
+    film = film_on(lying)
+    np.testing.assert_allclose(Sag(run_m=0.03).on_film(film, lying.points()), film, atol=1e-12)
+
+
+def test_sag_at_readings_is_that_of_the_skin():
+    surface = panel(0.25, 0.004)
+    wanted = np.array([[0.02, 0.0, 0.052], [-0.1, 0.0, -0.06], [0.0, 0.0, 0.112]])
+    readings = surface.vertices_m[cKDTree(surface.vertices_m).query(wanted)[1]]
+    motion, sag = spot(standoff_m=STANDOFF_M), Sag(run_m=0.004)
+    stencil = surface.at(readings, stencil_m=0.004)
+    gauge = FilmIntegrator(stencil, MODEL.with_effect(sag), 'double')
+    gauge.add(path_of(motion))
+    nearest = surface.locate(readings)
+    at_corners = painted(surface, motion, sag).film_um[surface.faces[nearest.faces]]
+    on_skin = (at_corners * nearest.weights).sum(axis=1)
+    np.testing.assert_allclose(gauge.film_um[:3], on_skin, rtol=5e-3)
+    plain = painted(surface, motion).film_um[surface.faces[nearest.faces]]
+    assert abs(on_skin - (plain * nearest.weights).sum(axis=1))[0] > 0.05 * on_skin[0]

@@ -1,0 +1,45 @@
+"""Effects of clocks and of time of flight."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from booth import painted, panel, path_of, serpentine
+from paint_deposition.effects.gun_wake import GunWake
+from paint_deposition.effects.pose_lag import PoseLag
+from paint_deposition.motion.path_builder import spray_path
+
+
+@pytest.mark.parametrize('lag_s', [-0.05, -0.007, 0.003, 0.04])
+@pytest.mark.parametrize('flow', [1.0, 0.6])
+def test_pose_lag_is_a_trigger_recorded_later(lag_s, flow):
+    trajectory = serpentine((0.1, -0.1), flow=flow)
+    shifted_ns = trajectory.trigger_stamps_ns + round(lag_s * 1e9)
+    expected = painted(panel(), replace(trajectory, trigger_stamps_ns=shifted_ns)).raw_um
+    film = painted(panel(), trajectory, PoseLag(lag_s=lag_s)).raw_um
+    np.testing.assert_allclose(film, expected, atol=2e-3 * expected.max())
+
+
+def test_pose_lag_keeps_the_paint():
+    path = path_of(serpentine((0.1, -0.1)))
+    plain = painted(panel(), path)
+    for lag_s in (-0.03, 0.03):
+        lagged = painted(panel(), path, PoseLag(lag_s=lag_s))
+        assert lagged.emitted_cm3 == pytest.approx(plain.emitted_cm3, rel=1e-9)
+
+
+def test_gun_wake_is_the_whole_pass_moved_back():
+    trajectory = serpentine((0.0,), speed_m_per_s=0.35)
+    moved = replace(trajectory, positions_m=trajectory.positions_m - [0.02 * 0.35, 0.0, 0.0])
+    film = painted(panel(), trajectory, GunWake(lag_s=0.02)).raw_um
+    expected = painted(panel(), moved).raw_um
+    np.testing.assert_allclose(film, expected, atol=1e-9 * expected.max())
+
+
+def test_gun_wake_is_invisible_within_a_straight_even_pass():
+    path = spray_path(serpentine((0.0,), half_width_m=0.9, opens_at_m=0.85), max_step_m=0.002)[0]
+    plain = painted(panel(), path).raw_um
+    waked = painted(panel(), path, GunWake(lag_s=0.03)).raw_um
+    middle = np.abs(panel().vertices_m[:, 0]) < 0.3
+    np.testing.assert_allclose(waked[middle], plain[middle], atol=2e-4 * plain.max())

@@ -1,0 +1,192 @@
+"""The live film is the offline film, whatever way the motion comes in."""
+
+import numpy as np
+import pytest
+
+from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.path_builder import spray_path
+from scenes import START_NS, lying_plane, stamps_ns, straight_pass, weaving
+
+MODEL = DepositionModel()
+# Its film at a place depends on what lies ahead in the stroke.
+LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
+TIMES_S = np.arange(0.0, 4.0, 0.004)
+TRIGGERS = {
+    'trigger_stamps_ns': stamps_ns([0.5013, 1.7502, 2.2]),
+    'trigger_flow': np.array([1.0, 0.0, 0.8]),
+}
+
+
+def _offline(trajectory, model=MODEL, points=None):
+    points = points or lying_plane()
+    integrator = FilmIntegrator(points, model)
+    path, _ = spray_path(
+        trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
+    )
+    integrator.add(path)
+    return integrator
+
+
+def _events(trajectory, batch, state_delay_s=0.0):
+    """The motion as it comes in: batches of poses, each state so much late."""
+    poses = [
+        (int(trajectory.stamps_ns[k]), _poses(trajectory, slice(k, k + batch)))
+        for k in range(0, len(trajectory), batch)
+    ]
+    states = [
+        (int(stamp + state_delay_s * 1e9), TriggerChange(int(stamp), float(flow)))
+        for stamp, flow in zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True)
+    ]
+    return [event for _, event in sorted(poses + states, key=lambda item: item[0])]
+
+
+def _poses(trajectory, rows):
+    return PoseBatch(
+        trajectory.stamps_ns[rows], trajectory.positions_m[rows], trajectory.quaternions_xyzw[rows]
+    )
+
+
+def _painted(events, model=MODEL, **options):
+    film = LiveFilm(lying_plane(), model, **options)
+    film.follow(events)
+    return film
+
+
+@pytest.mark.parametrize('model', [MODEL, LAGGING], ids=['plain', 'whole strokes'])
+@pytest.mark.parametrize('batch', [1, 7, 100, 5000])
+def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
+    motion = weaving(TIMES_S)
+    expected = _offline(motion, model)
+    film = LiveFilm(lying_plane(), model)
+    for event in _events(motion, batch):
+        film.follow([event])
+    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
+    assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
+    assert expected.film_um.max() > 1.0
+
+
+def test_looking_at_the_film_changes_nothing():
+    motion = weaving(TIMES_S)
+    film = LiveFilm(lying_plane(), LAGGING)
+    for event in _events(motion, 10):
+        film.follow([event])
+        film.up_to_date()
+    assert np.array_equal(film.up_to_date().film_um, _offline(motion, LAGGING).film_um)
+
+
+@pytest.mark.parametrize('batch', [1, 25])
+@pytest.mark.parametrize('delay_s', [0.0, 0.05, 0.0999])
+def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    # A batch of 25 poses is 0.1 s long and comes at its end.
+    latency_s = 0.1 + (0.1 if batch == 25 else 0.0)
+    film = _painted(_events(motion, batch, delay_s), trigger_latency_s=latency_s)
+    assert np.array_equal(film.up_to_date().film_um, _offline(motion).film_um)
+    assert film.counts.late_triggers == 0
+
+
+def test_a_state_that_comes_too_late_is_counted_and_counts_from_there_on():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = _painted(_events(motion, 1, state_delay_s=0.15))
+    assert film.counts.late_triggers >= 2
+    # Each change acts 0.05 s late, at 0.3 m/s on a film of some ten um/s.
+    difference = np.abs(film.up_to_date().film_um - _offline(motion).film_um).max()
+    assert 0.05 < difference < 2.0
+
+
+def test_the_first_state_takes_back_what_was_painted_before_it():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    first, *rest = [TriggerChange(int(s), float(f)) for s, f in zip(
+        motion.trigger_stamps_ns, motion.trigger_flow, strict=True
+    )]  # fmt: skip
+    film = LiveFilm(lying_plane(), MODEL)
+    film.add_poses(_poses(motion, slice(0, 300)))
+    assert film.flow is None
+    assert film.up_to_date().film_um.max() > 1.0
+    film.add_trigger(first)
+    assert film.flow == 1.0
+    film.follow([*rest, _poses(motion, slice(300, None))])
+    assert np.array_equal(film.up_to_date().film_um, _offline(motion).film_um)
+    assert film.counts.late_triggers == 0
+
+
+def test_after_a_reset_the_gun_stays_as_it_was():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = LiveFilm(lying_plane(), MODEL)
+    events = _events(motion, 10)
+    half = len(events) // 2
+    film.follow(events[:half])
+    assert film.flow == 0.0
+    film.reset()
+    assert film.up_to_date().film_um.max() == 0.0
+    assert film.counts.received == 0
+    assert film.flow == 0.0
+    film.follow(events[half:])
+    # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
+    second = straight_pass(
+        TIMES_S,
+        trigger_stamps_ns=stamps_ns([2.2]),
+        trigger_flow=np.array([0.8]),
+    )
+    assert np.allclose(film.up_to_date().film_um, _offline(second).film_um, rtol=0, atol=1e-9)
+
+
+def test_after_a_reset_the_same_motion_paints_the_same_film():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = _painted(_events(motion, 10))
+    first = film.up_to_date().film_um
+    film.reset()
+    film.follow(_events(motion, 33))
+    assert np.array_equal(film.up_to_date().film_um, first)
+
+
+def test_a_motion_that_begins_again_paints_a_second_coat():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = LiveFilm(lying_plane(), MODEL)
+    for _ in range(2):
+        film.follow(_events(motion, 10))
+    once = _offline(motion).film_um
+    assert np.allclose(film.up_to_date().film_um, 2 * once, rtol=0, atol=1e-5 * once.max())
+    assert film.counts.restarts == 1
+    assert film.counts.late_triggers == 0
+
+
+def test_the_log_paints_the_motion_again_with_another_model():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = _painted(_events(motion, 10, state_delay_s=0.05))
+    again = LiveFilm(lying_plane(), LAGGING)
+    again.follow(film.log.events)
+    assert np.array_equal(again.up_to_date().film_um, _offline(motion, LAGGING).film_um)
+    assert again.counts == film.counts
+
+
+def test_another_model_from_here_on_leaves_the_film_so_far():
+    motion = straight_pass(TIMES_S)
+    doubled = MODEL.model_copy(
+        update={'planar': MODEL.planar.model_copy(update={'K1_cm3_per_s': 3.8})}
+    )
+    film = LiveFilm(lying_plane(), MODEL, trigger_latency_s=0.0)
+    film.add_poses(_poses(motion, slice(0, 501)))
+    before = film.up_to_date().film_um
+    film.use(doubled)
+    assert np.allclose(film.up_to_date().film_um, before, rtol=0, atol=1e-6)
+    film.add_poses(_poses(motion, slice(501, None)))
+    whole = _offline(motion).film_um
+    assert np.allclose(
+        film.up_to_date().film_um, before + 2 * (whole - before), rtol=0, atol=1e-4 * whole.max()
+    )
+
+
+def test_memory_is_bounded_and_says_so():
+    motion = straight_pass(TIMES_S)
+    film = _painted(_events(motion, 100), limit_poses=500)
+    assert not film.log.complete
+    assert film.log.events == []
+    assert np.array_equal(film.up_to_date().film_um, _offline(motion).film_um)
+    # Too late to be taken back: the gun is off from the first state on, not before.
+    film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))
+    assert film.up_to_date().film_um.max() > 1.0

@@ -1,0 +1,61 @@
+"""Figures of a film against what can be worked out by hand."""
+
+import math
+
+import numpy as np
+import pytest
+
+from paint_deposition.film.statistics import film_statistics
+
+
+def test_even_film_is_its_own_mean():
+    area = np.array([0.1, 0.3, 0.6])
+    stats = film_statistics(np.full(3, 40.0), area, emitted_cm3=50.0)
+    assert stats.mean_um == pytest.approx(40.0, rel=1e-12)
+    assert stats.std_dev_um == pytest.approx(0.0, abs=1e-12)
+    assert stats.coverage == 1.0
+    # 40 um on 1 m2 is 40 cm3.
+    assert stats.painted_volume_cm3 == pytest.approx(40.0, rel=1e-12)
+    assert stats.transfer_efficiency == pytest.approx(0.8, rel=1e-12)
+
+
+def test_area_weighs_not_the_number_of_vertices():
+    film = np.array([10.0, 10.0, 10.0, 30.0])
+    area = np.array([0.1, 0.1, 0.1, 0.3])
+    stats = film_statistics(film, area, emitted_cm3=1.0)
+    assert stats.mean_um == pytest.approx(20.0, rel=1e-12)
+    assert stats.std_dev_um == pytest.approx(10.0, rel=1e-12)
+    assert (stats.min_um, stats.max_um) == (10.0, 30.0)
+
+
+def test_refining_the_mesh_changes_nothing():
+    film, area = np.array([5.0, 15.0]), np.array([0.2, 0.1])
+    coarse = film_statistics(film, area, 10.0, target_um=15.0, target_tolerance_um=2.0)
+    fine = film_statistics(
+        np.repeat(film, 4), np.repeat(area, 4) / 4, 10.0, target_um=15.0, target_tolerance_um=2.0
+    )
+    for name, value in coarse.as_dict().items():
+        assert fine.as_dict()[name] == pytest.approx(value, rel=1e-12), name
+
+
+def test_bare_metal_and_dust_count_for_coverage_and_volume_only():
+    film, area = np.array([0.0, 0.5, 20.0]), np.array([0.5, 0.25, 0.25])
+    stats = film_statistics(film, area, emitted_cm3=10.0, painted_above_um=1.0)
+    assert stats.coverage == pytest.approx(0.25)
+    assert stats.mean_um == stats.min_um == stats.max_um == 20.0
+    assert stats.painted_volume_cm3 == pytest.approx(0.125 + 5.0)
+
+
+@pytest.mark.parametrize(('tolerance', 'share'), [(4.9, 0.25), (5.0, 0.5), (100.0, 1.0)])
+def test_share_within_the_target_band(tolerance, share):
+    film, area = np.array([30.0, 35.0, 99.0]), np.array([0.5, 0.5, 1.0])
+    stats = film_statistics(film, area, 1.0, target_um=35.0, target_tolerance_um=tolerance)
+    assert stats.within_target == pytest.approx(share)
+
+
+def test_without_target_or_paint_figures_say_so():
+    stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
+    assert math.isnan(stats.within_target)
+    assert math.isnan(stats.transfer_efficiency)
+    assert stats.as_dict()['transfer_efficiency'] is None
+    assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)

@@ -1,0 +1,119 @@
+"""Small recordings for tests, built by name."""
+
+from pathlib import Path
+
+import numpy as np
+from rosbags.rosbag1 import Writer as Ros1Writer
+from rosbags.rosbag2 import StoragePlugin
+from rosbags.rosbag2 import Writer as Ros2Writer
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+from paint_deposition.motion.trajectory import Trajectory
+
+# A stamp that a float could only hold to 256 ns.
+START_NS = 1_760_000_000_123_456_789
+POSE = 'geometry_msgs/msg/PoseStamped'
+BOOL = 'std_msgs/msg/Bool'
+STATE_TYPES = {
+    'paint_msgs/msg/AtomizerState': (
+        'std_msgs/Header header\nbool spraying\nfloat64 flow\nfloat64 shaping_air_l_per_min\n'
+        'float64 bell_speed_rpm\nfloat64 voltage_kv\n'
+    )
+}
+
+
+def straight_pass(count: int = 50, triggers: bool = True, frame_id: str = 'door') -> Trajectory:
+    """A metre along x in `count` poses at uneven intervals around 4 ms; gun on in the middle."""
+    rng = np.random.default_rng(5)
+    steps_ns = rng.integers(1_300_000, 24_000_000, count - 1)
+    stamps_ns = START_NS + np.concatenate([[0], np.cumsum(steps_ns)])
+    positions_m = np.zeros((count, 3))
+    positions_m[:, 0] = np.linspace(0.0, 1.0, count)
+    quaternions = rng.normal(size=(count, 4))
+    quaternions /= np.linalg.norm(quaternions, axis=1, keepdims=True)
+    if not triggers:
+        return Trajectory(stamps_ns, positions_m, quaternions, frame_id)
+    switched_ns = stamps_ns[[count // 4, 3 * count // 4]]
+    return Trajectory(
+        stamps_ns, positions_m, quaternions, frame_id, switched_ns, np.array([1.0, 0.0])
+    )
+
+
+class Messages:
+    """Messages of rosbags' types for one ROS version, ready to be written."""
+
+    def __init__(self, ros1: bool = False, state_types: dict[str, str] | None = None) -> None:
+        self.ros1 = ros1
+        self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
+        if not ros1:
+            for name, text in (state_types or STATE_TYPES).items():
+                self.store.register(get_types_from_msg(text, name))
+
+    def header(self, stamp_ns: int, frame_id: str = 'door'):
+        types = self.store.types
+        time = types['builtin_interfaces/msg/Time'](*divmod(int(stamp_ns), 10**9))
+        header = types['std_msgs/msg/Header']
+        return header(0, time, frame_id) if self.ros1 else header(time, frame_id)
+
+    def pose(self, stamp_ns: int, position_m, quaternion_xyzw, frame_id: str = 'door'):
+        types = self.store.types
+        return types[POSE](
+            self.header(stamp_ns, frame_id),
+            types['geometry_msgs/msg/Pose'](
+                types['geometry_msgs/msg/Point'](*map(float, position_m)),
+                types['geometry_msgs/msg/Quaternion'](*map(float, quaternion_xyzw)),
+            ),
+        )
+
+    def trigger(self, value: bool):
+        return self.store.types[BOOL](value)
+
+    def state(self, stamp_ns: int, spraying: bool, flow: float):
+        state = self.store.types['paint_msgs/msg/AtomizerState']
+        return state(self.header(stamp_ns), spraying, flow, 0.0, 0.0, 0.0)
+
+    def serialised(self, message) -> bytes:
+        kind = message.__msgtype__
+        if self.ros1:
+            return self.store.serialize_ros1(message, kind)
+        return self.store.serialize_cdr(message, kind)
+
+
+def write_bag(
+    path: Path,
+    entries: list[tuple[str, int, object]],
+    storage: str = 'mcap',
+    messages: Messages | None = None,
+) -> Path:
+    """Write (topic, log time, message) as 'ros1', 'sqlite3' or 'mcap'."""
+    messages = messages or Messages(ros1=storage == 'ros1')
+    if storage == 'ros1':
+        writer = Ros1Writer(path)
+    else:
+        plugin = StoragePlugin.SQLITE3 if storage == 'sqlite3' else StoragePlugin.MCAP
+        writer = Ros2Writer(path, version=9, storage_plugin=plugin)
+    with writer:
+        connections = {}
+        for topic, log_time_ns, message in entries:
+            if topic not in connections:
+                connections[topic] = writer.add_connection(
+                    topic, message.__msgtype__, typestore=messages.store
+                )
+            writer.write(connections[topic], int(log_time_ns), messages.serialised(message))
+    return path
+
+
+def pose_entries(
+    trajectory: Trajectory, topic: str = '/atomizer/pose', ros1: bool = False, delay_ns: int = 0
+) -> list[tuple[str, int, object]]:
+    """A trajectory's poses, logged `delay_ns` after their stamps."""
+    messages = Messages(ros1)
+    return [
+        (topic, stamp + delay_ns, messages.pose(stamp, position, quaternion, trajectory.frame_id))
+        for stamp, position, quaternion in zip(
+            trajectory.stamps_ns.tolist(),
+            trajectory.positions_m,
+            trajectory.quaternions_xyzw,
+            strict=True,
+        )
+    ]

@@ -1,0 +1,70 @@
+"""Effects whose marks these readings cannot tell apart."""
+
+import numpy as np
+import pytest
+
+from inference.linear import linear_fit
+from paint_deposition.effects.air_drift import AirDrift
+from paint_deposition.effects.edge_build import EdgeBuild
+from paint_deposition.effects.faraday_shielding import FaradayShielding
+from paint_deposition.effects.overspray_fog import OversprayFog
+from paint_deposition.effects.tcp_tilt import TcpTilt
+from paint_deposition.inference.classes import ALIKE, alike
+from paint_deposition.inference.evidence import BaseSpace
+from paint_deposition.inference.hypotheses import weigh
+from paint_deposition.inference.judgement import Judgement
+from paint_deposition.inference.signatures import Signature
+
+READINGS = 40
+MARK, OTHER, THIRD = np.linalg.qr(np.random.default_rng(1).normal(size=(READINGS, 3)))[0].T * 20.0
+
+
+def mark(effect, *columns, sides) -> Signature:
+    return Signature(
+        effect, type(effect).amplitudes(), np.column_stack(columns), np.array(sides, dtype=float)
+    )
+
+
+def members(*signatures) -> tuple[str, ...]:
+    """The class of the first, which acted on the readings."""
+    base = BaseSpace.of(linear_fit(np.random.default_rng(2), READINGS, np.zeros(READINGS)))
+    base = BaseSpace(np.eye(READINGS), signatures[0].columns[:, 0])
+    fields = [0.01 * np.random.default_rng(3).normal(size=(READINGS, 2))]
+    weighing = weigh(base, list(signatures), fields, [], np.inf, seed=0)
+    judged = Judgement(base, weighing, list(signatures), (), {})
+    return alike(judged, [s.id for s in signatures])
+
+
+def test_parallel_marks_are_one_class():
+    assert members(
+        mark(EdgeBuild(), MARK, sides=[1]),
+        mark(OversprayFog(), 0.2 * MARK, sides=[1]),
+        mark(FaradayShielding(), OTHER, sides=[1]),
+    ) == ('edge_build', 'overspray_fog')
+
+
+def test_opposite_marks_of_signed_effects_are_no_rivals():
+    first = mark(EdgeBuild(), MARK, sides=[1])
+    assert members(first, mark(FaradayShielding(), -MARK, sides=[1])) == ('edge_build',)
+    assert members(first, mark(FaradayShielding(), -MARK, sides=[-1])) == (
+        'edge_build',
+        'faraday_shielding',
+    )
+
+
+def test_an_effect_of_either_sign_rivals_both_ways():
+    for way in (1.0, -1.0):
+        rival = mark(AirDrift(), way * MARK, OTHER, sides=[0, 0])
+        assert 'air_drift' in members(mark(EdgeBuild(), MARK, sides=[1]), rival)
+
+
+def test_two_directions_together_may_rival_one():
+    rival = mark(TcpTilt(), MARK + OTHER, MARK - OTHER, sides=[0, 0])
+    assert 'tcp_tilt' in members(mark(EdgeBuild(), MARK, sides=[1]), rival)
+
+
+@pytest.mark.parametrize(('cosine', 'expected'), [(ALIKE + 0.02, True), (ALIKE - 0.02, False)])
+def test_the_limit_is_a_cosine(cosine, expected):
+    tilted = cosine * MARK + np.sqrt(1.0 - cosine**2) * THIRD
+    found = members(mark(EdgeBuild(), MARK, sides=[1]), mark(OversprayFog(), tilted, sides=[1]))
+    assert ('overspray_fog' in found) == expected

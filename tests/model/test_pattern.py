@@ -1,0 +1,143 @@
+"""Eq. (1): both Gaussians integrate to one, so that K1 is the volume that lands a second."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scipy.integrate import quad
+
+from paint_deposition.model.pattern import PlanarPattern
+
+RINGS = [(0.0, 0.09), (0.02, 0.09), (0.09, 0.09), (0.22, 0.09), (0.22, 0.02), (1.0, 0.005)]
+PATTERNS = st.builds(
+    PlanarPattern,
+    K1_cm3_per_s=st.floats(0.01, 100.0),
+    K2=st.floats(0.0, 1.0),
+    K3=st.floats(0.0, 1.0),
+    phi_rad=st.floats(-6.28, 6.28),
+    r_m=st.floats(0.0, 1.0),
+    sigma1_m=st.floats(0.005, 1.0),
+    sigma2_m=st.floats(0.005, 1.0),
+)
+
+
+def over_the_plane(density, radius_m, width_m):
+    """Integral of a radially symmetric density [1/m^2] that changes near radius and centre."""
+    points = sorted({min(max(radius_m + k * width_m, 0.0), radius_m + 12 * width_m)
+                     for k in range(-12, 13, 2)})  # fmt: skip
+    far = radius_m + 40 * width_m
+    return sum(
+        quad(lambda rho: 2.0 * math.pi * rho * density(rho, 0.0), a, b, epsabs=1e-13)[0]
+        for a, b in zip([0.0, *points], [*points, far], strict=True)
+        if b > a
+    )
+
+
+@pytest.mark.parametrize(('r_m', 'sigma_m'), RINGS)
+def test_g1_integrates_to_one(r_m, sigma_m):
+    pattern = PlanarPattern(r_m=r_m, sigma1_m=sigma_m)
+    assert over_the_plane(pattern.g1, r_m, sigma_m) == pytest.approx(1.0, abs=1e-11)
+
+
+@pytest.mark.parametrize('sigma_m', [0.005, 0.15, 1.0])
+def test_g2_integrates_to_one(sigma_m):
+    pattern = PlanarPattern(sigma2_m=sigma_m)
+    assert over_the_plane(pattern.g2, 0.0, sigma_m) == pytest.approx(1.0, abs=1e-11)
+
+
+def test_gamma_by_hand():
+    # r = 0: two Gaussians upon each other, 2 * 2 pi sigma^2.
+    assert PlanarPattern(r_m=0.0, sigma1_m=0.1).gamma_m2 == pytest.approx(0.04 * math.pi)
+    # r = 0.22, sigma_1 = 0.09: exp(-2.98765) = 0.0504056, erf(1.728483) = 0.9854991;
+    # 2 pi (0.0162 * 0.0504056 + 0.0198 * 2.5066283 * 0.9854991).
+    assert PlanarPattern(r_m=0.22, sigma1_m=0.09).gamma_m2 == pytest.approx(0.312448, abs=2e-6)
+    # A thin ring is a line of length 2 pi r and width sigma sqrt(2 pi).
+    thin = PlanarPattern(r_m=0.5, sigma1_m=0.005)
+    assert thin.gamma_m2 == pytest.approx(math.pi * 0.005 * math.sqrt(2 * math.pi), rel=1e-12)
+
+
+def test_flux_by_hand():
+    # K2 = 1 leaves the centred Gaussian: 2 / (2 pi 0.01) = 31.831 at its centre, in um/s.
+    centred = PlanarPattern(K1_cm3_per_s=2.0, K2=1.0, sigma2_m=0.1)
+    assert centred.flux_um_per_s(0.0, 0.0) == pytest.approx(100.0 / math.pi)
+    assert centred.flux_um_per_s(0.06, 0.08) == pytest.approx(100.0 / math.pi * math.exp(-0.5))
+    # K2 = 0 leaves the ring: at rho = r the second exponential is exp(-2 r^2 / sigma^2).
+    ring = PlanarPattern(K1_cm3_per_s=1.0, K2=0.0, K3=0.5, phi_rad=0.0, r_m=0.1, sigma1_m=0.1)
+    top = (1.0 + math.exp(-2.0)) / ring.gamma_m2
+    assert ring.flux_um_per_s(0.1, 0.0) == pytest.approx(top)
+    assert ring.flux_um_per_s(0.0, 0.1) == pytest.approx(1.5 * top)
+    assert ring.flux_um_per_s(0.0, -0.1) == pytest.approx(0.5 * top)
+
+
+@pytest.mark.parametrize('phi_rad', [0.0, 0.6, -2.0, 3.0])
+def test_asymmetry_is_strongest_a_quarter_turn_after_phi(phi_rad):
+    pattern = PlanarPattern(K3=0.4, phi_rad=phi_rad)
+    angle = np.linspace(-math.pi, math.pi, 721)
+    f = pattern.f(np.cos(angle), np.sin(angle))
+    strongest = angle[f.argmax()]
+    assert math.cos(strongest - phi_rad - 0.5 * math.pi) == pytest.approx(1.0, abs=1e-4)
+    assert (f.min(), f.max()) == (pytest.approx(0.6, abs=1e-4), pytest.approx(1.4, abs=1e-4))
+    # Not one value is lost on the whole turn: f integrates out against anything round.
+    assert f[:-1].mean() == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.parametrize('K2', [0.0, 0.15, 1.0])
+@pytest.mark.parametrize('K3', [0.0, 0.2, 1.0])
+@pytest.mark.parametrize(('r_m', 'sigma_m'), [(0.0, 0.09), (0.1, 0.09), (0.22, 0.09)])
+def test_the_whole_pattern_is_k1(K2, K3, r_m, sigma_m):
+    pattern = PlanarPattern(K1_cm3_per_s=1.7, K2=K2, K3=K3, r_m=r_m, sigma1_m=sigma_m)
+    node, weight = np.polynomial.legendre.leggauss(300)
+    far = r_m + 12.0 * max(sigma_m, pattern.sigma2_m)
+    rho, weight = 0.5 * far * (node + 1.0), 0.5 * far * weight
+    angle = 2.0 * math.pi * np.arange(64) / 64
+    x, y = rho[:, np.newaxis] * np.cos(angle), rho[:, np.newaxis] * np.sin(angle)
+    ring = pattern.flux_um_per_s(x, y).mean(axis=1) * 2.0 * math.pi * rho
+    assert weight @ ring == pytest.approx(1.7, rel=1e-10)
+
+
+@pytest.mark.parametrize('radius_m', [0.0, 0.05, 0.22, 0.4, 2.0])
+@pytest.mark.parametrize('r_m', [0.0, 0.1, 0.22])
+def test_enclosed_fraction_is_the_integral_up_to_there(radius_m, r_m):
+    pattern = PlanarPattern(r_m=r_m)
+
+    def ring(rho):
+        mean = (1.0 - pattern.K2) * pattern.g1(rho, 0.0) + pattern.K2 * pattern.g2(rho, 0.0)
+        return 2.0 * math.pi * rho * mean
+
+    expected = quad(ring, 0.0, radius_m, epsabs=1e-12, points=[0.2], limit=200)[0]
+    assert pattern.enclosed_fraction(radius_m) == pytest.approx(expected, abs=1e-10)
+
+
+@given(pattern=PATTERNS, x_m=st.floats(-3.0, 3.0), y_m=st.floats(-3.0, 3.0))
+def test_flux_is_never_negative_and_nowhere_above_the_peak(pattern, x_m, y_m):
+    flux = float(pattern.flux_um_per_s(x_m, y_m))
+    assert 0.0 <= flux <= 1.001 * pattern.peak_flux_um_per_s
+
+
+@given(pattern=PATTERNS, fraction=st.sampled_from([1e-3, 1e-6, 1e-9]), angle=st.floats(-3.2, 3.2))
+def test_beyond_its_radius_the_flux_is_negligible(pattern, fraction, angle):
+    rho = pattern.radius_of_flux_m(fraction) * np.linspace(1.0, 1.5, 50)
+    beyond = pattern.flux_um_per_s(rho * math.cos(angle), rho * math.sin(angle))
+    assert beyond.max() <= 1.01 * fraction * pattern.peak_flux_um_per_s
+
+
+def test_the_radius_is_no_larger_than_it_need_be():
+    pattern = PlanarPattern()
+    rho = np.linspace(0.0, 2.0, 20_001)
+    towards = pattern.phi_rad + 0.5 * math.pi
+    flux = pattern.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards))
+    needed = rho[flux > 1e-6 * pattern.peak_flux_um_per_s].max()
+    assert needed < pattern.radius_of_flux_m(1e-6) < 1.05 * needed
+
+
+@pytest.mark.parametrize(
+    'wrong',
+    [{'K1_cm3_per_s': 0.0}, {'K2': -0.1}, {'K2': 1.1}, {'K3': 1.2}, {'r_m': -0.01},
+     {'sigma1_m': 0.0}, {'sigma2_m': math.nan}, {'K1': 1.9}],
+)  # fmt: skip
+def test_impossible_parameters_are_refused(wrong):
+    with pytest.raises(ValidationError, match=next(iter(wrong))):
+        PlanarPattern(**wrong)

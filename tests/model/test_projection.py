@@ -1,0 +1,212 @@
+"""Eq. (2): paint that leaves the model plane lands on whatever stands behind it, all of it."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import NEAREST_M, Projection, flux_um_per_s
+from scenes import rotation_matrix
+
+PLANAR = PlanarPattern()
+# Within 33 degrees of the axis to 1e-9.
+NARROW = PlanarPattern(K1_cm3_per_s=1.3, K3=0.5, r_m=0.04, sigma1_m=0.025, sigma2_m=0.03)
+PROJECTION = Projection(model_plane_m=0.30, emission_offset_m=0.05)
+OMEGA = PROJECTION.model_plane_m
+DOWN = rotation_matrix()  # tool z along -z, tool x along x, tool y along -y
+STANDOFFS_M = [0.15, 0.25, 0.4]
+
+
+def flux(positions, normals, tcp, rotation=DOWN, planar=PLANAR, projection=PROJECTION):
+    return flux_um_per_s(
+        planar,
+        projection,
+        np.atleast_2d(np.asarray(positions, dtype=float)),
+        np.atleast_2d(np.asarray(normals, dtype=float)),
+        np.asarray(tcp, dtype=float),
+        rotation,
+    )
+
+
+def test_on_the_model_plane_it_is_eq_1():
+    x, y = np.meshgrid(np.linspace(-0.5, 0.5, 11), np.linspace(-0.5, 0.5, 11))
+    points = np.stack([x.ravel(), y.ravel(), np.zeros(x.size)], axis=1)
+    got = flux(points, np.tile([0, 0, 1], (x.size, 1)), [0, 0, 0.25])
+    off_axis = np.hypot(x, y).ravel() > 0
+    expected = PLANAR.flux_um_per_s(x, -y).ravel()
+    assert np.allclose(got[off_axis], expected[off_axis], rtol=1e-13, atol=0)
+
+
+def test_at_twice_the_distance_it_is_twice_as_wide_and_a_quarter_as_strong():
+    got = flux([0.2, -0.1, 0.0], [0, 0, 1], [0, 0, 0.55])
+    assert got[0] == pytest.approx(0.25 * PLANAR.flux_um_per_s(0.1, 0.05), rel=1e-13)
+
+
+def test_a_slanting_element_by_hand():
+    # Emission point at (0, 0, 0.4), s = (0.3, 0, 0): L = 0.5, <e, z> = 0.8, q = (0.225, 0).
+    # Normal turned so that <e, n> = 0.6: Omega^2 0.6 / (0.25 * 0.512) = 0.421875.
+    e = np.array([0.6, 0.0, -0.8])
+    across = np.array([0.8, 0.0, 0.6])
+    got = flux([0.3, 0, 0], -0.6 * e + 0.8 * across, [0, 0, 0.35])
+    assert got[0] == pytest.approx(0.421875 * PLANAR.flux_um_per_s(0.225, 0.0), rel=1e-13)
+
+
+@pytest.mark.parametrize('angle_deg', [0, 30, 60, 89])
+def test_on_the_axis_tilting_costs_the_cosine(angle_deg):
+    plain = PlanarPattern(K3=0.0)
+    angle = math.radians(angle_deg)
+    got = flux([0, 0, 0], [math.sin(angle), 0, math.cos(angle)], [0, 0, 0.25], planar=plain)
+    assert got[0] == pytest.approx(math.cos(angle) * plain.flux_um_per_s(0, 0), rel=1e-12)
+
+
+def disc(radius_m, count=240, angles=180):
+    """Distances t and angles over a disc with weights, smooth functions to rounding."""
+    node, weight = np.polynomial.legendre.leggauss(count)
+    t, weight = 0.5 * radius_m * (node + 1.0), 0.5 * radius_m * weight
+    angle = 2.0 * math.pi * np.arange(angles) / angles
+    t, angle = (grid.ravel() for grid in np.meshgrid(t, angle, indexing='ij'))
+    return t, angle, np.repeat(weight, angles) * 2.0 * math.pi / angles
+
+
+def plane(tilt_rad):
+    """Disc of a plane through the origin, tilted about y."""
+    t, angle, weight = disc(1.0)
+    u, v = t * np.cos(angle), t * np.sin(angle)
+    positions = np.stack([u * math.cos(tilt_rad), v, -u * math.sin(tilt_rad)], axis=1)
+    normals = np.tile([math.sin(tilt_rad), 0.0, math.cos(tilt_rad)], (len(t), 1))
+    return positions, normals, weight * t
+
+
+def cylinder(radius_m):
+    """Patch around the crest of a cylinder along x; concave toward the gun if radius < 0."""
+    t, angle, weight = disc(0.5 * math.pi * abs(radius_m))
+    x, turn = t * np.cos(angle), t * np.sin(angle) / radius_m
+    positions = np.stack([x, radius_m * np.sin(turn), radius_m * (np.cos(turn) - 1.0)], axis=1)
+    normals = np.stack([0.0 * x, np.sin(turn), np.cos(turn)], axis=1)
+    return positions, normals, weight * t
+
+
+def sphere(radius_m, standoff_m):
+    """Cap of a sphere as far as it is seen from the emission point."""
+    seen = math.acos(radius_m / (radius_m + standoff_m + PROJECTION.emission_offset_m))
+    t, angle, weight = disc(seen)
+    normals = np.stack([np.sin(t) * np.cos(angle), np.sin(t) * np.sin(angle), np.cos(t)], axis=1)
+    return radius_m * (normals - [0.0, 0.0, 1.0]), normals, weight * radius_m**2 * np.sin(t)
+
+
+@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
+@pytest.mark.parametrize('tilt_deg', [0, 15, -30, 45])
+def test_a_plane_however_tilted_takes_all(standoff_m, tilt_deg):
+    positions, normals, area = plane(math.radians(tilt_deg))
+    got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
+    assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=1e-6)
+
+
+@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
+@pytest.mark.parametrize('radius_m', [0.6, 2.0, -1.2])
+def test_a_cylinder_takes_all(standoff_m, radius_m):
+    positions, normals, area = cylinder(radius_m)
+    if radius_m < 0.0:  # the gun stands inside: what is behind it is not lit
+        assert standoff_m + PROJECTION.emission_offset_m < abs(radius_m)
+    got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
+    assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-6)
+
+
+@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
+@pytest.mark.parametrize('radius_m', [0.08, 0.25, 1.0])
+def test_a_sphere_takes_what_the_cone_to_its_limb_holds(standoff_m, radius_m):
+    distance = radius_m + standoff_m + PROJECTION.emission_offset_m
+    limb_m = OMEGA * radius_m / math.sqrt(distance**2 - radius_m**2)
+    captured = PLANAR.enclosed_fraction(limb_m)
+    assert 0.005 < captured < 0.99
+    positions, normals, area = sphere(radius_m, standoff_m)
+    got = area @ flux(positions, normals, [0, 0, standoff_m])
+    assert got == pytest.approx(captured * PLANAR.K1_cm3_per_s, rel=1e-6)
+
+
+@given(
+    position=st.tuples(*[st.floats(-1.0, 1.0)] * 3),
+    seed=st.integers(0, 1000),
+    offset=st.floats(-0.2, 0.5),
+    K3=st.floats(0.0, 1.0),
+)
+def test_no_negative_or_infinite_flux_from_anywhere(position, seed, offset, K3):
+    orientation = Rotation.random(2, rng=seed)
+    normal = orientation[0].apply([0.0, 0.0, 1.0])
+    got = flux(
+        position,
+        normal,
+        [0.0, 0.0, 0.0],
+        orientation[1].as_matrix(),
+        PlanarPattern(K3=K3),
+        Projection(emission_offset_m=offset),
+    )
+    assert np.isfinite(got).all()
+    assert got[0] >= 0.0
+
+
+def test_skin_that_looks_away_gets_none():
+    away = [[0, 0, -1], [0.6, 0, -0.8], [1, 0, -1e-9]]
+    assert flux(np.zeros((3, 3)), away, [0, 0, 0.25]).tolist() == [0, 0, 0]
+
+
+def test_what_lies_behind_the_bell_gets_none():
+    behind = [[0.02, 0.0, 0.251], [0.0, 0.0, 0.28], [0.3, 0.0, 0.6]]
+    assert flux(behind, np.tile([0, 0, 1], (3, 1)), [0, 0, 0.25]).tolist() == [0, 0, 0]
+    assert flux(behind, np.tile([0, 0, -1], (3, 1)), [0, 0, 0.25]).tolist() == [0, 0, 0]
+    before = flux([0.02, 0.0, 0.249], [0, 0, 1], [0, 0, 0.25])
+    assert before[0] > 0.0
+
+
+def test_an_emission_point_before_the_bell_has_no_pole():
+    ahead = Projection(emission_offset_m=-0.1)
+    assert ahead.nearest_m == NEAREST_M
+    heights = 0.15 + np.array([0.1, 0.0, -1e-6, -0.9e-3, -1.1e-3])
+    points = np.stack([0.0 * heights, 0.0 * heights, heights], axis=1)
+    got = flux(points, np.tile([0, 0, 1], (5, 1)), [0, 0, 0.25], projection=ahead)
+    assert got[:4].tolist() == [0, 0, 0, 0]
+    assert got[4] > 0.0
+
+
+@given(seed=st.integers(0, 1000))
+def test_moving_gun_and_part_together_changes_nothing(seed):
+    rng = np.random.default_rng(seed)
+    points, normals = rng.normal(0, 0.2, (20, 3)), Rotation.random(20, rng=rng).apply([0, 0, 1])
+    tcp, orientation = np.array([0.1, -0.05, 0.3]), Rotation.from_matrix(DOWN)
+    turn, shift = Rotation.random(rng=rng), rng.normal(0, 2.0, 3)
+    still = flux(points, normals, tcp)
+    moved = flux(
+        turn.apply(points) + shift,
+        turn.apply(normals),
+        turn.apply(tcp) + shift,
+        (turn * orientation).as_matrix(),
+    )
+    assert np.allclose(moved, still, rtol=1e-9, atol=1e-9)
+
+
+def test_rolling_the_gun_rolls_the_pattern():
+    roll = 0.8
+    rolled = DOWN @ Rotation.from_euler('z', roll).as_matrix()
+    turned = PlanarPattern(phi_rad=PLANAR.phi_rad + roll)
+    points = np.random.default_rng(1).uniform(-0.4, 0.4, (50, 3)) * [1, 1, 0]
+    normals = np.tile([0, 0, 1], (50, 1))
+    assert np.allclose(
+        flux(points, normals, [0, 0, 0.25], rolled),
+        flux(points, normals, [0, 0, 0.25], planar=turned),
+        rtol=1e-12,
+    )
+
+
+def test_the_model_joins_them():
+    model = DepositionModel(planar=NARROW, projection=PROJECTION)
+    assert model.reach_m == NARROW.radius_of_flux_m(1e-6)
+    assert model.shadow == 0.0
+    assert DepositionModel(projection=Projection(occlusion=True)).shadow == 1.0
+    assert not model.needs_whole_strokes
+    assert model.max_step_m == pytest.approx(0.0025)
+    assert DepositionModel().max_step_m == pytest.approx(0.008)

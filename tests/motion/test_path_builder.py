@@ -1,0 +1,228 @@
+"""One integrator for streams and recordings: the same sub-steps however the poses came."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import scenes
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.trajectory import Trajectory
+
+TIMES_S = np.arange(0.0, 4.0, 0.02)
+TRIGGER = {
+    'trigger_stamps_ns': scenes.stamps_ns([0.0, 0.5037, 1.9, 2.4, 3.3]),
+    'trigger_flow': np.array([0.0, 1.0, 0.0, 0.7, 0.0]),
+}
+
+
+def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
+    """The path of poses that come in batches of these sizes, in turns, with their triggers."""
+    builder = PathBuilder(whole_strokes=whole_strokes)
+    triggers = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
+    pieces = []
+    start, turn = 0, 0
+    while start < len(trajectory):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        start, turn = rows.stop, turn + 1
+        builder.add_poses(
+            trajectory.stamps_ns[rows],
+            trajectory.positions_m[rows],
+            trajectory.quaternions_xyzw[rows],
+        )
+        newest = trajectory.stamps_ns[rows][-1]
+        while triggers and triggers[0][0] <= newest:
+            builder.add_trigger(*triggers.pop(0))
+        pieces.append(builder.take(newest - lag_ns))
+    pieces.append(builder.take(finish=True))
+    return SprayPath.joined(pieces), builder.counts
+
+
+def assert_same_bits(path, other):
+    for column in fields(SprayPath):
+        assert np.array_equal(getattr(path, column.name), getattr(other, column.name)), column.name
+
+
+def to_and_fro(times_s=TIMES_S):
+    """Two passes there and back with the gun off at the turn."""
+    t = times_s[:, np.newaxis]
+    x = np.where(t < 2.0, 0.3 * t, 1.2 - 0.3 * t)
+    positions = np.hstack([x, 0.01 * np.sin(3.0 * t), 0.25 + 0.0 * t])
+    return Trajectory(
+        scenes.stamps_ns(times_s), positions, np.tile(scenes.LOOKING_DOWN, (len(t), 1)), **TRIGGER
+    )
+
+
+@given(sizes=st.lists(st.integers(1, 60), min_size=1, max_size=6), whole_strokes=st.booleans())
+def test_batches_do_not_matter_to_the_last_bit(sizes, whole_strokes):
+    trajectory = to_and_fro(TIMES_S[(TIMES_S < 1.0) | (TIMES_S > 1.4)])
+    expected, counts = spray_path(trajectory, whole_strokes=whole_strokes)
+    path, streamed_counts = streamed(trajectory, sizes, whole_strokes)
+    assert_same_bits(path, expected)
+    assert streamed_counts == counts
+
+
+def test_the_trigger_cuts_within_a_segment():
+    path, _ = spray_path(to_and_fro())
+    on_s = (1.9 - 0.5037) + 0.7 * (3.3 - 2.4)
+    assert path.spraying_time_s == pytest.approx(on_s, rel=1e-12)
+    sprayed = path.stamp_ns[path.flow > 0.0]
+    assert sprayed[0] >= scenes.stamps_ns(0.5037)
+    assert set(path.flow) == {0.0, 0.7, 1.0}
+
+
+def test_without_trigger_the_gun_always_sprays():
+    path, _ = spray_path(scenes.straight_pass(TIMES_S))
+    assert path.spraying_time_s == pytest.approx(TIMES_S[-1], rel=1e-12)
+    assert np.all(path.since_on_s == np.inf)
+
+
+def test_states_that_say_the_same_again_change_no_bit():
+    trajectory = scenes.straight_pass(TIMES_S, **TRIGGER)
+    every_10_ms = scenes.stamps_ns(np.arange(0.0, 4.0, 0.01))
+    at = np.searchsorted(TRIGGER['trigger_stamps_ns'], every_10_ms, side='right') - 1
+    stamps = np.concatenate([TRIGGER['trigger_stamps_ns'], every_10_ms])
+    flow = np.concatenate([TRIGGER['trigger_flow'], TRIGGER['trigger_flow'][at]])
+    order = np.argsort(stamps, kind='stable')
+    chatty = scenes.straight_pass(
+        TIMES_S, trigger_stamps_ns=stamps[order], trigger_flow=flow[order]
+    )
+    assert_same_bits(spray_path(chatty)[0], spray_path(trajectory)[0])
+
+
+def test_a_gap_is_gun_off():
+    times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.3, 2.0, 0.02)])
+    path, counts = spray_path(scenes.straight_pass(times))
+    assert counts.gaps == 1
+    assert counts.longest_gap_ns == pytest.approx(0.32e9, rel=1e-9)
+    assert path.spraying_time_s == pytest.approx(0.98 + 0.68, rel=1e-12)
+    within = path.stamp_ns - scenes.stamps_ns(0.0)
+    assert not np.any((within > 0.98e9) & (within < 1.3e9))
+
+
+def test_a_gap_closes_the_gun_and_opens_it_again():
+    times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.3, 2.0, 0.02)])
+    path, _ = spray_path(scenes.straight_pass(times))
+    before = np.flatnonzero(path.stroke == 0)[-1]
+    assert path.until_off_s[before] == pytest.approx(0.5 * path.dwell_s[before])
+    assert path.since_on_s[before + 1] == pytest.approx(0.5 * path.dwell_s[before + 1])
+    assert path.stroke[before + 1] == 1
+
+
+def test_the_limit_of_a_gap_can_be_set():
+    trajectory = scenes.straight_pass(np.arange(0.0, 4.0, 0.4))
+    assert len(spray_path(trajectory)[0]) == 0
+    path, counts = spray_path(trajectory, max_pose_gap_s=0.5)
+    assert counts.gaps == 0
+    assert path.spraying_time_s == pytest.approx(3.6)
+
+
+@pytest.mark.parametrize('batches', [[1], [7], [1000]])
+def test_bad_poses_change_no_bit(batches):
+    clean = to_and_fro()
+    stamps = clean.stamps_ns.tolist()
+    positions, quaternions = clean.positions_m.tolist(), clean.quaternions_xyzw.tolist()
+    bad = {
+        30: (stamps[29], [9.0, 9.0, 9.0], quaternions[0]),  # repeated stamp
+        60: (stamps[40], [9.0, 9.0, 9.0], quaternions[0]),  # backward
+        61: (stamps[41], [9.0, 9.0, 9.0], quaternions[0]),
+        62: (stamps[42], [9.0, 9.0, 9.0], quaternions[0]),
+        90: (stamps[90] - 1_000, [np.nan, 0.0, 0.0], quaternions[0]),
+        120: (stamps[120] - 1_000, [9.0, 9.0, 9.0], [0.0, 0.0, np.inf, 0.0]),
+        150: (stamps[150] - 1_000, [9.0, 9.0, 9.0], [0.0, 0.0, 0.0, 0.5]),
+        180: (stamps[180] - 1_000, [9.0, 9.0, 9.0], [0.0, 0.0, 0.0, 0.0]),
+    }
+    for row in sorted(bad, reverse=True):
+        for values, value in zip((stamps, positions, quaternions), bad[row], strict=True):
+            values.insert(min(row, len(values)), value)
+    dirty = Trajectory(
+        np.array(stamps, dtype=np.int64), np.array(positions), np.array(quaternions), **TRIGGER
+    )
+    path, counts = streamed(dirty, batches)
+    assert_same_bits(path, spray_path(clean, whole_strokes=False)[0])
+    assert (counts.received, counts.rejected) == (len(clean) + 8, 8)
+    assert (counts.repeated_stamps, counts.backward_stamps) == (1, 3)
+    assert (counts.not_finite, counts.not_unit_quaternions) == (2, 2)
+
+
+@pytest.mark.parametrize('whole_strokes', [False, True])
+def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
+    once = to_and_fro()
+    twice = Trajectory(
+        np.concatenate([once.stamps_ns, once.stamps_ns]),
+        np.concatenate([once.positions_m, once.positions_m]),
+        np.concatenate([once.quaternions_xyzw, once.quaternions_xyzw]),
+        **TRIGGER,
+    )
+    single, _ = spray_path(once)
+    path, counts = spray_path(twice, whole_strokes=whole_strokes)
+    assert (counts.restarts, counts.rejected, counts.gaps) == (1, 0, 0)
+    assert len(path) == 2 * len(single)
+    for name in ('stamp_ns', 'dwell_s', 'flow', 'position_m'):
+        column = getattr(path, name)
+        assert np.array_equal(column[: len(single)], getattr(single, name))
+        assert np.array_equal(column[len(single) :], getattr(single, name))
+
+
+def test_a_live_stream_that_begins_again_follows_its_new_triggers():
+    once = to_and_fro()
+    builder = PathBuilder()
+    pieces = []
+    for _ in range(2):
+        for stamp, flow in zip(TRIGGER['trigger_stamps_ns'], TRIGGER['trigger_flow'], strict=True):
+            builder.add_trigger(stamp, flow)
+        for row in range(0, len(once), 10):
+            rows = slice(row, row + 10)
+            builder.add_poses(
+                once.stamps_ns[rows], once.positions_m[rows], once.quaternions_xyzw[rows]
+            )
+            if row:  # the first poses of a stream that begins again are only waiting yet
+                pieces.append(builder.take())
+    pieces.append(builder.take(finish=True))
+    sprayed = SprayPath.joined(pieces).spraying_time_s
+    assert sprayed == pytest.approx(2.0 * spray_path(once)[0].spraying_time_s, rel=1e-12)
+    assert builder.counts.restarts == 1
+
+
+def test_a_late_trigger_is_counted_and_holds_from_there_on():
+    trajectory = scenes.straight_pass(TIMES_S)
+    builder = PathBuilder()
+    builder.add_trigger(scenes.stamps_ns(0.0), 1.0)
+    rows = slice(0, 101)
+    builder.add_poses(
+        trajectory.stamps_ns[rows], trajectory.positions_m[rows], trajectory.quaternions_xyzw[rows]
+    )
+    painted = builder.take().spraying_time_s
+    builder.add_trigger(scenes.stamps_ns(1.9), 0.0)
+    rows = slice(101, None)
+    builder.add_poses(
+        trajectory.stamps_ns[rows], trajectory.positions_m[rows], trajectory.quaternions_xyzw[rows]
+    )
+    assert painted == pytest.approx(2.0)
+    assert builder.take(finish=True).spraying_time_s == 0.0
+    assert builder.counts.late_triggers == 1
+
+
+def test_until_leaves_what_ends_later():
+    trajectory = scenes.straight_pass(TIMES_S)
+    builder = PathBuilder()
+    builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
+    until = int(scenes.stamps_ns(1.0))
+    assert builder.take(until).spraying_time_s == pytest.approx(1.0)
+    assert builder.integrated_ns == until
+    assert builder.newest_ns == trajectory.stamps_ns[-1]
+    assert builder.take().spraying_time_s == pytest.approx(TIMES_S[-1] - 1.0)
+
+
+@pytest.mark.parametrize('count', [0, 1])
+def test_too_few_poses_paint_nothing(count):
+    trajectory = Trajectory(
+        np.arange(count, dtype=np.int64), np.zeros((count, 3)), np.tile([0, 0, 0, 1.0], (count, 1))
+    )
+    path, counts = spray_path(trajectory)
+    assert len(path) == 0
+    assert path.rotation.shape == (0, 3, 3)
+    assert counts.received == count

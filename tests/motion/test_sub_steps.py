@@ -1,0 +1,152 @@
+"""Segments cut into sub-steps: nothing of the time, the way or the turn is lost."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from paint_deposition.motion.sub_steps import (
+    LEVER_M,
+    MOST_SUB_STEPS,
+    slerp,
+    split_segments,
+    write_rotation,
+)
+
+GAP_NS = 250_000_000
+STEP_M = 0.008
+
+
+def split(stamps_ns, positions, quaternions, cuts_ns=(), max_step_m=STEP_M):
+    return split_segments(
+        np.asarray(stamps_ns, dtype=np.int64),
+        np.asarray(positions, dtype=float),
+        np.asarray(quaternions, dtype=float),
+        np.asarray(cuts_ns, dtype=np.int64),
+        GAP_NS,
+        max_step_m,
+    )
+
+
+def random_motion(seed, count=12):
+    rng = np.random.default_rng(seed)
+    stamps = np.cumsum(rng.integers(1_300_000, 24_000_000, count))
+    positions = np.cumsum(rng.normal(0.0, 0.01, (count, 3)), axis=0)
+    steps = Rotation.from_rotvec(rng.normal(0.0, 0.05, (count, 3)))
+    quaternions = np.empty((count, 4))
+    orientation = Rotation.random(rng=seed)
+    for row, step in enumerate(steps):
+        orientation = orientation * step
+        quaternions[row] = orientation.as_quat() * rng.choice([-1.0, 1.0])
+    return stamps, positions, quaternions, rng
+
+
+@pytest.mark.parametrize('angle_rad', [0.0, 1e-9, 1e-6, 1e-3, 0.7, 3.0, np.pi])
+@pytest.mark.parametrize('t', [0.0, 0.25, 0.5, 1.0])
+def test_slerp_turns_evenly_the_short_way(angle_rad, t):
+    axis = np.array([0.36, -0.48, 0.8])
+    start = Rotation.from_euler('xyz', [0.3, -1.1, 2.0])
+    end = Rotation.from_rotvec(angle_rad * axis) * start
+    expected = Rotation.from_rotvec(t * angle_rad * axis) * start
+    for sign in (1.0, -1.0):
+        got = Rotation.from_quat(slerp(start.as_quat(), sign * end.as_quat(), t))
+        half_turn = angle_rad == np.pi  # both ways round are as short
+        if not half_turn:
+            assert (got.inv() * expected).magnitude() < 1e-9
+        assert (got.inv() * start).magnitude() == pytest.approx(t * angle_rad, abs=1e-7)
+
+
+def test_the_rotation_is_scipys():
+    matrix = np.empty((3, 3))
+    for seed in range(20):
+        rotation = Rotation.random(rng=seed)
+        write_rotation(matrix, rotation.as_quat())
+        assert np.allclose(matrix, rotation.as_matrix(), rtol=0, atol=1e-15)
+
+
+@given(seed=st.integers(0, 2**32 - 1), cuts=st.lists(st.floats(-0.2, 1.2), max_size=5))
+def test_time_and_way_are_kept(seed, cuts):
+    stamps, positions, quaternions, _ = random_motion(seed)
+    span = stamps[-1] - stamps[0]
+    cuts_ns = np.unique(stamps[0] + np.round(np.array(cuts) * span).astype(np.int64))
+    stamp, dwell, position, rotation, velocity, after_gap = split(
+        stamps, positions, quaternions, cuts_ns
+    )
+    assert dwell.sum() == pytest.approx(span * 1e-9, rel=1e-12)
+    assert np.all(dwell > 0.0)
+    assert np.all(np.diff(stamp) > 0)
+    assert not after_gap.any()
+    # Stamps are middles: weighted by the dwell their mean is the middle of the whole.
+    off_middle_ns = (stamp - stamps[0]) @ dwell / dwell.sum() - 0.5 * span
+    assert abs(off_middle_ns) < 1.0
+    # Velocity times dwell, put end to end, is the way from the first pose to the last.
+    way = (velocity * dwell[:, np.newaxis]).sum(axis=0)
+    assert np.allclose(way, positions[-1] - positions[0], rtol=0, atol=1e-12)
+    # At the middle of each sub-step, which is stamped to the nanosecond: on the straight line,
+    # evenly turned.
+    at = stamp * 1e-9
+    for axis in range(3):
+        expected = np.interp(at, stamps * 1e-9, positions[:, axis])
+        assert np.allclose(position[:, axis], expected, rtol=0, atol=1e-7)
+    expected = Slerp(stamps * 1e-9, Rotation.from_quat(quaternions))(at)
+    off = expected.inv() * Rotation.from_matrix(rotation)
+    assert off.magnitude().max() < 1e-6
+
+
+@given(seed=st.integers(0, 2**32 - 1), max_step_m=st.floats(0.001, 0.02))
+def test_no_sub_step_goes_further_than_allowed(seed, max_step_m):
+    stamps, positions, quaternions, _ = random_motion(seed)
+    _, dwell, _, rotation, velocity, _ = split(
+        stamps, positions, quaternions, max_step_m=max_step_m
+    )
+    travel = dwell * np.linalg.norm(velocity, axis=1)
+    assert travel.max() <= max_step_m * (1 + 1e-9)
+    turned = Rotation.from_matrix(rotation[:-1]).inv() * Rotation.from_matrix(rotation[1:])
+    # Middles of neighbours may be one sub-step apart in all.
+    assert (turned.magnitude() * LEVER_M).max() <= max_step_m * (1 + 1e-6)
+
+
+def test_a_turn_on_the_spot_is_cut_too():
+    turn = Rotation.from_euler('x', [0.0, 0.4])
+    _, dwell, *_ = split([0, 10_000_000], np.zeros((2, 3)), turn.as_quat())
+    assert len(dwell) == np.ceil(LEVER_M * 0.4 / STEP_M)
+
+
+def test_a_gap_gives_nothing_and_is_told():
+    stamps = [0, 10_000_000, 10_000_000 + GAP_NS + 1, 20_000_000 + GAP_NS + 1]
+    positions = [[0, 0, 0], [0.001, 0, 0], [0.5, 0, 0], [0.501, 0, 0]]
+    stamp, dwell, *_, after_gap = split(stamps, positions, np.tile([0, 0, 0, 1.0], (4, 1)))
+    assert dwell.sum() == pytest.approx(0.02)
+    assert after_gap.tolist() == [False, True]
+    assert np.all((stamp < stamps[1]) | (stamp > stamps[2]))
+
+
+def test_an_interval_as_long_as_the_limit_is_no_gap():
+    _, dwell, *_ = split([0, GAP_NS], np.zeros((2, 3)), np.tile([0, 0, 0, 1.0], (2, 1)))
+    assert dwell.sum() == pytest.approx(0.25)
+
+
+@pytest.mark.parametrize('cut_ns', [1, 3_141_592, 9_999_999])
+def test_a_cut_splits_the_time_exactly(cut_ns):
+    positions = np.array([[0, 0, 0], [0.03, 0, 0]])
+    stamp, dwell, *_ = split([0, 10_000_000], positions, np.tile([0, 0, 0, 1.0], (2, 1)), [cut_ns])
+    before = stamp < cut_ns
+    assert dwell[before].sum() == pytest.approx(cut_ns * 1e-9, rel=1e-12)
+    assert dwell[~before].sum() == pytest.approx((10_000_000 - cut_ns) * 1e-9, rel=1e-12)
+
+
+def test_a_cut_at_a_pose_cuts_nothing():
+    positions = np.array([[0, 0, 0], [0.001, 0, 0], [0.002, 0, 0]])
+    quaternions = np.tile([0, 0, 0, 1.0], (3, 1))
+    whole = split([0, 10, 20], positions, quaternions)
+    cut = split([0, 10, 20], positions, quaternions, [0, 10, 20])
+    assert all(np.array_equal(a, b) for a, b in zip(whole, cut, strict=True))
+
+
+@pytest.mark.parametrize('away_m', [1e3, 1e30, 1e300])
+def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
+    positions = np.array([[0, 0, 0], [away_m, 0, 0], [0.001, 0, 0]])
+    stamp, dwell, *_ = split([0, 10, 20], positions, np.tile([0, 0, 0, 1.0], (3, 1)))
+    assert len(stamp) == 2 * MOST_SUB_STEPS
+    assert dwell.sum() == pytest.approx(20e-9)

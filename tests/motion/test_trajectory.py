@@ -1,0 +1,43 @@
+"""A recording says what it lacks."""
+
+import numpy as np
+import pytest
+
+import scenes
+from paint_deposition.errors import RecordingError
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.motion.trigger import relative_flow
+
+
+def test_duration_and_length():
+    trajectory = scenes.straight_pass([0.0, 0.5, 2.0])
+    assert len(trajectory) == 3
+    assert trajectory.duration_s == 2.0
+    empty = Trajectory(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 4)))
+    assert empty.duration_s == 0.0
+
+
+def test_shapes_must_match():
+    stamps = np.arange(3, dtype=np.int64)
+    with pytest.raises(RecordingError, match=r'3 stamps .*positions \(2, 3\)'):
+        Trajectory(stamps, np.zeros((2, 3)), np.zeros((3, 4)))
+    with pytest.raises(RecordingError, match='2 trigger stamps go with 1 flow'):
+        Trajectory(stamps, np.zeros((3, 3)), np.zeros((3, 4)), '', np.arange(2), np.array([1.0]))
+
+
+def test_counts_by_name_with_their_sum():
+    counts = PoseCounts(received=9, repeated_stamps=1, backward_stamps=2, not_finite=3)
+    counts.not_unit_quaternions = 1
+    named = counts.as_dict()
+    assert named['rejected'] == counts.rejected == 7
+    assert named['received'] == 9
+    assert named['restarts'] == 0
+
+
+def test_relative_flow():
+    assert relative_flow(False, 0.9) == 0.0
+    assert relative_flow(True) == 1.0
+    assert relative_flow(True, 0.9) == 0.9
+    for wrong in (-0.1, float('inf')):
+        with pytest.raises(RecordingError, match='flow is'):
+            relative_flow(True, wrong)

@@ -1,0 +1,172 @@
+"""A small paint cell for tests: a panel, a motion over it, the robot and those who look on."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from paint_msgs.msg import AtomizerState
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.serialization import deserialize_message
+
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.messages import to_time
+
+START_NS = 1_760_000_000_000_000_000
+# The tool's z axis along +y, toward a panel that looks to -y.
+FACING_PANEL = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
+PANEL_M = 0.8
+TWO_PASSES_POSES = 600
+# A user's effect whose code is new for every number, so that no cache has it compiled.
+OWN_EFFECT = """
+from paint_deposition.effects.base import Effect, parameter
+
+class Own(Effect):
+    id = 'own'
+    family = 'incidence'
+    gain: float = parameter(0.0, low=-1.0, high=1.0, typical=0.1, unit='1', description='g')
+
+    @staticmethod
+    def flux_factor(ray, gain):
+        return 1.0 + gain * ray.cos_incidence + {unique!r} * (1.0 - ray.cos_incidence)
+"""
+
+
+def write_panel(path: Path, reverse: bool = False) -> Path:
+    """A square that stands in x-z and looks to -y, as STL."""
+    half = PANEL_M / 2
+    corners = [[-half, 0, -half], [half, 0, -half], [half, 0, half], [-half, 0, half]]
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    trimesh.Trimesh(corners, faces[:, ::-1] if reverse else faces, process=False).export(path)
+    return path
+
+
+def two_passes(poses: int = TWO_PASSES_POSES, trigger: bool = True) -> Trajectory:
+    """There at the height of 0.1 m and back at -0.1 m, 250 Hz; the gun is off at the turn."""
+    share = np.linspace(0.0, 1.0, poses)
+    across = np.interp(share, [0.0, 0.45, 0.55, 1.0], [-0.5, 0.5, 0.5, -0.5])
+    height = np.interp(share, [0.45, 0.55], [0.1, -0.1])
+    stamps = START_NS + 4_000_000 * np.arange(poses)
+    switched_s = 0.004 * poses * np.array([0.02, 0.441, 0.561])
+    return Trajectory(
+        stamps_ns=stamps,
+        positions_m=np.stack([across, np.full(poses, -0.25), height], axis=1),
+        quaternions_xyzw=np.tile(FACING_PANEL, (poses, 1)),
+        frame_id='part',
+        trigger_stamps_ns=START_NS + np.round(switched_s * 1e9).astype(np.int64)
+        if trigger
+        else np.empty(0, dtype=np.int64),
+        trigger_flow=np.array([1.0, 0.0, 1.0]) if trigger else np.empty(0),
+    )
+
+
+def offline_um(
+    node, trajectory: Trajectory, model: DepositionModel | None = None, precision: str = 'single'
+) -> np.ndarray:
+    """The film that an offline run has at the node's points."""
+    model = model or DepositionModel()
+    path, _ = spray_path(
+        trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
+    )
+    integrator = FilmIntegrator(node.points, model, precision, node.surface.occluder)
+    integrator.add(path)
+    return integrator.film_um
+
+
+def parameters(**values: object) -> list[Parameter]:
+    """Parameter overrides by name."""
+    return [Parameter(name, value=value) for name, value in values.items()]
+
+
+class Robot(Node):
+    """Publishes poses and states as a cell would."""
+
+    def __init__(self, context, reliable: bool = True, **options) -> None:
+        super().__init__('robot', context=context, **options)
+        profile = QoSProfile(depth=2000)
+        if not reliable:
+            profile.reliability = ReliabilityPolicy.BEST_EFFORT
+        self.pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+
+    def is_heard_by(self, *nodes: Node) -> bool:
+        """Both sides know of each other: what is sent from now on arrives."""
+        topics = [
+            publisher.topic_name for publisher in (self.pose_publisher, self.state_publisher)
+        ]
+        inputs = [s for node in nodes for s in node.subscriptions if s.topic_name in topics]
+        return all(s.get_publisher_count() for s in inputs) and all(
+            publisher.get_subscription_count() >= len(nodes)
+            for publisher in (self.pose_publisher, self.state_publisher)
+        )
+
+    def send_pose(self, stamp_ns, position, quaternion, frame_id: str = 'part') -> None:
+        message = PoseStamped()
+        message.header.frame_id = frame_id
+        message.header.stamp = to_time(stamp_ns)
+        p, q = message.pose.position, message.pose.orientation
+        p.x, p.y, p.z = map(float, position)
+        q.x, q.y, q.z, q.w = map(float, quaternion)
+        self.pose_publisher.publish(message)
+
+    def send_state(self, stamp_ns, flow: float) -> None:
+        message = AtomizerState(spraying=bool(flow > 0.0), flow=float(flow))
+        message.header.stamp = to_time(stamp_ns)
+        self.state_publisher.publish(message)
+
+    def send(self, trajectory: Trajectory, rows: slice = slice(None), frame_id='part') -> None:
+        """Poses, and each state before the first pose that is newer."""
+        changes = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
+        for row in np.arange(len(trajectory))[rows]:
+            stamp = trajectory.stamps_ns[row]
+            before = trajectory.stamps_ns[row - 1] if row else 0
+            for changed_ns, flow in changes:
+                if before < changed_ns <= stamp:
+                    self.send_state(changed_ns, flow)
+            self.send_pose(
+                stamp, trajectory.positions_m[row], trajectory.quaternions_xyzw[row], frame_id
+            )
+
+
+class Onlooker(Node):
+    """Subscribes to topics and keeps the bytes of all that it hears; decoding is for later."""
+
+    def __init__(self, context, topics: dict[str, tuple[type, QoSProfile]], **options) -> None:
+        super().__init__('onlooker', context=context, **options)
+        self.types = {topic: message for topic, (message, _) in topics.items()}
+        self.heard: dict[str, list[bytes]] = {topic: [] for topic in topics}
+        for topic, (message, profile) in topics.items():
+            self.create_subscription(message, topic, self.heard[topic].append, profile, raw=True)
+
+    def newest(self, topic: str):
+        """The last message of a topic, None if there was none."""
+        heard = self.heard[topic]
+        return deserialize_message(heard[-1], self.types[topic]) if heard else None
+
+    def first(self, topic: str):
+        """The first message of a topic."""
+        return deserialize_message(self.heard[topic][0], self.types[topic])
+
+    def status(self, name: str):
+        """The last DiagnosticStatus of a task, None if there was none."""
+        for data in reversed(self.heard['/diagnostics']):
+            for status in deserialize_message(data, DiagnosticArray).status:
+                if status.name == name:
+                    return status
+        return None
+
+
+DIAGNOSTICS = {'/diagnostics': (DiagnosticArray, QoSProfile(depth=100))}
+
+
+def values_of(status) -> dict[str, str]:
+    """Key-values of a DiagnosticStatus."""
+    return {value.key: value.value for value in status.values}

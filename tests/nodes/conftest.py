@@ -1,0 +1,87 @@
+"""Nodes of a small paint cell, spinning."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+
+@pytest.fixture
+def simulator(ros_context, spin, tmp_path):
+    """`simulator(**parameters)`: a simulator of the panel that runs."""
+    from nodes.cell import parameters, write_panel
+    from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+
+    def simulator(**values) -> DepositionSimulator:
+        chosen = {
+            'mesh_file': str(write_panel(tmp_path / 'panel.stl')),
+            'max_edge_length_m': 0.05,
+            'publish_rate_hz': 10.0,
+            'pose_queue_depth': 1000,
+            'output_directory': str(tmp_path / 'films'),
+        } | values
+        node = DepositionSimulator(context=ros_context, parameter_overrides=parameters(**chosen))
+        spin(node)
+        return node
+
+    return simulator
+
+
+@pytest.fixture
+def robot(ros_context, spin, wait_until):
+    """`robot(*nodes)`: a robot that these nodes hear."""
+    from nodes.cell import Robot
+
+    def robot(*nodes) -> Robot:
+        robot = Robot(ros_context)
+        spin(robot)
+        wait_until(lambda: robot.is_heard_by(*nodes), what='discovery of the simulator')
+        return robot
+
+    return robot
+
+
+@pytest.fixture
+def onlooker(ros_context, spin):
+    """`onlooker({topic: (type, QoS)})`: a node that keeps what it hears."""
+    from nodes.cell import Onlooker
+
+    def onlooker(topics) -> Onlooker:
+        node = Onlooker(ros_context, topics)
+        spin(node)
+        return node
+
+    return onlooker
+
+
+@pytest.fixture
+def call(wait_until):
+    """`call(node, type, name, request)`: the response of a service."""
+
+    def call(node, service, name, request):
+        client = node.create_client(service, name)
+        wait_until(client.service_is_ready, what=f'service {name}')
+        future = client.call_async(request)
+        wait_until(future.done, what=f'answer of {name}', timeout_s=30.0)
+        return future.result()
+
+    return call
+
+
+@pytest.fixture
+def painted(wait_until):
+    """`painted(node, count)`: wait until so many poses were painted; the film in micrometres.
+
+    By default all poses of `two_passes()`.
+    """
+    from nodes.cell import TWO_PASSES_POSES
+
+    def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:
+        wait_until(
+            lambda: node.film.counts.received >= count,
+            timeout_s=30.0,
+            what=f'{count} poses painted',
+        )
+        return node.film.up_to_date().film_um
+
+    return painted

@@ -1,0 +1,73 @@
+"""Nodes as processes of their own, for what only a process shows: signals and exit codes."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+
+class NodeProcess:
+    """`module`'s main() in a new process; `parameters` go on its command line.
+
+    Output goes to `<log>.out` and `<log>.err`. Use as a context manager: it is killed at the end.
+    """
+
+    def __init__(
+        self,
+        log: Path,
+        module: str,
+        *,
+        code: str = '',
+        ros_arguments: tuple[str, ...] = (),
+        **parameters: object,
+    ) -> None:
+        self._out, self._err = log.with_suffix('.out'), log.with_suffix('.err')
+        program = code or f'import sys; from {module} import main; sys.exit(main())'
+        arguments = [
+            part
+            for name, value in parameters.items()
+            for part in ('-p', f'{name}:={str(value).lower() if value is True else value}')
+        ]
+        with self._out.open('wb') as out, self._err.open('wb') as err:
+            self._process = subprocess.Popen(
+                [sys.executable, '-c', program, '--ros-args', *arguments, *ros_arguments],
+                stdout=out,
+                stderr=err,
+                env=os.environ | {'PYTHONUNBUFFERED': '1'},
+                cwd=log.parent,
+            )
+
+    @property
+    def out(self) -> str:
+        return self._out.read_text()
+
+    @property
+    def err(self) -> str:
+        return self._err.read_text()
+
+    @property
+    def exit_code(self) -> int | None:
+        return self._process.poll()
+
+    def wait(self, timeout_s: float = 20.0) -> int:
+        return self._process.wait(timeout_s)
+
+    def interrupt_as_launch_does(self) -> None:
+        """Ctrl-C under `ros2 launch`: one SIGINT from the terminal, and one from launch."""
+        self._process.send_signal(signal.SIGINT)
+        self._process.send_signal(signal.SIGINT)
+
+    def terminate(self) -> None:
+        self._process.terminate()
+
+    def kill(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+    def __enter__(self) -> 'NodeProcess':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._process.poll() is None:
+            self.kill()

@@ -1,0 +1,128 @@
+"""The live film over real DDS."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from visualization_msgs.msg import Marker
+
+from nodes.cell import (
+    offline_um,
+    parameters,
+    two_passes,
+    write_panel,
+)
+from nodes.processes import NodeProcess
+from paint_deposition.errors import PaintError
+from paint_deposition.formats.bags import write_pose_bag
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+
+MOTION = two_passes()
+
+
+def test_the_film_is_that_of_the_offline_run(simulator, robot, painted):
+    node = simulator()
+    robot(node).send(MOTION)
+    film = painted(node)
+    exact = offline_um(node, MOTION, precision='double')
+    assert exact.max() > 5.0
+    assert np.abs(film - exact).max() < 1e-6 * exact.max()
+    assert np.array_equal(film, offline_um(node, MOTION))
+
+
+def test_the_rate_at_which_poses_come_changes_no_bit(simulator, robot, painted):
+    node = simulator()
+    source = robot(node)
+    source.send(MOTION)
+    at_once = painted(node)
+    node.reset()
+    for start in range(0, len(MOTION), 37):
+        source.send(MOTION, slice(start, start + 37))
+        film = painted(node, min(start + 37, len(MOTION)))
+    assert np.array_equal(film, at_once)
+
+
+def test_without_any_state_the_gun_always_sprays(simulator, robot, painted):
+    motion = two_passes(trigger=False)
+    node = simulator()
+    robot(node).send(motion)
+    assert np.array_equal(painted(node), offline_um(node, motion))
+
+
+def test_a_state_that_comes_after_poses_of_its_time_still_cuts_there(simulator, robot, painted):
+    node = simulator()
+    source = robot(node)
+    changes = zip(MOTION.trigger_stamps_ns, MOTION.trigger_flow, strict=True)
+    sent = 0
+    for stamp, flow in changes:
+        upto = int(np.searchsorted(MOTION.stamps_ns, stamp + 60_000_000))
+        poses = two_passes(trigger=False)
+        source.send(poses, slice(sent, upto))
+        painted(node, upto)
+        source.send_state(stamp, flow)
+        sent = upto
+    source.send(two_passes(trigger=False), slice(sent, None))
+    assert np.array_equal(painted(node), offline_um(node, MOTION))
+    assert node.film.counts.late_triggers == 0
+
+
+def test_a_skin_turned_inside_out_is_painted_all_the_same(simulator, robot, painted, tmp_path):
+    right = simulator()
+    wrong = simulator(mesh_file=str(write_panel(tmp_path / 'reversed.stl', reverse=True)))
+    robot(right, wrong).send(MOTION)
+    film = painted(right)
+    painted(wrong)
+    wrong.up_to_date()
+    assert wrong.film.up_to_date().film_um.sum() == pytest.approx(film.sum(), rel=1e-5)
+    assert any('turned round' in note for note in wrong.surface.notes)
+    assert np.array_equal(wrong.surface.normals, np.tile([0, -1, 0], (len(film), 1)))
+
+
+def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wait_until,
+                                                         tmp_path):  # fmt: skip
+    """100,000 triangles go out five times a second, to a subscriber, while poses come."""
+    node = simulator(max_edge_length_m=0.0045, publish_rate_hz=5.0, pose_queue_depth=500)
+    assert len(node.surface.faces) > 100_000
+    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+    motion = two_passes(poses=1500, trigger=False)
+    bag = write_pose_bag(tmp_path / 'motion', motion)
+    player = 'paint_deposition.nodes.bag_player'
+    with NodeProcess(tmp_path / 'player', player, bag=bag) as replay:
+        wait_until(lambda: node.input.poses_received, timeout_s=20.0, what='the first pose')
+        began_s = time.monotonic()
+        wait_until(lambda: replay.exit_code is not None, timeout_s=30.0, what='the replay')
+        lasted_s = time.monotonic() - began_s
+    node.up_to_date()
+    assert node.film.counts.received == len(motion)
+    assert node.film.counts.rejected == 0
+    assert node.input.intervals.long == 0
+    # The replay took six seconds; every publication reached the subscriber, as 12 MB each.
+    meshes = viewer.heard['thickness/mesh']
+    assert len(meshes) > 0.7 * 5.0 * min(lasted_s, 6.0)
+    assert min(map(len, meshes)) > 120 * 100_000
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'mesh_file': ''}, 'mesh_file is empty'),
+        ({'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
+        ({'model_file': 'nowhere.yaml'}, 'nowhere.yaml: no such file'),
+        ({'color_min_um': 5.0, 'color_max_um': 5.0}, 'color_min_um 5 is not below'),
+        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'part_parent_frame'),
+        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]}, 'unit quaternion'),
+        ({'down': [0.0, 0.0, 0.0]}, 'not all zero'),
+        ({'mesh_fil': 'x'}, 'did you mean mesh_file'),
+    ],
+)
+def test_bad_input_is_one_line(ros_context, tmp_path, values, words):
+    chosen = {'mesh_file': str(write_panel(tmp_path / 'panel.stl'))} | values
+    with pytest.raises(PaintError, match=words) as caught:
+        DepositionSimulator(context=ros_context, parameter_overrides=parameters(**chosen))
+    assert '\n' not in str(caught.value)

@@ -1,0 +1,36 @@
+"""Diagnostics over real DDS."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.node import Node
+
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.diagnostics import OK, WARN, Diagnostics, Status
+
+
+def test_every_task_reports_each_period(ros_context, spin, wait_until):
+    node = Node('painter', context=ros_context, namespace='cell1')
+    calls = []
+
+    def gun() -> Status:
+        calls.append(1)
+        return Status(WARN, f'call {len(calls)}', {'poses': 3, 'gap s': 0.5})
+
+    Diagnostics(node, {'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
+    listener = Node('listener', context=ros_context)
+    got = []
+    listener.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
+    spin(node, listener)
+    wait_until(lambda: len(got) >= 3, what='diagnostics')
+    first, later = got[0], got[2]
+    gun_status, mesh_status = first.status
+    assert gun_status.name == 'painter: gun'
+    assert mesh_status.name == 'painter: mesh'
+    assert (gun_status.level, mesh_status.level) == (b'\x01', b'\x00')
+    assert gun_status.hardware_id == '/cell1/painter'
+    assert [(v.key, v.value) for v in gun_status.values] == [('poses', '3'), ('gap s', '0.5')]
+    assert first.header.stamp.sec > 0
+    assert later.status[0].message != gun_status.message

@@ -1,0 +1,175 @@
+"""The index planner over real DDS."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from nav_msgs.msg import Path
+from paint_msgs.srv import RecommendIndex
+from rclpy.node import Node
+
+from nodes.cell import DIAGNOSTICS, PANEL_M, Onlooker, parameters, values_of, write_panel
+from nodes.processes import NodeProcess
+from paint_deposition.errors import PaintError
+from paint_deposition.formats.model_file import write_model
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.recommendation import recommend
+
+NARROW = DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
+
+
+@pytest.fixture
+def planner(ros_context, spin):
+    """`planner(**parameters)`: an index planner that runs."""
+
+    def planner(**values) -> IndexPlanner:
+        node = IndexPlanner(context=ros_context, parameter_overrides=parameters(**values))
+        spin(node)
+        return node
+
+    return planner
+
+
+@pytest.fixture
+def ask(ros_context, spin, wait_until):
+    """`ask(**request)`: what the service answers."""
+    user = Node('user', context=ros_context)
+    client = user.create_client(RecommendIndex, 'recommend_index')
+    spin(user)
+
+    def ask(**request) -> RecommendIndex.Response:
+        wait_until(client.service_is_ready, what='discovery of recommend_index')
+        future = client.call_async(RecommendIndex.Request(**request))
+        wait_until(future.done, what='the answer')
+        return future.result()
+
+    return ask
+
+
+def test_answer_is_the_recommendation(planner, ask):
+    planner()
+    answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
+    expected = recommend(DepositionModel(), Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
+    assert answer.success
+    assert answer.index_m == expected.index_m
+    assert answer.sigma_n == expected.sigma_n
+    assert list(answer.index_range_m) == [0.2, 0.8]
+    assert list(answer.window_high_m) == [high for _, high in expected.windows_m]
+    assert list(answer.minima_index_m) == [m.index_m for m in expected.minima]
+    assert (answer.passes, answer.travel) == (expected.passes, 'alternating')
+    assert answer.cycle_time_s == expected.cycle_time_s
+    assert answer.mean_um == expected.mean_um
+    np.testing.assert_array_equal(answer.curve_sigma_n, expected.curve.sigma_n)
+    assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]
+    assert 'keeps its orientation' in answer.message
+
+
+def test_what_was_not_asked_for_is_nan_or_zero(planner, ask):
+    planner()
+    answer = ask(speed_m_per_s=0.2, one_way=True)
+    assert answer.success
+    assert answer.travel == 'one_way'
+    assert answer.passes == 0
+    for name in ('tolerance', 'cycle_time_s', 'index_drift_low_m', 'standoff_drift_high_m'):
+        assert math.isnan(getattr(answer, name)), name
+
+
+def test_speed_follows_from_the_target(planner, ask):
+    planner()
+    answer = ask(target_um=20.0)
+    assert answer.mean_um == pytest.approx(20.0)
+    assert answer.speed_m_per_s == pytest.approx(1.9 / (20.0 * answer.index_m), rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ('request_', 'words'),
+    [
+        ({}, 'neither speed_m_per_s nor target_um'),
+        ({'speed_m_per_s': math.nan}, 'speed_m_per_s is nan'),
+        ({'speed_m_per_s': 0.2, 'tolerance': 1e-6}, 'the closest is'),
+    ],
+)
+def test_impossible_requests_say_why(planner, ask, request_, words):
+    node = planner()
+    answer = ask(**request_)
+    assert not answer.success
+    assert words in answer.message
+    assert '\n' not in answer.message
+    assert node._status().level == DiagnosticStatus.WARN
+
+
+def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path):
+    write_model(tmp_path / 'narrow.yaml', NARROW)
+    (tmp_path / 'broken.yaml').write_text('planar: {K9: 1}\n')
+    node = planner()
+    wide = ask(speed_m_per_s=0.2, tolerance=0.1).index_m
+    (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'narrow.yaml')))
+    assert result.successful
+    assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
+    (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'broken.yaml')))
+    assert not result.successful
+    assert 'K9' in result.reason
+    assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
+
+
+def test_gun_turns_is_a_parameter_and_is_told(planner, ask):
+    planner(gun_turns=True)
+    turned = ask(speed_m_per_s=0.2, tolerance=0.2)
+    assert 'gun turns' in turned.message
+    assert turned.sigma_n > ask(speed_m_per_s=0.2, tolerance=0.2, one_way=True).sigma_n
+
+
+def test_passes_are_planned_on_a_mesh_and_latched(
+    planner, ros_context, spin, wait_until, tmp_path
+):
+    mesh = write_panel(tmp_path / 'panel.stl')
+    planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
+    late = Onlooker(ros_context, {'planned_path': (Path, qos.LATCHED)})
+    spin(late)
+    wait_until(lambda: late.newest('planned_path'), what='the latched path')
+    path = late.newest('planned_path')
+    assert path.header.frame_id == 'panel'
+    at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
+    # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
+    np.testing.assert_allclose(at[:, 1], -0.25, atol=1e-6)
+    assert np.ptp(at[:, 0]) > PANEL_M + 0.4
+    stamps = [p.header.stamp.sec * 10**9 + p.header.stamp.nanosec for p in path.poses]
+    assert all(later > earlier for earlier, later in pairwise(stamps))
+
+
+def test_diagnostics_name_model_and_last_answer(planner, ask, ros_context, spin, wait_until):
+    planner()
+    onlooker = Onlooker(ros_context, DIAGNOSTICS)
+    spin(onlooker)
+    ask(speed_m_per_s=0.2)
+    name = 'index_planner: index'
+    wait_until(lambda: (s := onlooker.status(name)) and 'sigma_n' in s.message, what='diagnostics')
+    assert values_of(onlooker.status(name))['model'] == 'a 50 mm bell'
+
+
+@pytest.mark.parametrize(
+    'values',
+    [{'model_file': 'nowhere.yaml'}, {'mesh_file': 'nowhere.stl'}, {'direction': 'diagonal'}],
+)
+def test_bad_parameters_stop_the_node(ros_context, values):
+    with pytest.raises(PaintError):
+        IndexPlanner(context=ros_context, parameter_overrides=parameters(**values))
+
+
+def test_bad_model_ends_the_process_with_one_line_and_exit_code_2(ros_domain, tmp_path):
+    module = 'paint_deposition.nodes.index_planner'
+    with NodeProcess(tmp_path / 'planner', module, model_file='nowhere.yaml') as process:
+        assert process.wait() == 2
+        assert process.err.count('\n') == 1
+        assert 'nowhere.yaml' in process.err

@@ -1,0 +1,105 @@
+"""The nodes as processes: a bag is replayed, painted and saved, as in a cell."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.srv import SaveFilm
+from rcl_interfaces.srv import SetParameters
+from std_srvs.srv import Trigger
+
+from nodes.cell import OWN_EFFECT, Onlooker, parameters, two_passes, write_panel
+from nodes.processes import NodeProcess
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.bags import read_trajectory, write_pose_bag
+from paint_deposition.formats.meshes import read_mesh
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
+
+SIMULATOR = 'paint_deposition.nodes.deposition_simulator'
+COMPARISON = 'paint_deposition.nodes.model_comparison'
+PLAYER = 'paint_deposition.nodes.bag_player'
+EDGE_M = 0.03
+
+
+@pytest.fixture
+def call(ros_context, spin, wait_until):
+    """`call(type, name, request)`: the response of a service of another process."""
+    caller = Onlooker(ros_context, {})
+    spin(caller)
+
+    def call(service, name, request):
+        client = caller.create_client(service, name)
+        wait_until(client.service_is_ready, timeout_s=40.0, what=f'service {name}')
+        future = client.call_async(request)
+        wait_until(future.done, timeout_s=30.0, what=f'answer of {name}')
+        return future.result()
+
+    return call
+
+
+def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wait_until, tmp_path):
+    mesh = write_panel(tmp_path / 'panel.stl')
+    bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=1000))
+    simulator = NodeProcess(
+        tmp_path / 'simulator',
+        SIMULATOR,
+        mesh_file=mesh,
+        max_edge_length_m=EDGE_M,
+        output_directory=tmp_path,
+    )
+    with simulator:
+        for name, rate in (('fast', 0.0), ('double', 2.0)):
+            with NodeProcess(
+                tmp_path / name, PLAYER, bag=bag, state_topic='/atomizer/state', rate=rate
+            ) as player:
+                wait_until(lambda p=player: p.exit_code is not None, timeout_s=40.0, what=name)
+                assert player.exit_code == 0, player.err
+            saved = call(SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name=name))
+            assert saved.success, saved.message
+            assert call(Trigger, '/deposition_simulator/reset', Trigger.Request()).success
+        simulator.interrupt_as_launch_does()
+        assert simulator.wait() == 0, simulator.err
+    assert (tmp_path / 'fast.csv').read_bytes() == (tmp_path / 'double.csv').read_bytes()
+    live = np.loadtxt(tmp_path / 'fast.csv', delimiter=',', skiprows=1)
+    surface = read_mesh(mesh, 1.0, EDGE_M)
+    integrator = FilmIntegrator(surface.points(), DepositionModel(), 'double')
+    integrator.add(spray_path(read_trajectory(bag, None, '/atomizer/state'))[0])
+    offline = integrator.film_um
+    assert offline.max() > 5.0
+    assert np.abs(live[:, 3] - offline).max() < 1e-6 * offline.max()
+
+
+def test_ctrl_c_while_a_model_is_compiled_ends_it_at_once(ros_domain, call, tmp_path):
+    own = tmp_path / 'own.py'
+    own.write_text(OWN_EFFECT.format(unique=time.time() * 1e-20))
+    (tmp_path / 'own.yaml').write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
+    mesh = write_panel(tmp_path / 'panel.stl')
+    with NodeProcess(tmp_path / 'simulator', SIMULATOR, mesh_file=mesh) as simulator:
+        changes = parameters(model_file=str(tmp_path / 'own.yaml'))
+        request = SetParameters.Request(parameters=[p.to_parameter_msg() for p in changes])
+        answer = call(SetParameters, '/deposition_simulator/set_parameters', request)
+        assert answer.results[0].successful, answer.results[0].reason
+        simulator.interrupt_as_launch_does()
+        assert simulator.wait(timeout_s=5.0) == 0, simulator.err
+
+
+@pytest.mark.parametrize(
+    ('module', 'values', 'words'),
+    [
+        (SIMULATOR, {}, 'deposition_simulator: mesh_file is empty'),
+        (SIMULATOR, {'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
+        (COMPARISON, {'mesh_file': 'nowhere.stl'}, 'measurements_file is empty'),
+    ],
+)
+def test_bad_input_ends_the_process_with_one_line(ros_domain, tmp_path, module, values, words):
+    with NodeProcess(tmp_path / 'node', module, **values) as node:
+        assert node.wait() == 2
+        lines = node.err.splitlines()
+    assert len(lines) == 1
+    assert words in lines[0]

@@ -1,0 +1,106 @@
+"""Messages made of bytes and arrays are those that rclpy would have built."""
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point
+from rclpy.serialization import deserialize_message, serialize_message
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import ColorRGBA
+from visualization_msgs.msg import Marker
+
+from paint_deposition.nodes.messages import ColouredMesh, FilmCloud, FilmField, to_time
+from paint_deposition.pictures.colours import FILM_PALETTE
+
+STAMP_NS = 1_758_000_123_456_789_012
+
+
+def _marker(vertices_m, faces, frame_id, stamp_ns, rgba):
+    """The message the slow way."""
+    marker = Marker(ns='thickness', type=Marker.TRIANGLE_LIST)
+    marker.header.frame_id = frame_id
+    marker.header.stamp = to_time(stamp_ns)
+    marker.pose.orientation.w = 1.0
+    marker.scale.x = marker.scale.y = marker.scale.z = 1.0
+    marker.color = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
+    for vertex in faces.ravel():
+        x, y, z = vertices_m[vertex].tolist()
+        r, g, b, a = (rgba[vertex] / 255.0).tolist()
+        marker.points.append(Point(x=x, y=y, z=z))
+        marker.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
+    return marker
+
+
+@pytest.fixture
+def part(rng):
+    """Forty vertices and triangles on them in no order."""
+    return rng.normal(size=(40, 3)), rng.integers(0, 40, size=(57, 3))
+
+
+@pytest.fixture
+def rng():
+    """Numbers that are the same in every run."""
+    return np.random.default_rng(7)
+
+
+# Names of every length modulo 8: what comes behind them must keep its alignment.
+@pytest.mark.parametrize('frame_id', ['', 'p', 'pa', 'par', 'part', 'cell1/door', 'Tür'])
+@pytest.mark.parametrize('triangles', [1, 2, 57])
+def test_the_mesh_is_the_marker_that_rclpy_builds(part, rng, frame_id, triangles):
+    vertices, faces = part[0], part[1][:triangles]
+    mesh = ColouredMesh(vertices, faces, frame_id, 'thickness')
+    for stamp_ns in (0, STAMP_NS):
+        rows = rng.integers(0, len(FILM_PALETTE), size=len(vertices))
+        data = mesh.serialised(stamp_ns, FILM_PALETTE, rows)
+        expected = _marker(vertices, faces, frame_id, stamp_ns, FILM_PALETTE[rows])
+        received = deserialize_message(data, Marker)
+        assert received.header == expected.header
+        assert received.points == expected.points
+        for name in ('r', 'g', 'b', 'a'):
+            colours = [[getattr(c, name) for c in m.colors] for m in (received, expected)]
+            assert np.allclose(*colours, rtol=0, atol=1e-7)
+        expected.colors = received.colors
+        assert received == expected
+        # Padding may hold anything; there is none behind the header's name.
+        assert len(data) == len(serialize_message(expected))
+
+
+def test_serialised_bytes_stay_as_they_are(part):
+    vertices, faces = part
+    mesh = ColouredMesh(vertices, faces, 'part', 'thickness')
+    first = mesh.serialised(1, FILM_PALETTE, np.zeros(40, dtype=int))
+    copy = bytes(bytearray(first))
+    mesh.serialised(2, FILM_PALETTE, np.full(40, 200))
+    assert first == copy
+
+
+def test_the_cloud_has_points_and_film(part):
+    vertices = part[0]
+    film = np.linspace(0.0, 90.0, len(vertices))
+    cloud = FilmCloud(vertices, 'part')
+    cloud.message(1, np.zeros(len(vertices)))
+    received = deserialize_message(serialize_message(cloud.message(STAMP_NS, film)), PointCloud2)
+    assert received.header.frame_id == 'part'
+    assert received.header.stamp == to_time(STAMP_NS)
+    layout = np.dtype(
+        {
+            'names': [field.name for field in received.fields],
+            'formats': ['<f4'] * 4,
+            'offsets': [field.offset for field in received.fields],
+            'itemsize': received.point_step,
+        }
+    )
+    values = np.frombuffer(bytes(received.data), layout)
+    assert received.width * received.height == len(values) == len(vertices)
+    assert received.row_step == received.width * received.point_step
+    assert layout.names == ('x', 'y', 'z', 'thickness_um')
+    assert np.array_equal(values['y'], vertices[:, 1].astype(np.float32))
+    assert np.array_equal(values['thickness_um'], film.astype(np.float32))
+
+
+def test_the_field_has_one_value_a_vertex():
+    field = FilmField(3, 'abc', 'part')
+    message = field.message(STAMP_NS, np.array([0.0, 1.5, 2.5]))
+    received = deserialize_message(serialize_message(message), type(message))
+    assert received.mesh_id == 'abc'
+    assert received.header.stamp == to_time(STAMP_NS)
+    assert list(received.thickness_um) == [0.0, 1.5, 2.5]

@@ -1,0 +1,218 @@
+"""The live comparison with gauge readings over real DDS."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import ComparisonStats
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from nodes.cell import Onlooker, offline_um, parameters, two_passes, write_panel
+from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.errors import PaintError
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.meshes import read_mesh
+from paint_deposition.formats.model_file import write_model
+from paint_deposition.formats.tables import write_table
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.model_comparison import ModelComparison
+from paint_deposition.pictures.colours import BARE_RGB
+
+MOTION = two_passes()
+TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
+SIGMA_UM = 0.2
+
+
+@pytest.fixture
+def readings(tmp_path):
+    """A file of forty noisy readings of the true film, each place measured twice."""
+    rng = np.random.default_rng(11)
+    surface = read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
+    places = np.column_stack(
+        [rng.uniform(-0.25, 0.25, 20), np.zeros(20), rng.uniform(-0.25, 0.25, 20)]
+    )
+    integrator = FilmIntegrator(surface.at(places), TRUTH, 'double')
+    integrator.add(spray_path(MOTION)[0])
+    lines = [['x_m', 'y_m', 'z_m', 'thickness_um', 'point', 'sigma_um']]
+    for number, (place, film) in enumerate(zip(places, integrator.gauge_um, strict=True)):
+        for _ in range(2):
+            reading = film + rng.normal(scale=SIGMA_UM)
+            lines.append([*(f'{c:.6f}' for c in place), f'{reading:.4f}', number, SIGMA_UM])
+    path = tmp_path / 'readings.csv'
+    write_table(path, lines)
+    return path
+
+
+@pytest.fixture
+def comparison(ros_context, spin, readings, tmp_path):
+    """`comparison(**parameters)`: a comparison with the readings that runs."""
+
+    def comparison(**values) -> ModelComparison:
+        chosen = {
+            'mesh_file': str(tmp_path / 'panel.stl'),
+            'max_edge_length_m': 0.05,
+            'measurements_file': str(readings),
+            'publish_rate_hz': 10.0,
+            'pose_queue_depth': 1000,
+        } | values
+        node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
+        spin(node)
+        return node
+
+    return comparison
+
+
+@pytest.fixture
+def viewer(ros_context, spin):
+    """A node that looks at the comparison."""
+    node = Onlooker(
+        ros_context,
+        {
+            'comparison/stats': (ComparisonStats, qos.LATCHED),
+            'comparison/mesh': (Marker, qos.LATCHED),
+            'comparison/legend': (MarkerArray, qos.LATCHED),
+        },
+    )
+    spin(node)
+    return node
+
+
+def _true_model(tmp_path) -> str:
+    write_model(tmp_path / 'truth.yaml', TRUTH)
+    return str(tmp_path / 'truth.yaml')
+
+
+def _at(stamp) -> int:
+    return stamp.sec * 1_000_000_000 + stamp.nanosec
+
+
+def test_the_error_falls_to_the_noise_as_the_part_is_painted(
+    comparison, robot, viewer, wait_until, tmp_path
+):
+    node = comparison(model_file=_true_model(tmp_path))
+    source = robot(node)
+    errors = []
+    for start in range(0, len(MOTION), 200):
+        rows = slice(start, start + 200)
+        source.send(MOTION, rows)
+        newest = MOTION.stamps_ns[rows][-1]
+        wait_until(
+            lambda newest=newest: (
+                viewer.newest('comparison/stats')
+                and _at(viewer.newest('comparison/stats').header.stamp) == newest
+            )
+        )
+        errors.append(viewer.newest('comparison/stats').rmse_um)
+    before_any = viewer.first('comparison/stats')
+    measured = node._readings.thickness_um
+    assert before_any.rmse_um == pytest.approx(np.sqrt(np.mean(measured**2)))
+    assert before_any.readings_painted == 0
+    assert before_any.rmse_um > errors[0] > errors[1] > errors[2]
+    stats = viewer.newest('comparison/stats')
+    assert (stats.model, stats.readings, stats.readings_painted) == ('truth.yaml', 40, 40)
+    assert stats.rmse_um == pytest.approx(SIGMA_UM, rel=0.3)
+    assert stats.chi_square_per_reading == pytest.approx(1.0, abs=0.6)
+    assert stats.noise_floor_um == pytest.approx(SIGMA_UM)
+    assert abs(stats.worst_residual_um) < 5 * SIGMA_UM
+
+
+def test_a_better_model_set_at_run_time_lowers_the_error(
+    comparison, robot, viewer, wait_until, tmp_path
+):
+    node = comparison()
+    source = robot(node)
+    source.send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    node.publish()
+    wait_until(lambda: viewer.newest('comparison/stats').readings_painted == 40)
+    without = viewer.newest('comparison/stats')
+    assert without.model == 'default model'
+    assert without.rmse_um > 3 * SIGMA_UM
+    node.set_parameters(parameters(model_file=_true_model(tmp_path)))
+    wait_until(lambda: viewer.newest('comparison/stats').rmse_um < 1.5 * SIGMA_UM, timeout_s=60.0)
+    assert viewer.newest('comparison/stats').model == 'truth.yaml'
+
+
+def test_predictions_are_those_of_an_offline_run_in_double_precision(
+    comparison, robot, wait_until
+):
+    node = comparison()
+    robot(node).send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    offline = offline_um(node, MOTION, precision='double')
+    predicted = node.residuals().predicted_um
+    assert np.array_equal(predicted, np.repeat(offline[:20], 2))
+    assert np.allclose(
+        predicted + node.residuals().residual_um, node._readings.thickness_um, rtol=1e-14
+    )
+
+
+def test_the_skin_is_coloured_around_readings_and_grey_elsewhere(
+    comparison, robot, viewer, wait_until
+):
+    node = comparison(color_radius_m=0.06, color_max_um=5.0)
+    robot(node).send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    node.publish()
+    wait_until(
+        lambda: (
+            viewer.newest('comparison/mesh')
+            and _at(viewer.newest('comparison/mesh').header.stamp) == MOTION.stamps_ns[-1]
+        )
+    )
+    mesh = viewer.newest('comparison/mesh')
+    colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
+    corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
+    places = node._readings.positions_m
+    distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
+    grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
+    assert grey[distance > 0.0601].all()
+    assert not grey[distance < 0.0599].any()
+    texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
+    assert (texts[0], texts[-1]) == ('-5 um', '5 um')
+
+
+def test_compare_says_it_in_a_line(comparison, robot, viewer, wait_until):
+    node = comparison()
+    robot(node).send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    client = viewer.create_client(Trigger, '/model_comparison/compare')
+    wait_until(client.service_is_ready)
+    future = client.call_async(Trigger.Request())
+    wait_until(future.done)
+    answer = future.result()
+    assert answer.success
+    assert '\n' not in answer.message
+    assert f'rms {node.residuals().rmse_um:.2f} um' in answer.message
+    assert '40 readings, 40 where' in answer.message
+
+
+def test_unknown_noise_is_said_to_be_unknown(comparison, viewer, wait_until, tmp_path):
+    few = tmp_path / 'few.csv'
+    write_table(few, [['x_m', 'y_m', 'z_m', 'thickness_um'], ['0', '0', '0', '12']])
+    comparison(measurements_file=str(few))
+    wait_until(lambda: viewer.newest('comparison/stats'))
+    assert math.isnan(viewer.newest('comparison/stats').noise_floor_um)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [
+        ({'measurements_file': ''}, 'measurements_file is empty'),
+        ({'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
+        ({'mesh_file': ''}, 'mesh_file is empty'),
+        ({'mesh_scale': 0.01}, "lie off the part's skin"),
+    ],
+)
+def test_bad_input_is_one_line(comparison, values, words):
+    with pytest.raises(PaintError, match=words) as caught:
+        comparison(**values)
+    assert '\n' not in str(caught.value)

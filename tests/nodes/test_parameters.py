@@ -1,0 +1,139 @@
+"""Parameter tables on real nodes: types, ranges, and the line a user gets for a wrong one."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rcl_interfaces.msg import ParameterType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from paint_deposition.errors import PaintError
+from paint_deposition.nodes.bag_player import BagPlayer
+from paint_deposition.nodes.parameters import NodeParameter, declare_parameters
+from paint_deposition.nodes.run_recorder import RunRecorder
+
+TABLE = (
+    NodeParameter('rate_hz', 2.0, 'Rate [Hz]', low=0.1, high=100.0),
+    NodeParameter('target_um', 0.0, 'Target film, 0: none [um]', low=0.0),
+    NodeParameter('queue_depth', 500, 'Queue [messages]', low=1),
+    NodeParameter('mesh_file', '', 'Mesh [path]', read_only=True),
+    NodeParameter('compression', 'zstd', 'Compression [name]', choices=('zstd', 'none')),
+    NodeParameter('topics', [], 'Topics [names]', element=str, read_only=True),
+    NodeParameter('down', [0.0, 0.0, -1.0], 'Gravity [1]'),
+    NodeParameter(
+        'odd', 1, 'Odd number [1]', constraints='an odd number', allows=lambda value: value % 2
+    ),
+)
+
+
+@pytest.fixture
+def declared(ros_context, executor):
+    """`declared(name=value, ...)`: a node with the table under these overrides, and its values."""
+
+    def declared(**overrides):
+        node = Node(
+            'tester',
+            context=ros_context,
+            parameter_overrides=[
+                Parameter(name, value=value) for name, value in overrides.items()
+            ],
+        )
+        executor.add_node(node)
+        return node, declare_parameters(node, TABLE)
+
+    return declared
+
+
+def test_defaults_keep_their_types(declared):
+    node, values = declared()
+    assert values == {row.name: row.default for row in TABLE}
+    kinds = {name: node.describe_parameter(name).type for name in values}
+    assert kinds['rate_hz'] == ParameterType.PARAMETER_DOUBLE
+    assert kinds['queue_depth'] == ParameterType.PARAMETER_INTEGER
+    assert kinds['topics'] == ParameterType.PARAMETER_STRING_ARRAY
+    assert kinds['down'] == ParameterType.PARAMETER_DOUBLE_ARRAY
+
+
+def test_whole_numbers_serve_as_floats(declared):
+    _, values = declared(rate_hz=3, down=[0, -1, 0])
+    assert (values['rate_hz'], values['down']) == (3.0, [0.0, -1.0, 0.0])
+    assert isinstance(values['rate_hz'], float)
+
+
+def test_lists_of_text(declared):
+    node, values = declared(topics=['a', 'b'])
+    assert values['topics'] == ['a', 'b']
+    assert node.describe_parameter('topics').read_only
+
+
+@pytest.mark.parametrize(
+    ('overrides', 'line'),
+    [
+        ({'rate_hz': 200.0}, 'tester: rate_hz is 200.0: must be at least 0.1 and at most 100.0'),
+        ({'target_um': -1.0}, 'tester: target_um is -1.0: must be at least 0.0'),
+        ({'queue_depth': 0}, 'tester: queue_depth is 0: must be at least 1'),
+        ({'rate_hz': float('nan')}, 'tester: rate_hz is nan: give a finite number'),
+        ({'target_um': float('inf')}, 'tester: target_um is inf: give a finite number'),
+        ({'rate_hz': 'fast'}, "tester: rate_hz is 'fast': give a number"),
+        ({'queue_depth': 2.5}, 'tester: queue_depth is 2.5: give a whole number'),
+        ({'mesh_file': 7}, 'tester: mesh_file is 7: give text'),
+        ({'topics': [1, 2]}, 'tester: topics is [1, 2]: give a list of texts'),
+        ({'compression': 'zip'}, "tester: compression is 'zip': choose one of zstd, none"),
+        ({'odd': 2}, 'tester: odd is 2: must be an odd number'),
+        ({'mesh_fil': 'x'}, 'tester has no parameter mesh_fil; did you mean mesh_file?'),
+        ({'speed': 1.0}, 'tester has no parameter speed; did you mean'),
+    ],
+)
+def test_the_line_for_a_wrong_override(declared, overrides, line):
+    with pytest.raises(PaintError) as refused:
+        declared(**overrides)
+    assert str(refused.value).startswith(line)
+    assert '\n' not in str(refused.value)
+
+
+@pytest.mark.parametrize(
+    ('name', 'value', 'reason'),
+    [
+        ('rate_hz', 1e3, 'out of range'),
+        ('rate_hz', float('nan'), 'rate_hz'),
+        ('compression', 'zip', 'choose one of zstd, none'),
+        ('odd', 4, 'must be an odd number'),
+        ('mesh_file', 'other.stl', 'read-only'),
+        ('topics', ['a'], 'read-only'),
+        ('queue_depth', 'deep', 'Wrong parameter type'),
+    ],
+)
+def test_later_changes_are_checked_too(declared, name, value, reason):
+    node, values = declared()
+    (result,) = node.set_parameters([Parameter(name, value=value)])
+    assert not result.successful
+    assert reason in result.reason
+    assert node.get_parameter(name).value == values[name]
+
+
+def test_a_later_change_that_fits(declared):
+    node, _ = declared()
+    (result,) = node.set_parameters([Parameter('compression', value='none')])
+    assert result.successful
+
+
+def test_sim_time_and_qos_overrides_are_not_ours(declared):
+    declared(use_sim_time=False, **{'qos_overrides./tf.publisher.depth': 3})
+
+
+def test_what_parameter_describe_shows(declared):
+    node, _ = declared()
+    rate = node.describe_parameter('rate_hz')
+    assert rate.description == 'Rate [Hz]'
+    (bounds,) = rate.floating_point_range
+    assert (bounds.from_value, bounds.to_value) == (0.1, 100.0)
+    assert node.describe_parameter('odd').additional_constraints == 'an odd number'
+    assert node.describe_parameter('compression').additional_constraints == 'one of zstd, none'
+
+
+@pytest.mark.parametrize('node_class', [BagPlayer, RunRecorder])
+def test_every_description_states_a_unit(node_class):
+    for row in node_class.PARAMETERS:
+        assert row.description.endswith(']'), row.name
+        assert row.refusal(row.default) is None, row.name

@@ -1,0 +1,163 @@
+"""How node processes end: signals, errors, and what is finished before."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from nodes.processes import NodeProcess
+
+NODE = """
+import sys, time
+from pathlib import Path
+from paint_deposition.errors import PaintError
+from paint_deposition.nodes.parameters import NodeParameter
+from paint_deposition.nodes.shutdown import PaintNode, run_node
+
+
+class Worker(PaintNode):
+    PARAMETERS = (
+        NodeParameter('does', 'run', 'What it does [word]'),
+        NodeParameter('rate_hz', 1.0, 'Rate [Hz]', low=0.1),
+    )
+
+    def __init__(self, **kwargs):
+        super().__init__('worker', **kwargs)
+        if self.values['does'] == 'refuse':
+            raise PaintError('mesh none.stl does not exist; give a mesh')
+        if self.values['does'] == 'load':
+            print('loading', flush=True)
+            while True:
+                time.sleep(0.01)
+        self.create_timer(0.02, self.work)
+        print('ready', flush=True)
+
+    def work(self):
+        does = self.values['does']
+        if does == 'fail':
+            raise PaintError('the disk is full; empty it')
+        if does == 'crash':
+            raise ZeroDivisionError('never mind')
+        if does == 'finish':
+            self.finish(3)
+        if does == 'fail_later':
+            self.fail(PaintError('the bag is damaged; recover it'))
+        if does == 'work':
+            print('working', flush=True)
+            start = time.monotonic()
+            while time.monotonic() < start + 0.5:
+                pass
+            Path('worked').touch()
+
+    def close(self):
+        start = time.monotonic()
+        while time.monotonic() < start + 0.3:
+            pass
+        print('closed', flush=True)
+
+
+sys.exit(run_node(Worker))
+"""
+
+
+@pytest.fixture
+def worker(ros_domain, tmp_path):
+    """`worker(does)`: a process of the node above."""
+    started = []
+
+    def worker(does: str, **parameters) -> NodeProcess:
+        process = NodeProcess(tmp_path / does, '', code=NODE, does=does, **parameters)
+        started.append(process)
+        return process
+
+    yield worker
+    for process in started:
+        if process.exit_code is None:
+            process.kill()
+
+
+def one_line(text: str) -> str:
+    (line,) = text.strip().splitlines()
+    return line
+
+
+def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
+    process = worker('run')
+    wait_until(lambda: 'ready' in process.out, what='the node')
+    process.interrupt_as_launch_does()
+    # And once more while it finishes its files.
+    process.interrupt_as_launch_does()
+    assert process.wait() == 0
+    assert process.out.split() == ['ready', 'closed']
+    assert process.err == ''
+
+
+def test_terminate_ends_cleanly(worker, wait_until):
+    process = worker('run')
+    wait_until(lambda: 'ready' in process.out, what='the node')
+    process.terminate()
+    assert process.wait() == 0
+    assert process.out.split() == ['ready', 'closed']
+
+
+def test_a_callback_is_completed_first(worker, wait_until, tmp_path):
+    process = worker('work')
+    wait_until(lambda: 'working' in process.out, what='the callback')
+    process.interrupt_as_launch_does()
+    assert process.wait() == 0
+    assert (tmp_path / 'worked').exists()
+    assert process.out.split()[-1] == 'closed'
+
+
+def test_an_interrupt_while_loading(worker, wait_until):
+    process = worker('load')
+    wait_until(lambda: 'loading' in process.out, what='the node')
+    process.interrupt_as_launch_does()
+    assert process.wait() == 0
+    assert process.err == ''
+
+
+def test_bad_input_is_one_line_and_exit_code_2(worker):
+    process = worker('refuse')
+    assert process.wait() == 2
+    assert one_line(process.err) == 'error: mesh none.stl does not exist; give a mesh'
+
+
+def test_a_bad_parameter_is_one_line_and_exit_code_2(worker):
+    process = worker('run', rate_hz='0.0')
+    assert process.wait() == 2
+    assert one_line(process.err) == 'error: worker: rate_hz is 0.0: must be at least 0.1'
+
+
+def test_bad_ros_arguments_are_exit_code_2(ros_domain, tmp_path):
+    with NodeProcess(tmp_path / 'bad', '', code=NODE, ros_arguments=('-p', 'does')) as process:
+        assert process.wait() == 2
+        assert process.err.strip().splitlines()[-1].startswith('error: ')
+        assert 'Traceback' not in process.err
+
+
+def test_an_error_in_a_callback_closes_the_node(worker):
+    process = worker('fail')
+    assert process.wait() == 2
+    assert one_line(process.err) == 'error: the disk is full; empty it'
+    assert process.out.split() == ['ready', 'closed']
+
+
+def test_an_error_from_elsewhere_closes_the_node(worker):
+    process = worker('fail_later')
+    assert process.wait() == 2
+    assert one_line(process.err) == 'error: the bag is damaged; recover it'
+    assert process.out.split() == ['ready', 'closed']
+
+
+def test_a_defect_shows_its_traceback(worker):
+    process = worker('crash')
+    assert process.wait() == 1
+    assert 'ZeroDivisionError: never mind' in process.err
+    assert process.out.split() == ['ready', 'closed']
+
+
+def test_a_node_may_finish_by_itself(worker):
+    process = worker('finish')
+    assert process.wait() == 3
+    assert process.out.split() == ['ready', 'closed']
+    assert process.err == ''

@@ -1,0 +1,128 @@
+"""Services and parameters of the simulator."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import ThicknessField, ThicknessStats
+from paint_msgs.srv import SaveFilm
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import MarkerArray
+
+from nodes.cell import (
+    parameters,
+    two_passes,
+)
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+
+MOTION = two_passes()
+
+
+def test_reset_bares_the_metal(simulator, robot, painted, onlooker, call, wait_until):
+    node = simulator()
+    viewer = onlooker({'thickness/field': (ThicknessField, qos.RESULTS)})
+    source = robot(node)
+    source.send(MOTION)
+    first = painted(node)
+    wait_until(lambda: viewer.heard['thickness/field'])
+    answer = call(viewer, Trigger, '/deposition_simulator/reset', Trigger.Request())
+    assert answer.success
+    assert '600 poses' in answer.message
+    wait_until(lambda: max(viewer.newest('thickness/field').thickness_um) == 0.0)
+    assert node.film.counts.received == 0
+    source.send(MOTION)
+    assert np.array_equal(painted(node), first)
+
+
+def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painted, call, tmp_path):
+    node = simulator()
+    source = robot(node)
+    source.send(MOTION)
+    film = painted(node)
+    service = '/deposition_simulator/save_film'
+    answer = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
+    assert answer.success, answer.message
+    folder = tmp_path / 'films'
+    written = [folder / f'door_7.{kind}' for kind in ('ply', 'csv', 'json')]
+    assert list(answer.paths) == list(map(str, written))
+    table = np.genfromtxt(folder / 'door_7.csv', delimiter=',', names=True)
+    assert np.allclose(table['thickness_um'], film, rtol=1e-8, atol=1e-30)
+    mesh = trimesh.load_mesh(folder / 'door_7.ply', process=False)
+    assert np.array_equal(mesh.faces, node.surface.faces)
+    figures = json.loads((folder / 'door_7.json').read_text())
+    assert figures['mesh_id'] == node.mesh_id
+    assert figures['poses']['received'] == len(MOTION)
+    again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
+    assert not again.success
+    assert 'door_7.ply is there already' in again.message
+    assert list(again.paths) == []
+    for name in ('../up', 'a/b', '.hidden', 'a b'):
+        refused = call(source, SaveFilm, service, SaveFilm.Request(name=name))
+        assert not refused.success, name
+    chosen = call(source, SaveFilm, service, SaveFilm.Request())
+    assert chosen.success
+    assert len(list(folder.iterdir())) == 6
+
+
+@pytest.mark.parametrize(
+    ('values', 'reason'),
+    [
+        ({'mesh_file': 'other.stl'}, 'cannot change while the node runs: the film lies on this'),
+        ({'max_edge_length_m': 0.01}, 'the film lies on the refined mesh'),
+        ({'frame_id': 'other'}, 'in this frame'),
+        ({'pose_queue_depth': 10}, 'the subscriptions are made with it'),
+        ({'precision': 'double'}, 'was summed in it'),
+        ({'publish_rate_hz': 600.0}, 'out of range'),
+        ({'max_pose_gap_s': math.nan}, 'out of range'),
+        ({'color_min_um': 50.0}, 'color_min_um 50 is not below color_max_um 0'),
+        ({'model_file': 'none.yaml'}, 'none.yaml: no such file'),
+        ({'part_pose': [0.0, 1.0], 'part_parent_frame': 'cell'}, 'seven numbers'),
+        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'without part_parent_frame'),
+    ],
+)
+def test_changes_that_cannot_be_are_refused_with_the_reason(simulator, values, reason):
+    node = simulator()
+    before = {name: node.get_parameter(name).value for name in values}
+    result = node.set_parameters_atomically(parameters(**values))
+    assert not result.successful
+    assert reason in result.reason
+    assert '\n' not in result.reason
+    assert {name: node.get_parameter(name).value for name in values} == before
+
+
+def test_every_parameter_says_what_it_is_and_whether_it_can_change(simulator):
+    node = simulator()
+    for row in DepositionSimulator.PARAMETERS:
+        descriptor = node.describe_parameter(row.name)
+        assert len(descriptor.description) > 10, row.name
+        assert '[' in descriptor.description, row.name
+        assert descriptor.read_only == bool(row.fixed_because), row.name
+        if descriptor.read_only:
+            assert 'cannot change' in descriptor.additional_constraints
+
+
+def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, onlooker,
+                                                    wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(
+        {
+            'thickness/stats': (ThicknessStats, qos.LATCHED),
+            'thickness/legend': (MarkerArray, qos.LATCHED),
+        }
+    )
+    robot(node).send(MOTION)
+    painted(node)
+    changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=100.0)
+    assert all(result.successful for result in node.set_parameters(changes))
+    wait_until(lambda: viewer.newest('thickness/stats').within_target == 1.0)
+    wait_until(lambda: viewer.newest('thickness/legend').markers[-1].text == '25 um')
+    assert node.set_parameters(parameters(publish_rate_hz=1.0))[0].successful
+    assert node._show_timer.timer_period_ns == 1_000_000_000

@@ -1,0 +1,254 @@
+"""What the simulator publishes, and what it says of what comes in."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import Marker, MarkerArray
+
+from nodes.cell import (
+    DIAGNOSTICS,
+    Robot,
+    offline_um,
+    parameters,
+    two_passes,
+    values_of,
+    write_panel,
+)
+from paint_deposition.nodes import qos
+from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.pictures.colours import BARE_RGB, FILM_PALETTE
+
+MOTION = two_passes()
+POSES = 'deposition_simulator: poses'
+
+
+def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted, onlooker,
+                                                       wait_until):  # fmt: skip
+    node = simulator(color_min_um=0.0, color_max_um=40.0)
+    robot(node).send(MOTION)
+    film = painted(node)
+    node.publish()
+    late = onlooker(
+        {
+            'thickness/mesh': (Marker, qos.LATCHED),
+            'thickness/legend': (MarkerArray, qos.LATCHED),
+            'thickness/stats': (ThicknessStats, qos.LATCHED),
+            'thickness/field': (ThicknessField, qos.RESULTS),
+            'thickness/cloud': (PointCloud2, qos.RESULTS),
+        }
+    )
+    wait_until(lambda: all(late.heard.values()), what='all five topics')
+    mesh = late.newest('thickness/mesh')
+    assert (mesh.type, mesh.header.frame_id) == (Marker.TRIANGLE_LIST, 'part')
+    assert len(mesh.points) == len(mesh.colors) == 3 * len(node.surface.faces)
+    corners = node.surface.faces.ravel()
+    painted_row = int(np.argmax(film[corners]))
+    expected = FILM_PALETTE[int(film[corners][painted_row] / 40.0 * 256)] / 255.0
+    colour = mesh.colors[painted_row]
+    assert np.allclose([colour.r, colour.g, colour.b], expected[:3], atol=1e-6)
+    field = late.newest('thickness/field')
+    assert field.mesh_id == node.mesh_id
+    assert np.array_equal(field.thickness_um, film.astype(np.float32))
+    cloud = late.newest('thickness/cloud')
+    values = np.frombuffer(bytes(cloud.data), np.float32).reshape(-1, 4)
+    assert np.array_equal(values[:, 3], film.astype(np.float32))
+    texts = [m.text for m in late.newest('thickness/legend').markers if m.text]
+    assert texts[0] == '0 um'
+    assert texts[-1] == '40 um'
+    for message in (mesh, field, cloud, late.newest('thickness/stats')):
+        stamp = message.header.stamp
+        assert stamp.sec * 1_000_000_000 + stamp.nanosec == MOTION.stamps_ns[-1]
+
+
+def test_bare_metal_is_grey_before_the_first_pose(simulator, onlooker, wait_until):
+    simulator()
+    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+    wait_until(lambda: viewer.newest('thickness/mesh'))
+    colours = {(c.r, c.g, c.b) for c in viewer.newest('thickness/mesh').colors}
+    assert len(colours) == 1
+    assert np.allclose(colours.pop(), np.array(BARE_RGB) / 255.0, atol=1e-6)
+
+
+def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, wait_until):
+    node = simulator(target_um=10.0, target_tolerance_um=5.0)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    robot(node).send(MOTION)
+    film = painted(node)
+
+    def newest():
+        stats = viewer.newest('thickness/stats')
+        return stats and stats.poses_received == len(MOTION) and stats
+
+    wait_until(newest)
+    stats, area = newest(), node.surface.vertex_areas_m2
+    coated = film > 1.0
+    assert stats.mean_um == pytest.approx(np.average(film[coated], weights=area[coated]))
+    assert stats.max_um == film.max()
+    assert stats.coverage == pytest.approx(area[coated].sum() / area.sum())
+    good = coated & (np.abs(film - 10.0) <= 5.0)
+    assert stats.within_target == pytest.approx(area[good].sum() / area[coated].sum())
+    assert stats.painted_volume_cm3 == pytest.approx(film @ area)
+    sprayed_s = 0.004 * 600 * (0.441 - 0.02 + 1.0 - 0.561) - 0.004
+    assert stats.transfer_efficiency == pytest.approx(film @ area / (1.9 * sprayed_s), rel=1e-6)
+    assert (stats.poses_rejected, stats.pose_gaps) == (0, 0)
+
+
+def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted, onlooker,
+                                                      wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    source = robot(node)
+    # Two gaps of gun off, and one pose lost that only the rhythm tells.
+    for rows in (slice(0, 100), slice(200, 300), slice(301, 400), slice(500, 600)):
+        source.send(MOTION, rows)
+    painted(node, 399)
+
+    def shown():
+        stats, status = viewer.newest('thickness/stats'), viewer.status(POSES)
+        return stats and stats.pose_gaps == 2 and status and '2 gaps' in status.message
+
+    wait_until(shown)
+    assert viewer.newest('thickness/stats').longest_gap_s == pytest.approx(0.404)
+    values = values_of(viewer.status(POSES))
+    assert values['gaps'] == '2'
+    assert values['intervals over 1.5 times the usual one'] == '3'
+    assert values['usual rate [Hz]'] == '250.0'
+
+
+def test_stamps_before_any_pose_are_zero(simulator, onlooker, wait_until):
+    simulator()
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    wait_until(lambda: viewer.newest('thickness/stats'))
+    stats = viewer.newest('thickness/stats')
+    assert stats.header.stamp.sec == 0
+    assert math.isnan(stats.transfer_efficiency)
+
+
+def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,
+                                                             wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    source = robot(node)
+    source.send(MOTION, slice(0, 300))
+    good = MOTION.positions_m[300], MOTION.quaternions_xyzw[300]
+    source.send_pose(MOTION.stamps_ns[299] + 1, [math.nan, 0, 0], good[1])
+    source.send_pose(MOTION.stamps_ns[299] + 2, good[0], [math.inf, 0, 0, 0])
+    source.send_pose(MOTION.stamps_ns[299] + 3, good[0], [0, 0, 0, 0])
+    source.send_pose(MOTION.stamps_ns[299], *good)
+    source.send_pose(MOTION.stamps_ns[200], *good)
+    source.send(MOTION, slice(300, None))
+    film = painted(node, len(MOTION) + 5)
+    assert np.array_equal(film, offline_um(node, MOTION))
+
+    def shown():
+        stats, status = viewer.newest('thickness/stats'), viewer.status(POSES)
+        done = stats and stats.poses_received == len(MOTION) + 5
+        return done and status and 'not finite' in status.message
+
+    wait_until(shown)
+    assert viewer.newest('thickness/stats').poses_rejected == 5
+    values = values_of(viewer.status(POSES))
+    assert values['poses refused'] == '5'
+    assert values['poses that are not finite'] == '2'
+    assert values['repeated stamps'] == '1'
+    assert values['backward stamps'] == '1'
+
+
+def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot, onlooker,
+                                                               wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    robot(node).send(MOTION, frame_id='base_link')
+    wait_until(lambda: node.input.poses_refused == len(MOTION))
+
+    def shown():
+        status = viewer.status(POSES)
+        return status and 'refused' in status.message
+
+    wait_until(shown)
+    status = viewer.status(POSES)
+    assert status.level == b'\x02'
+    assert "'base_link'" in status.message
+    assert "'part'" in status.message
+    assert node.film.up_to_date().film_um.max() == 0.0
+    wait_until(lambda: viewer.newest('thickness/stats').poses_rejected == len(MOTION))
+
+
+def test_a_pose_in_the_parent_frame_is_transformed(simulator, robot, painted):
+    # The part hangs turned by 90 degrees about z, a metre along the cell's x.
+    turned = [1.0, 0.0, 0.5, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]
+    node = simulator(part_pose=turned, part_parent_frame='base_link')
+    source = robot(node)
+    x, y, z = MOTION.positions_m.T
+    in_cell = np.stack([1.0 - y, x, 0.5 + z], axis=1)
+    qx, qy, qz, qw = MOTION.quaternions_xyzw.T
+    c = math.sqrt(0.5)
+    quaternions = c * np.stack([qx - qy, qy + qx, qz + qw, qw - qz], axis=1)
+    for changed_ns, flow in zip(MOTION.trigger_stamps_ns, MOTION.trigger_flow, strict=True):
+        source.send_state(changed_ns, flow)
+    for stamp, position, quaternion in zip(MOTION.stamps_ns, in_cell, quaternions, strict=True):
+        source.send_pose(stamp, position, quaternion, '/base_link')
+    film, expected = painted(node), offline_um(node, MOTION)
+    assert np.abs(film - expected).max() < 1e-5 * expected.max()
+    assert node.input.poses_refused == 0
+
+
+def test_progress_names_the_newest_pose_and_no_reset_lowers_it(simulator, robot, painted, onlooker,
+                                                               wait_until):  # fmt: skip
+    node = simulator()
+    player = onlooker({'atomizer/progress': (PoseProgress, qos.PROGRESS)})
+    wait_until(lambda: player.newest('atomizer/progress'))
+    assert player.newest('atomizer/progress').header.stamp.sec == 0
+    robot(node).send(MOTION)
+    painted(node)
+    node.reset()
+
+    def taken():
+        report = player.newest('atomizer/progress')
+        stamp_ns = report.header.stamp.sec * 10**9 + report.header.stamp.nanosec
+        return stamp_ns == MOTION.stamps_ns[-1] and report.poses_received == len(MOTION)
+
+    wait_until(taken)
+    wait_until(lambda: len(player.heard['atomizer/progress']) >= len(MOTION) // 50)
+
+
+def test_a_partner_that_cannot_be_heard_is_an_error(simulator, ros_context, spin, onlooker,
+                                                    wait_until):  # fmt: skip
+    simulator(pose_reliability='reliable')
+    viewer = onlooker(DIAGNOSTICS)
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    onlooker({'thickness/cloud': (PointCloud2, latched)})
+    spin(Robot(ros_context, reliable=False))
+
+    def shown():
+        status = viewer.status('deposition_simulator: topics')
+        return status and 'atomizer/pose' in status.message and 'cloud' in status.message
+
+    wait_until(shown)
+    status = viewer.status('deposition_simulator: topics')
+    assert status.level == b'\x02'
+    assert 'reliability' in status.message
+    assert 'durability' in status.message
+
+
+def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):
+    node = DepositionSimulator(
+        context=ros_context,
+        namespace='cell1',
+        parameter_overrides=parameters(mesh_file=str(write_panel(tmp_path / 'p.stl'))),
+    )
+    spin(node)
+    source = Robot(ros_context, namespace='cell1')
+    spin(source)
+    wait_until(lambda: source.is_heard_by(node))
+    names = {name for name, _ in node.get_topic_names_and_types()}
+    assert {'/cell1/thickness/mesh', '/cell1/atomizer/pose', '/diagnostics'} <= names

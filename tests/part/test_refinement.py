@@ -1,0 +1,104 @@
+"""Refinement changes the triangles, not the part."""
+
+from collections import Counter
+
+import numpy as np
+import pytest
+from scipy.spatial import Delaunay
+from trimesh.creation import cylinder
+
+from paint_deposition.errors import MeshError
+from paint_deposition.part import refinement
+from paint_deposition.part.creases import Edges
+from paint_deposition.part.refinement import face_areas_m2, refine, weld
+from paint_deposition.part.surface import Surface
+
+
+@pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])
+def test_area_is_kept_and_edges_are_short(triangles, ball, max_edge_length_m):
+    vertices, faces = triangles(ball(0.5), 0.06, jitter=0.3)
+    surface = Surface.from_triangles(vertices, faces, max_edge_length_m)
+    assert surface.area_m2 == pytest.approx(face_areas_m2(vertices, faces).sum(), rel=1e-12)
+    assert surface.longest_edge_m <= max_edge_length_m
+
+
+def test_no_cracks(skin, ball):
+    surface = skin(ball(0.5), 0.06, max_edge_length_m=0.013, jitter=0.35)
+    edges = np.sort(np.concatenate([surface.faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
+    uses = Counter(map(tuple, edges.tolist()))
+    ends = np.array([edge for edge, count in uses.items() if count == 1])
+    on_rim = np.abs(surface.vertices_m[ends][:, :, [0, 2]]).max(axis=2) > 0.2 - 1e-9
+    assert max(uses.values()) == 2
+    assert on_rim.all()
+
+
+@pytest.mark.parametrize('seed', range(8))
+def test_slivers_and_all_stay_one_skin(seed):
+    rng = np.random.default_rng(seed)
+    flat = rng.random((60, 2)) * [1.0, 0.05 + rng.random()]
+    flat[:20, 1] *= 0.01
+    vertices = np.column_stack([flat, np.zeros(60)])
+    faces = upward(vertices, Delaunay(flat).simplices)
+    fine, _, refined = refine(vertices, np.tile([0.0, 0, 1], (60, 1)), faces, 0.03)
+    assert sides_m(fine, refined).max() <= 0.03
+    np.testing.assert_array_equal(upward(fine, refined), refined)
+    assert face_areas_m2(fine, refined).sum() == pytest.approx(
+        face_areas_m2(vertices, faces).sum(), rel=1e-12
+    )
+    assert rim_length_m(fine, refined) == pytest.approx(rim_length_m(vertices, faces), rel=1e-12)
+    assert not len(Edges.of(refined).clashing)
+
+
+def test_a_needle_is_cut_into_pieces_as_wide_as_itself():
+    vertices = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0.016]])
+    fine, _, faces = refine(vertices, np.tile([0.0, -1, 0], (3, 1)), np.array([[0, 1, 2]]), 0.02)
+    assert face_areas_m2(fine, faces).sum() == pytest.approx(0.008)
+    assert sides_m(fine, faces).max() <= 0.02
+    assert len(faces) < 170
+
+
+def test_a_bar_of_strips_costs_little_more_than_its_area():
+    bar = cylinder(radius=0.5, height=1.0, sections=200)
+    surface = Surface.from_triangles(bar.vertices, np.asarray(bar.faces), 0.02)
+    assert surface.area_m2 == pytest.approx(bar.area, rel=1e-9)
+    assert len(surface.faces) < 10 * bar.area / 0.02**2
+
+
+def sides_m(vertices, faces):
+    """(F, 3) lengths of the sides."""
+    corners = vertices[faces]
+    return np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+
+
+def upward(vertices, faces):
+    """The triangles with an area, wound to look up z."""
+    a, b, c = vertices[faces].transpose(1, 0, 2)
+    doubled = np.cross(b - a, c - a)[:, 2]
+    faces = np.where(doubled[:, None] > 0, faces, faces[:, ::-1])
+    return faces[np.abs(doubled) > 1e-9]
+
+
+def rim_length_m(vertices, faces):
+    """Length of the edges that only one triangle has."""
+    single = Edges.of(faces).single
+    ends = vertices[np.roll(faces, -1, axis=1).ravel()[single]]
+    return np.linalg.norm(vertices[faces.ravel()[single]] - ends, axis=1).sum()
+
+
+def test_too_many_triangles_are_refused_with_an_edge_length_that_works(
+    triangles, flat, monkeypatch
+):
+    monkeypatch.setattr(refinement, 'MAX_TRIANGLES', 5000)
+    vertices, faces = triangles(flat, 0.2, half_width_m=1.0)
+    with pytest.raises(MeshError, match=r'max_edge_length_m = 0\.001 m .* at least') as caught:
+        Surface.from_triangles(vertices, faces, 0.001)
+    remedy_m = float(str(caught.value).split('at least ')[1].split()[0])
+    refined = Surface.from_triangles(vertices, faces, 1.05 * remedy_m)
+    assert 1500 < len(refined.faces) < 5000
+
+
+def test_welding_joins_what_lies_within_a_micrometre():
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 2e-7], [1, 0, 0], [1, 0, 1]])
+    welded, faces = weld(vertices, np.array([[0, 1, 2], [3, 4, 5]]))
+    np.testing.assert_allclose(welded, vertices[[0, 1, 2, 5]])
+    np.testing.assert_array_equal(faces, [[0, 1, 2], [0, 1, 3]])

@@ -1,0 +1,126 @@
+"""The sample parts and motions are what the documentation says they are."""
+
+import runpy
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.bags import read_trajectory
+from paint_deposition.formats.meshes import read_mesh
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.facing import facing
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from skins import triangulated
+
+
+@pytest.fixture(scope='module')
+def samples(repository):
+    return repository / 'ros2_ws' / 'src' / 'paint_deposition' / 'samples'
+
+
+@pytest.fixture(scope='module')
+def door(samples):
+    return read_mesh(samples / 'door.stl')
+
+
+def motion(samples, name):
+    return read_trajectory(samples / name, '/atomizer/pose', '/atomizer/state')
+
+
+def film_um(points: SurfacePoints, trajectory) -> np.ndarray:
+    integrator = FilmIntegrator(points, DepositionModel(), precision='double')
+    integrator.add(spray_path(trajectory)[0])
+    return integrator.film_um
+
+
+def test_the_door_has_its_convex_line_and_its_concave_third(door):
+    z = np.linspace(0.02, 0.85, 167)
+    section = door.at(np.stack([0 * z, 0 * z, z], axis=1)).curvature_per_m
+    assert 0.43 < z[section.argmin()] < 0.53
+    assert section.min() < -3.0
+    assert 0.1 < z[section.argmax()] < 0.3
+    assert section.max() > 3.0
+    assert np.abs(section[z > 0.6]).max() < 0.6
+
+
+def test_the_door_is_a_clean_sheet_that_stands(door):
+    extent = np.ptp(door.vertices_m, axis=0)
+    np.testing.assert_allclose(extent, [1.2, 0.12, 0.89], atol=0.05)
+    np.testing.assert_array_equal(door.down, [0, 0, -1])
+    assert door.notes == ()
+    assert (door.normals[:, 1] < -0.8).all()
+
+
+def test_the_script_draws_the_door_again(samples, tmp_path):
+    subprocess.run([sys.executable, samples / 'make_door.py', tmp_path], check=True)
+    for name in ('door.stl', 'panel.stl'):
+        kept, drawn = (np.frombuffer((p / name).read_bytes()[84:], np.uint8) for p in
+                       (samples, tmp_path))  # fmt: skip
+        assert len(kept) == len(drawn)
+        assert np.mean(kept == drawn) > 0.99
+
+
+@pytest.mark.parametrize(
+    ('name', 'mesh', 'passes', 'mean_um'),
+    [
+        ('door_horizontal', 'door.stl', 3, (15.0, 25.0)),
+        ('door_vertical', 'door.stl', 5, (15.0, 25.0)),
+        ('panel_577', 'panel.stl', 3, (15.0, 25.0)),
+    ],
+)
+def test_the_motions_paint_the_front(samples, name, mesh, passes, mean_um):
+    surface, trajectory = read_mesh(samples / mesh), motion(samples, name)
+    axes = Rotation.from_quat(trajectory.quaternions_xyzw).as_matrix()
+    seen = facing(surface, trajectory.positions_m, axes[:, :, 2])
+    assert seen.back == 0
+    assert seen.front > 100
+    assert np.sum(trajectory.trigger_flow) == passes
+    film = film_um(surface.points(), trajectory)
+    share = surface.vertex_areas_m2 / surface.area_m2
+    assert mean_um[0] < film @ share < mean_um[1]
+
+
+def test_the_motions_are_logged_as_unevenly_as_by_a_controller(samples):
+    trajectory = motion(samples, 'door_horizontal')
+    interval_s = np.diff(trajectory.stamps_ns) * 1e-9
+    repeated = np.all(np.diff(trajectory.positions_m, axis=0) == 0, axis=1)
+    assert interval_s.min() > 0.0012
+    assert interval_s.max() < 0.0241
+    assert np.std(interval_s) > 0.002
+    assert repeated.sum() > 50
+
+
+def test_film_does_not_depend_on_the_triangulation(samples):
+    """One door triangulated in three ways, and seen as the formula that it was drawn with."""
+    door_depth = runpy.run_path(samples / 'make_door.py')['door_depth']
+
+    def depth(x, z):
+        return door_depth(x, z + 0.45)
+
+    trajectory = motion(samples, 'door_horizontal')
+    lift = np.array([0.0, 0.0, 0.45])
+    x, z = np.random.default_rng(5).uniform(-0.43, 0.43, (2, 400))
+    exact = film_um(by_formula(depth, x, z, lift), trajectory)
+    for spacing_m, jitter, worst_um in [(0.01, 0.35, 0.15), (0.02, 0.0, 0.25), (0.03, 0.35, 0.5)]:
+        vertices, faces = triangulated(depth, spacing_m, half_width_m=0.44, jitter=jitter)
+        surface = Surface.from_triangles(vertices + lift, faces, 0.02)
+        readings = surface.at(np.stack([x, depth(x, z), z], axis=1) + lift)
+        off = film_um(readings, trajectory) - exact
+        assert np.abs(off).max() < worst_um
+        assert np.sqrt(np.mean(off**2)) < 0.25 * worst_um
+
+
+def by_formula(depth, x, z, lift) -> SurfacePoints:
+    h = 1e-5
+    normals = np.stack(
+        [(depth(x + h, z) - depth(x - h, z)) / (2 * h), -np.ones_like(x),
+         (depth(x, z + h) - depth(x, z - h)) / (2 * h)], axis=1
+    )  # fmt: skip
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    return SurfacePoints(np.stack([x, depth(x, z), z], axis=1) + lift, normals)

@@ -1,0 +1,70 @@
+"""Lines of sight against shapes whose shadows are known."""
+
+import numpy as np
+import pytest
+from trimesh.creation import box
+from trimesh.util import concatenate
+
+from paint_deposition.part.surface import Surface
+
+
+def test_all_of_an_open_skin_is_seen(skin, ball):
+    surface = skin(ball(0.5), 0.02, jitter=0.3)
+    eyes = np.array([[0.0, -0.3, 0.0], [0.3, -0.4, 0.2]])
+    seen = surface.occluder.visible(eyes, surface.vertices_m)
+    assert seen.shape == (2, len(surface.vertices_m))
+    assert seen.all()
+
+
+def test_concave_skin_sees_its_eye(skin, ball):
+    surface = skin(ball(-0.3), 0.02)
+    assert surface.occluder.visible([[0.0, -0.3, 0.0]], surface.vertices_m).all()
+
+
+def test_the_shadow_of_a_bar_ends_where_geometry_says():
+    wall = box((1.0, 0.01, 1.0), transform=translation(y=0.005))
+    bar = box((2.0, 0.02, 0.1), transform=translation(y=-0.2))
+    both = concatenate([wall, bar])
+    surface = Surface.from_triangles(both.vertices, np.asarray(both.faces), 0.05)
+    z = np.linspace(-0.4, 0.4, 801)
+    line = np.stack([0 * z, 0 * z, z], axis=1)
+    seen = surface.occluder.visible([[0.0, -0.4, 0.0]], line)[0]
+    # The bar's front corners, 0.19 m before the eye, cast the edge onto the wall 0.4 m before it.
+    edge_m = 0.05 * 0.4 / 0.19
+    clear = np.abs(np.abs(z) - edge_m) > 2e-3
+    np.testing.assert_array_equal(seen[clear], (np.abs(z) > edge_m)[clear])
+
+
+def test_far_from_the_origin_nothing_is_lost(triangles, ball):
+    vertices, faces = triangles(ball(-0.3), 0.02)
+    offset = np.array([40.0, -25.0, 3.0])
+    surface = Surface.from_triangles(vertices + offset, faces, 0.02)
+    assert surface.occluder.visible([offset - np.array([0.0, 0.3, 0.0])], surface.vertices_m).all()
+
+
+def test_openness_of_a_plane_and_of_convex_skin_is_one(skin, flat, ball):
+    np.testing.assert_array_equal(skin(flat, 0.05).points().openness, 1.0)
+    np.testing.assert_allclose(skin(ball(0.4), 0.01).points().openness, 1.0, atol=2e-3)
+
+
+@pytest.mark.parametrize('opening_deg', [60.0, 90.0, 140.0])
+@pytest.mark.parametrize('share', [0.2, 0.5, 0.9])
+def test_openness_in_a_groove(skin, fold, opening_deg, share):
+    half = np.radians(opening_deg) / 2
+    slant_m, length_m = 0.1, 3.0
+    depth_m = slant_m * np.sin(half)
+    groove = skin(fold(half - np.pi / 2), 0.1, 0.1, half_width_m=length_m, half_height_m=depth_m)
+    s = share * slant_m
+    point = np.array([[0.0, -s * np.cos(half), s * np.sin(half)]])
+    # The other wall hides what lies between this wall and its own lip: (1 - sin) / 2, with the
+    # sine of the lip's angle from the normal here.
+    to_lip = np.array([-slant_m * np.cos(half), -slant_m * np.sin(half)]) - point[0, 1:]
+    sine = to_lip @ [np.cos(half), -np.sin(half)] / np.linalg.norm(to_lip)
+    hidden = 0.5 * (1.0 - sine)
+    assert groove.at(point).openness[0] == pytest.approx(1.0 - hidden, abs=0.02)
+
+
+def translation(y: float) -> np.ndarray:
+    matrix = np.eye(4)
+    matrix[1, 3] = y
+    return matrix

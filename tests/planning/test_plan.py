@@ -1,0 +1,159 @@
+"""Passes planned on parts, and their files."""
+
+import json
+
+import numpy as np
+import pytest
+
+from paint_deposition.errors import PlanError
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.bags import read_trajectory
+from paint_deposition.formats.meshes import read_mesh
+from paint_deposition.formats.plan_files import write_plan
+from paint_deposition.formats.rapid import read_program
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.planning.plan import PlanRequest, plan
+from part.test_skin_map import sheet
+
+NARROW = DepositionModel(
+    planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
+)
+
+
+@pytest.fixture(scope='module')
+def bowed():
+    """A skin that falls away toward its top and comes forward at its foot."""
+    return sheet(lambda x, z: 0.2 * x**2 + 0.5 * np.maximum(z, 0.0) ** 2 + 0.15 * z, half_m=0.4)
+
+
+@pytest.fixture(scope='module')
+def planned(bowed):
+    return plan(bowed, NARROW, PlanRequest(target_um=20.0), 'part')
+
+
+def film_of(surface, model, trajectory):
+    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
+    integrator = FilmIntegrator(surface.points(), model)
+    integrator.add(path)
+    return integrator.film_um
+
+
+def evenness(surface, film):
+    weight = surface.vertex_areas_m2 / surface.vertex_areas_m2.sum()
+    mean = weight @ film
+    return mean, np.sqrt(weight @ (film - mean) ** 2) / mean
+
+
+def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
+    film = film_of(bowed, NARROW, planned.trajectory)
+    np.testing.assert_allclose(planned.film_um, film, rtol=1e-5)
+    mean, sigma_n = evenness(bowed, film)
+    assert mean == pytest.approx(20.0, rel=3e-3)
+    assert planned.sigma_n == pytest.approx(sigma_n, rel=1e-4)
+    assert planned.statistics.coverage == 1.0
+
+
+def test_placing_beats_the_plane_s_recommendation_on_this_part(planned):
+    assert planned.sigma_n < 0.97 * planned.plane_on_part.sigma_n
+    assert planned.sigma_n == pytest.approx(planned.placing.sigma_n, rel=0.1)
+
+
+def test_neighbouring_indices_are_no_better(bowed, planned):
+    for change in (0.97, 1.03):
+        index = change * planned.placing.index_m
+        other = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_m=index))
+        assert other.placing.sigma_n > 0.97 * planned.placing.sigma_n
+
+
+def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():
+    surface = sheet(lambda x, z: 0.0 * x, half_m=0.6)
+    flat = plan(surface, NARROW, PlanRequest(speed_m_per_s=0.2, overspray_m=0.5))
+    assert flat.sigma_n < flat.plane.sigma_n + 0.015
+    assert flat.statistics.mean_um == pytest.approx(
+        NARROW.planar.K1_cm3_per_s / (0.2 * flat.placing.index_m), rel=0.03
+    )
+
+
+def test_vertical_passes_run_downward_first(bowed):
+    vertical = plan(bowed, NARROW, PlanRequest(direction='vertical', speed_m_per_s=0.3))
+    first, last = vertical.passes[0].positions_m, vertical.passes[-1].positions_m
+    assert first[-1, 2] < first[0, 2] - 0.5
+    assert last[:, 0].mean() > first[:, 0].mean() + 0.3
+
+
+def test_horizontal_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it(planned):
+    first, last = planned.passes[0].positions_m, planned.passes[-1].positions_m
+    assert first[:, 2].mean() > last[:, 2].mean() + 0.3
+    assert first[-1, 0] > first[0, 0] + 0.5
+
+
+def test_given_index_is_kept_and_range_respected(bowed):
+    fixed = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_m=0.2))
+    assert fixed.placing.index_m == 0.2
+    lines = [planned.across_m for planned in fixed.passes]
+    np.testing.assert_allclose(np.diff(lines), 0.2, atol=1e-9)
+    ranged = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_min_m=0.22, index_max_m=0.3))
+    assert 0.22 <= ranged.placing.index_m <= 0.3
+
+
+@pytest.mark.parametrize(
+    ('what', 'words'),
+    [
+        ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
+        ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 0.05; the closest is'),
+        ({'index_m': -0.2}, 'index_m is -0.2'),
+        ({'standoff_m': -1.0}, 'standoff_m is -1'),
+        ({'overspray_m': -0.1}, 'overspray_m is -0.1'),
+        ({'direction': 'up'}, 'horizontal or vertical'),
+    ],
+)
+def test_impossible_plans_say_why(bowed, what, words):
+    with pytest.raises(PlanError, match=words) as refusal:
+        plan(bowed, NARROW, PlanRequest(**({'speed_m_per_s': 0.3} | what)))
+    assert '\n' not in str(refusal.value)
+
+
+def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
+    files = write_plan(tmp_path, planned, bowed, {'mesh': 'sheet'})
+    assert all(path.exists() for path in files)
+    recorded = read_trajectory(tmp_path / 'trajectory', state_topic='atomizer/state')
+    np.testing.assert_array_equal(recorded.stamps_ns, planned.trajectory.stamps_ns)
+    np.testing.assert_allclose(recorded.positions_m, planned.trajectory.positions_m)
+    film = film_of(bowed, NARROW, recorded)
+    np.testing.assert_allclose(film, planned.film_um, rtol=1e-5)
+    content = json.loads((tmp_path / 'plan.json').read_text())
+    assert content['passes'] == len(planned.passes)
+    assert content['plane']['sigma_n_on_part'] == planned.plane_on_part.sigma_n
+    rows = np.genfromtxt(tmp_path / 'passes.csv', delimiter=',', names=True)
+    assert rows['pass'].max() == len(planned.passes)
+    assert len(list(tmp_path.glob('.*'))) == 0
+
+
+def test_robot_program_lays_the_same_film(bowed, planned, tmp_path):
+    write_plan(tmp_path, planned, bowed)
+    program = read_program(tmp_path / 'passes.mod')
+    sprayed = [move for move in program.moves if move.spraying]
+    assert len(sprayed) > 10 * len(planned.passes)
+    assert {round(move.speed_m_per_s, 3) for move in sprayed} == {
+        round(planned.style.speed_m_per_s, 3)
+    }
+
+
+def test_writing_again_replaces_the_plan_but_no_stranger(bowed, planned, tmp_path):
+    write_plan(tmp_path, planned, bowed)
+    write_plan(tmp_path, planned, bowed)
+    (tmp_path / 'trajectory' / 'notes.txt').write_text('mine')
+    with pytest.raises(Exception, match='no planned bag; move it away'):
+        write_plan(tmp_path, planned, bowed)
+    assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'
+
+
+def test_sample_door_in_either_direction(repository):
+    door = read_mesh(repository / 'ros2_ws/src/paint_deposition/samples/door.stl')
+    for direction in ('horizontal', 'vertical'):
+        result = plan(door, DepositionModel(), PlanRequest(direction=direction, speed_m_per_s=0.3))
+        assert result.sigma_n < 0.13
+        assert result.sigma_n < result.plane_on_part.sigma_n
+        assert result.statistics.coverage == 1.0

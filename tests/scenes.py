@@ -1,0 +1,62 @@
+"""Small worlds for tests: a gun, a way for it, and skin to paint."""
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+
+START_NS = 1_760_000_000_000_000_000
+# Tool z along -z of the world, tool x along its x: the gun looks down on a lying plane.
+LOOKING_DOWN = np.array([1.0, 0.0, 0.0, 0.0])
+NORMAL_STANDOFF_M = 0.25
+
+
+def stamps_ns(times_s) -> np.ndarray:
+    """Stamps of times after START_NS."""
+    return START_NS + np.round(np.asarray(times_s, dtype=float) * 1e9).astype(np.int64)
+
+
+def straight_pass(
+    times_s,
+    begin_m=(-0.6, 0.0, NORMAL_STANDOFF_M),
+    end_m=(0.6, 0.0, NORMAL_STANDOFF_M),
+    quaternion=LOOKING_DOWN,
+    **trigger,
+) -> Trajectory:
+    """An even motion from begin to end, sampled at these times."""
+    times = np.asarray(times_s, dtype=float)
+    share = ((times - times[0]) / (times[-1] - times[0]))[:, np.newaxis]
+    positions = (1.0 - share) * np.array(begin_m) + share * np.array(end_m)
+    return Trajectory(stamps_ns(times), positions, np.tile(quaternion, (len(times), 1)), **trigger)
+
+
+def weaving(times_s) -> Trajectory:
+    """A curved way at changing speed with a tool that sways, as a function of time alone."""
+    t = np.asarray(times_s, dtype=float)
+    positions = np.stack(
+        [0.45 * np.sin(0.7 * t), 0.25 * np.sin(1.1 * t + 0.4), 0.25 + 0.03 * np.sin(1.7 * t)],
+        axis=1,
+    )
+    sway = Rotation.from_euler('xy', np.stack([0.2 * np.sin(t), 0.15 * np.cos(1.3 * t)], axis=1))
+    quaternions = (Rotation.from_quat(LOOKING_DOWN) * sway).as_quat()
+    return Trajectory(stamps_ns(t), positions, quaternions)
+
+
+def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
+    """Square plane at z = 0 that looks up, with the area of each of its count^2 points."""
+    line = np.linspace(-half_m, half_m, count)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
+    positions = np.stack([x, y, np.zeros(len(x))], axis=1)
+    spacing = line[1] - line[0]
+    return SurfacePoints(
+        positions,
+        np.tile([0.0, 0.0, 1.0], (len(x), 1)),
+        area_m2=np.full(len(x), spacing**2),
+        down=(0.0, -1.0, 0.0),
+    )
+
+
+def rotation_matrix(quaternion=LOOKING_DOWN) -> np.ndarray:
+    """Tool axes as columns."""
+    return Rotation.from_quat(quaternion).as_matrix()

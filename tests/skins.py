@@ -1,0 +1,35 @@
+"""Skins of known shape, triangulated as one likes."""
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.spatial import Delaunay
+
+Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def triangulated(
+    depth: Depth,
+    spacing_m: float,
+    half_width_m: float = 0.2,
+    half_height_m: float | None = None,
+    jitter: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and faces of the skin y = depth(x, z), outward to -y.
+
+    ``jitter`` moves the grid's vertices by that share of the spacing, those on the rim along it.
+    """
+    rng = np.random.default_rng(7)
+    half = np.array([half_width_m, half_height_m or half_width_m])
+    counts = np.maximum(2, np.round(2 * half / spacing_m).astype(int)) + 1
+    lines = [np.linspace(-h, h, count) for h, count in zip(half, counts, strict=True)]
+    flat = np.stack(np.meshgrid(*lines, indexing='ij'), axis=2).reshape(-1, 2)
+    inner = np.abs(flat) < half - 1e-9
+    flat = flat + inner * rng.uniform(-jitter, jitter, flat.shape) * spacing_m
+    faces = Delaunay(flat).simplices
+    a, b, c = flat[faces].transpose(1, 0, 2)
+    doubled = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    faces = np.where(doubled[:, None] > 0, faces, faces[:, ::-1])
+    faces = faces[np.abs(doubled) > 1e-6 * spacing_m**2]
+    x, z = flat.T
+    return np.stack([x, depth(x, z), z], axis=1), faces

@@ -1,0 +1,18 @@
+"""A small campaign of the virtual paint shop: few parcels and readings, made in two seconds."""
+
+from pathlib import Path
+
+from paint_deposition.formats.campaign_file import read_campaign
+from paint_deposition.inference.campaign import Campaign
+from virtual_paint_shop.files import write
+from virtual_paint_shop.shop import generate
+
+
+def small_campaign(folder: Path, **options) -> Campaign:
+    """Panel and door with a strong hidden drift of the air, unless options say otherwise."""
+    chosen = {
+        'seed': 7, 'truth': 'air_drift', 'amplitude': 0.05, 'experiments': ('panel', 'door'),
+        'readings': 40, 'repeats': 10, 'heldout': 1, 'style': 'columns', 'parcels': 100_000,
+    } | options  # fmt: skip
+    write(generate(**chosen), folder)
+    return read_campaign(folder / 'campaign.yaml')

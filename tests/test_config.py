@@ -1,0 +1,137 @@
+"""The files in config/: examples that work as they stand, and views of what is published."""
+
+from __future__ import annotations
+
+import json
+import re
+
+import pytest
+import yaml
+
+from paint_deposition.formats.campaign_file import EXPERIMENT_KEYS, TOP_KEYS, read_campaign
+from paint_deposition.formats.model_file import read_model
+from paint_deposition.formats.tables import REQUIRED, read_readings
+from paint_deposition.model.deposition_model import DepositionModel
+
+OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
+# What a display of RViz shows.
+SHOWN = {
+    'Marker': 'visualization_msgs/msg/Marker',
+    'MarkerArray': 'visualization_msgs/msg/MarkerArray',
+    'PointCloud2': 'sensor_msgs/msg/PointCloud2',
+    'Path': 'nav_msgs/msg/Path',
+    'Pose': 'geometry_msgs/msg/PoseStamped',
+}
+
+
+@pytest.fixture
+def config(repository):
+    return repository / 'config'
+
+
+@pytest.fixture
+def samples(repository):
+    return repository / 'ros2_ws' / 'src' / 'paint_deposition' / 'samples'
+
+
+@pytest.fixture
+def publishers(ros_context, executor, samples):
+    """The publishers of all nodes that a viewer looks at, by topic."""
+    from nodes.cell import parameters
+    from paint_deposition.nodes.bag_player import BagPlayer
+    from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+    from paint_deposition.nodes.index_planner import IndexPlanner
+    from paint_deposition.nodes.model_comparison import ModelComparison
+
+    panel = samples / 'panel_study'
+    part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}
+    readings = {'measurements_file': str(panel / 'panel_577.csv')}
+    replay = {'bag': str(samples / 'door_horizontal'), 'start_paused': True}
+    made = [
+        node(context=ros_context, parameter_overrides=parameters(**values))
+        for node, values in (
+            (DepositionSimulator, part),
+            (ModelComparison, part | readings),
+            (IndexPlanner, {}),
+            (BagPlayer, replay),
+        )
+    ]
+    for node in made:
+        executor.add_node(node)
+    return {publisher.topic_name: publisher for node in made for publisher in node.publishers}
+
+
+def type_of(publisher) -> str:
+    package, kind, _ = publisher.msg_type.__module__.split('.')
+    return f'{package}/{kind}/{publisher.msg_type.__name__}'
+
+
+def test_model_is_the_default_one(config):
+    assert read_model(config / 'model.yaml') == DepositionModel()
+
+
+def test_readings_are_readings(config):
+    readings = read_readings(config / 'readings.csv')
+    assert len(readings) == 3
+    assert len(set(readings.point)) == 2
+    text = (config / 'readings.csv').read_text()
+    assert all(re.search(rf'\b{name}\b', text) for name in (*REQUIRED, *OPTIONAL))
+
+
+def test_campaign_can_be_read_and_tells_of_every_key(config):
+    campaign = read_campaign(config / 'campaign.yaml')
+    assert [experiment.name for experiment in campaign.experiments] == ['panel', 'door']
+    text = (config / 'campaign.yaml').read_text()
+    for key in (*TOP_KEYS, *EXPERIMENT_KEYS):
+        assert re.search(rf'^[ -]*(# )?(- )?{key}:', text, re.M), key
+
+
+def test_campaigns_commented_keys_are_as_good(config, tmp_path):
+    text = (config / 'campaign.yaml').read_text()
+    text = text.replace('../ros2_ws', str(config.parent / 'ros2_ws'))
+    text = re.sub(r'^    # (\w+: )', r'    \1', text, flags=re.M).replace('0.001', '1.0')
+    entries = yaml.safe_load(text)['experiments']
+    assert set(EXPERIMENT_KEYS) <= set(entries[-1])
+    campaign = tmp_path / 'campaign.yaml'
+    campaign.write_text(text)
+    assert len(read_campaign(campaign).experiments) == 2
+
+
+def test_rviz_shows_what_is_published_as_it_is_published(config, publishers):
+    from rclpy.qos import DurabilityPolicy
+
+    manager = yaml.safe_load((config / 'paint.rviz').read_text())['Visualization Manager']
+    assert manager['Global Options']['Fixed Frame'] == 'part'
+    shown = [display for display in manager['Displays'] if 'Topic' in display]
+    assert len(shown) == 7
+    for display in shown:
+        publisher = publishers[display['Topic']['Value']]
+        assert type_of(publisher) == SHOWN[display['Class'].removeprefix('rviz_default_plugins/')]
+        latched = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        assert latched == (display['Topic']['Durability Policy'] == 'Transient Local')
+    (cloud,) = (display for display in shown if 'Channel Name' in display)
+    assert cloud['Channel Name'] == 'thickness_um'
+
+
+def test_foxglove_shows_topics_and_fields_that_there_are(config, publishers):
+    layout = json.loads((config / 'foxglove.json').read_text())
+    panels = layout['configById']
+    assert set(panels) == set(panels_of(layout['layout']))
+    scene = panels['3D!part']
+    assert scene['followTf'] == 'part'
+    assert set(scene['topics']) <= set(publishers)
+    assert scene['topics']['/thickness/cloud']['colorField'] == 'thickness_um'
+    plots = [panel for name, panel in panels.items() if name.startswith('Plot!')]
+    paths = [path['value'] for plot in plots for path in plot['paths']]
+    assert len(paths) == 11
+    for path in paths:
+        topic, field = path.rsplit('.', 1)
+        assert field in publishers[topic].msg_type.get_fields_and_field_types(), path
+    assert panels['DiagnosticSummary!health']['topicToRender'] in publishers
+
+
+def panels_of(layout) -> list[str]:
+    """Names of the panels in a layout's tree."""
+    if isinstance(layout, str):
+        return [layout]
+    return [*panels_of(layout['first']), *panels_of(layout['second'])]
