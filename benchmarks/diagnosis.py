@@ -1,0 +1,320 @@
+"""How often the diagnosis is right, on doors of the virtual paint shop with hidden effects.
+
+Every campaign is drawn by a generator that shares no code with the model; the same campaigns are
+given to stepwise selection by BIC. Results are kept line by line, so that a run can be cut off and
+taken up again; `--summary` prints the table of what is there.
+"""
+
+import json
+import multiprocessing
+import os
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import click
+import numpy as np
+from scipy.stats import beta
+from tqdm import tqdm
+
+# One thread a process: several campaigns are judged at once, and would wait for each other.
+for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
+    os.environ.setdefault(threads, '1')
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+FOOTPRINTS = ('elliptic', 'skewed', 'triangular_ring', 'two_lobes')
+STRANGE = ('charge_swirl', 'masking_tape', 'poor_ground', 'pump_pulsation', 'thermal_stripe')
+LAYOUTS = (('door',), ('door',), ('panel', 'door'), ('door', 'door_vertical'))
+PARCELS = 4_000_000
+# Parameter in which truth and model speak of the same amount: (name, other name, sign).
+SAME_AMOUNT = {
+    'flow_drift': 'drift_per_pass',
+    'fog_gradient': 'fog_um',
+    'tcp_standoff': 'offset_m',
+}
+
+
+def jobs(clean: int, each: int) -> list[tuple[int, str]]:
+    """(seed, truth) of every campaign; seeds are not those of any test."""
+    from paint_deposition.effects.catalogue import EFFECTS
+
+    listed = [(910_000 + k, '') for k in range(clean)]
+    truths = list(EFFECTS)
+    truths += [f'footprint:{name}' for name in FOOTPRINTS]
+    truths += [f'unknown:{name}' for name in STRANGE]
+    for number, truth in enumerate(truths):
+        listed += [(920_000 + 100 * number + k, truth) for k in range(each)]
+    return listed
+
+
+def run_one(job: tuple[int, str]) -> dict:
+    """Draw a campaign, diagnose it with the whole library and without the truth's class."""
+    import warnings
+
+    warnings.simplefilter('ignore')
+    from tests.virtual_paint_shop.files import write
+    from tests.virtual_paint_shop.shop import generate
+
+    seed, truth = job
+    random = np.random.default_rng(seed)
+    layout = LAYOUTS[seed % len(LAYOUTS)]
+    readings = int(random.integers(60, 131)) // len(layout)
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name) / 'campaign'
+        write(
+            generate(seed, truth or None, experiments=layout, readings=readings,
+                     repeats=max(12, readings // 4), parcels=PARCELS),
+            folder,
+        )  # fmt: skip
+        try:
+            return _judge(folder, seed, truth, layout)
+        except Exception as error:  # a crash is a result too
+            return {'seed': seed, 'truth': truth, 'error': f'{type(error).__name__}: {error}'}
+
+
+def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
+    from paint_deposition.effects.catalogue import EFFECTS
+    from paint_deposition.formats.campaign_file import read_campaign
+    from paint_deposition.inference.diagnosis import diagnose
+    from paint_deposition.model.deposition_model import DepositionModel
+
+    campaign = read_campaign(folder / 'campaign.yaml')
+    started = time.perf_counter()
+    diagnosis = diagnose(campaign, DepositionModel(), EFFECTS)
+    seconds = time.perf_counter() - started
+    record = {
+        'seed': seed,
+        'truth': truth,
+        'layout': '+'.join(layout),
+        'readings': campaign.reading_count,
+        'seconds': seconds,
+        **_said(diagnosis),
+        'heldout': _held_out(folder, campaign, diagnosis),
+        'amount': _amount(folder, truth, diagnosis),
+        'bic': stepwise_bic(diagnosis),
+    }
+    if truth in EFFECTS and record['verdict'] != 'none_missing':
+        gone = _class_of(truth, diagnosis)
+        library = {key: value for key, value in EFFECTS.items() if key not in gone}
+        record['without'] = {'removed': sorted(gone)} | _said(
+            diagnose(campaign, DepositionModel(), library)
+        )
+    return record
+
+
+def _said(diagnosis) -> dict:
+    return {
+        'verdict': diagnosis.verdict,
+        'p_value': diagnosis.p_value,
+        'accepted': list(diagnosis.accepted),
+        'classes': [[list(c.members), c.probability] for c in diagnosis.classes],
+        'unknown': diagnosis.unknown.kind if diagnosis.unknown else None,
+        'not_testable': list(diagnosis.not_testable),
+    }
+
+
+def _class_of(truth: str, diagnosis) -> set[str]:
+    """The truth and whatever can imitate it: declared rivals and the class found."""
+    from paint_deposition.effects.catalogue import EFFECTS
+
+    gone = {truth, *EFFECTS[truth].rivals}
+    gone |= {key for key, effect in EFFECTS.items() if effect.family == EFFECTS[truth].family}
+    for found in diagnosis.classes:
+        if truth in found.members:
+            gone |= set(found.members)
+    return gone
+
+
+def _held_out(folder: Path, campaign, diagnosis) -> dict[str, float]:
+    """RMSE on readings the diagnosis never saw, over the noise of the gauge there."""
+    from paint_deposition.formats.tables import read_readings
+    from paint_deposition.inference.campaign import Campaign, Experiment
+    from paint_deposition.inference.study import Study
+
+    unseen = []
+    for experiment in campaign.experiments:
+        table = read_readings(folder / 'truth' / f'heldout_{experiment.name}.csv')
+        unseen.append(Experiment.of(experiment.name, experiment.surface, experiment.path, table))
+    study = Study.of(Campaign(tuple(unseen)))
+    noise = np.hypot(0.7, 0.01 * study.measured_um)
+    noise = noise / np.sqrt(np.concatenate([e.means.repeats for e in unseen]))
+    floor = float(np.sqrt(np.mean(noise**2)))
+    found = {}
+    for name, step in (('before', diagnosis.history[0]), ('after', diagnosis.history[-1])):
+        off = study.measured_um - study.forward.predict_um(step.model)
+        found[name] = float(np.sqrt(np.mean(off**2))) / floor
+    return found
+
+
+def _amount(folder: Path, truth: str, diagnosis) -> dict | None:
+    """The truth's amount beside the interval found, where both mean the same quantity."""
+    hidden = json.loads((folder / 'truth' / 'truth.json').read_text())['hidden']
+    found = next((c for c in diagnosis.classes if c.best == truth), None)
+    if not found or len(hidden) != 1 or truth not in diagnosis.accepted:
+        return None
+    true, parameters = hidden[0], found.parameters
+    if truth == 'air_drift':
+        vertical = abs(true['direction'][2]) > 0.5
+        interval = parameters['shift_down_m' if vertical else 'shift_across_m']
+        size = -true['amplitude'] * true['direction'][2] if vertical else None
+        if size is None:
+            return None
+    elif truth in SAME_AMOUNT and SAME_AMOUNT[truth] in parameters:
+        interval, size = parameters[SAME_AMOUNT[truth]], true['amplitude']
+    else:
+        return None
+    return {'true': size, 'low': float(interval.low), 'high': float(interval.high)}
+
+
+def stepwise_bic(diagnosis) -> dict:
+    """Forward selection by BIC over the same signatures: the usual way, for comparison."""
+    from paint_deposition.effects.catalogue import EFFECTS
+    from paint_deposition.inference.signatures import neutral_shapes, signature
+
+    study, fit = diagnosis.study, diagnosis.history[0].fit
+    marks = [
+        signature(study.forward, fit, shape, study.sigma_um)
+        for effect in EFFECTS.values()
+        for shape in neutral_shapes(effect)
+    ]
+    columns, chosen = fit.jacobian, []
+    count = len(fit.residual)
+
+    def bic(design: np.ndarray) -> float:
+        solved, *_ = np.linalg.lstsq(design, fit.residual, rcond=None)
+        rest = fit.residual - design @ solved
+        return float(rest @ rest) + design.shape[1] * np.log(count)
+
+    value = bic(columns)
+    while len(chosen) < 3:
+        options = [
+            (bic(np.hstack([columns, m.columns])), k)
+            for k, m in enumerate(marks)
+            if m.id not in chosen
+        ]
+        best, k = min(options)
+        if best >= value:
+            break
+        value, columns = best, np.hstack([columns, marks[k].columns])
+        chosen.append(marks[k].id)
+    return {'chosen': chosen}
+
+
+def interval(hits: int, total: int) -> str:
+    """A share with its 95 % Clopper-Pearson interval."""
+    if total == 0:
+        return 'none'
+    low = beta.ppf(0.025, hits, total - hits + 1) if hits else 0.0
+    high = beta.ppf(0.975, hits + 1, total - hits) if hits < total else 1.0
+    share = 100.0 * hits / total
+    return f'{share:5.1f} %  [{100 * low:.1f}, {100 * high:.1f}]  {hits}/{total}'
+
+
+def summary(records: list[dict]) -> str:
+    """The table."""
+    from paint_deposition.effects.catalogue import EFFECTS
+
+    sound = [r for r in records if 'error' not in r]
+    clean = [r for r in sound if not r['truth']]
+    hidden = [r for r in sound if r['truth'] in EFFECTS]
+    seen = [r for r in hidden if r['verdict'] != 'none_missing']
+    footprint = [r for r in sound if r['truth'].startswith('footprint:')]
+    seen_footprint = [r for r in footprint if r['verdict'] != 'none_missing']
+    strange = [r for r in sound if r['truth'].startswith('unknown:')]
+    seen_strange = [r for r in strange if r['verdict'] != 'none_missing']
+    without = [r['without'] for r in hidden if 'without' in r]
+    left = [w for w in without if w['verdict'] != 'none_missing']
+
+    def in_classes(r):
+        return any(r['truth'] in members for members, _ in r['classes'])
+
+    def wrong(r, truth):
+        return any(
+            truth not in members and probability > 0.8 and set(members) & set(r['accepted'])
+            for members, probability in r['classes']
+        )
+
+    def bic_right(r):
+        return bool(r['bic']['chosen']) and r['bic']['chosen'][0] == r['truth']
+
+    added = [r for r in hidden if r['accepted'] and r['truth'] in
+             {m for members, _ in r['classes'] for m in members}]  # fmt: skip
+    ratios = [r['heldout']['after'] for r in added]
+    before = [r['heldout']['before'] for r in added]
+    amounts = [r['amount'] for r in hidden if r['amount']]
+    covered = sum(a['low'] <= a['true'] <= a['high'] for a in amounts)
+    seconds = [r['seconds'] for r in sound]
+    alarm = sum(r['verdict'] != 'none_missing' for r in clean)
+    bic_alarm = sum(bool(r['bic']['chosen']) for r in clean)
+    bic_seen = [r for r in hidden if r['bic']['chosen']]
+    unsure = sum(w['verdict'] in ('unknown_effect', 'undecided') for w in left)
+    recognised = sum(r['unknown'] == 'footprint' for r in seen_footprint)
+    everything = [*seen, *seen_footprint, *seen_strange]
+    lines = [
+        f'{len(records)} campaigns, {len(records) - len(sound)} errors',
+        f'false alarms on clean data       {interval(alarm, len(clean))}',
+        f'  stepwise BIC                   {interval(bic_alarm, len(clean))}',
+        f'effects detected                 {interval(len(seen), len(hidden))}',
+        f'  stepwise BIC                   {interval(len(bic_seen), len(hidden))}',
+        f'right effect in a class reported {interval(sum(map(in_classes, seen)), len(seen))}',
+        f'  stepwise BIC, first named      '
+        f'{interval(sum(map(bic_right, bic_seen)), len(bic_seen))}',
+        f'wrong effect above 0.8, effects  '
+        f'{interval(sum(wrong(r, r["truth"]) for r in seen), len(seen))}',
+        f'wrong effect above 0.8, all      '
+        f'{interval(sum(wrong(r, r["truth"]) for r in everything), len(everything))}',
+        f'class removed: unknown/undecided {interval(unsure, len(left))}',
+        f'strange cause: unknown/undecided '
+        f'{interval(sum(not r["accepted"] for r in seen_strange), len(seen_strange))}',
+        f'footprint: not blamed on physics '
+        f'{interval(sum(not r["accepted"] for r in seen_footprint), len(seen_footprint))}',
+        f'  recognised as the footprint    {interval(recognised, len(seen_footprint))}',
+        f'95 % intervals cover the truth   {interval(covered, len(amounts))}',
+    ]
+    if ratios:
+        lines.append(
+            f'held-out RMSE over noise         {np.median(before):.2f} before, '
+            f'{np.median(ratios):.2f} after (90 % of cases below '
+            f'{np.quantile(ratios, 0.9):.2f})'
+        )
+    if seconds:
+        lines.append(
+            f'seconds a diagnosis              {np.median(seconds):.1f} median, '
+            f'{max(seconds):.1f} longest'
+        )
+    return '\n'.join(lines)
+
+
+@click.command()
+@click.option('--clean', default=100, show_default=True, help='Campaigns with nothing hidden.')
+@click.option('--each', default=6, show_default=True, help='Campaigns of each hidden cause.')
+@click.option('--processes', default=2, show_default=True)
+@click.option(
+    '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
+)
+@click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
+def main(clean: int, each: int, processes: int, results: Path, only_summary: bool) -> None:
+    """Score the diagnosis on doors with hidden effects."""
+    results.parent.mkdir(parents=True, exist_ok=True)
+    lines = results.read_text().splitlines() if results.exists() else []
+    records = [json.loads(line) for line in lines]
+    if not only_summary:
+        known = {(r['seed'], r['truth']) for r in records}
+        todo = [job for job in jobs(clean, each) if job not in known]
+        # Causes are mixed, so that a run cut off early is a fair sample.
+        np.random.default_rng(0).shuffle(todo)
+        todo = [(int(seed), str(truth)) for seed, truth in todo]
+        pool = multiprocessing.get_context('spawn').Pool(processes)
+        with results.open('a') as file, pool:
+            for record in tqdm(pool.imap_unordered(run_one, todo), total=len(todo)):
+                records.append(record)
+                file.write(json.dumps(record, default=float) + '\n')
+                file.flush()
+    click.echo(summary(records))
+
+
+if __name__ == '__main__':
+    main()

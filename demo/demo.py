@@ -1,0 +1,147 @@
+"""A door painted live, an index recommended, a measured door explained: all of it in two minutes.
+
+Starts the real nodes as processes, replays the sample trajectory onto the sample door, records
+the run, checks it against the offline film, asks the planner, and diagnoses the measured door.
+"""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import rclpy
+from ament_index_python.packages import get_package_prefix, get_package_share_directory
+from domain_coordinator import domain_id
+from paint_msgs.srv import SaveFilm
+from rosbags.highlevel import AnyReader
+from std_srvs.srv import Trigger
+
+from nodes import Cell
+from paint_deposition.formats.bags import read_trajectory
+
+PACKAGE = 'paint_deposition'
+PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE
+SAMPLES = Path(get_package_share_directory(PACKAGE)) / 'samples'
+DOOR, TRAJECTORY = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
+MEASURED = SAMPLES / 'measured_door'
+
+
+def main() -> None:
+    """Run the demo; the results go to the folder given, those of an older demo are replaced."""
+    folder = Path(sys.argv[1]).resolve()
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True, exist_ok=True)
+    with domain_id() as domain:
+        # The nodes talk among themselves, whatever else runs on this machine.
+        os.environ['ROS_DOMAIN_ID'] = str(domain)
+        rclpy.init()
+        run, film_csv = paint_live(folder)
+        offline = paint_offline(folder)
+        compare_films(film_csv, run, offline / 'film.csv')
+        recommend()
+        rclpy.shutdown()
+    diagnose(folder)
+    say('What there is now')
+    for what, path in (
+        ('the run, for ros2 bag, Foxglove or rosbags', run),
+        ('the door in colours', film_csv.with_suffix('.ply')),
+        ('the door from the front', offline / 'film.png'),
+        ('where the model fails and why, for a browser', folder / 'diagnosis' / 'report.html'),
+        ('the model with what was missing', folder / 'diagnosis' / 'model.yaml'),
+    ):
+        print(f'  {what}:\n    {path}')
+
+
+def paint_live(folder: Path) -> tuple[Path, Path]:
+    """Paint the door through the nodes; returns the recorded run and the film's table."""
+    say('A door painted live')
+    poses = len(read_trajectory(TRAJECTORY, state_topic='/atomizer/state'))
+    with Cell(PREFIX) as cell:
+        cell.start('deposition_simulator', mesh_file=DOOR, max_edge_length_m=0.01,
+                   output_directory=folder)  # fmt: skip
+        cell.start('run_recorder', output_directory=folder)
+        cell.wait_for_service(SaveFilm, 'deposition_simulator/save_film')
+        cell.wait_for_service(Trigger, 'run_recorder/stop')
+        cell.start('bag_player', bag=TRAJECTORY, state_topic='/atomizer/state', rate=0.0,
+                   wait_for_subscribers=2)  # fmt: skip
+        stats = cell.follow_poses(poses)
+        cell.wait_for_end('bag_player')
+        paths = cell.save_film('live')
+        run = cell.stop_recorder()
+    print(
+        f'{stats.poses_received} poses, {stats.poses_rejected} rejected; film '
+        f'{stats.mean_um:.1f} um mean, {stats.std_dev_um:.1f} um standard deviation, '
+        f'{100 * stats.coverage:.0f} % covered, transfer efficiency '
+        f'{100 * stats.transfer_efficiency:.0f} %'
+    )
+    return run, next(path for path in paths if path.suffix == '.csv')
+
+
+def paint_offline(folder: Path) -> Path:
+    """The same film from the command line, for its picture and to check the nodes."""
+    output = folder / 'film'
+    paint('simulate', '--mesh', DOOR, '--trajectory', TRAJECTORY, '--state-topic',
+          '/atomizer/state', '-o', output, '--json')  # fmt: skip
+    return output
+
+
+def compare_films(live_csv: Path, run: Path, offline_csv: Path) -> None:
+    """Print how far the live and the recorded film are from the offline one."""
+    offline = np.loadtxt(offline_csv, delimiter=',', skiprows=1)[:, 3]
+    live = np.loadtxt(live_csv, delimiter=',', skiprows=1)[:, 3]
+    with AnyReader([run]) as reader:
+        fields = [c for c in reader.connections if c.topic.endswith('thickness/field')]
+        *_, (connection, _, raw) = reader.messages(connections=fields)
+        recorded = reader.deserialize(raw, connection.msgtype).thickness_um
+    for name, film in (('live', live), ('recorded', recorded)):
+        off = np.abs(film - offline).max() / offline.max()
+        print(f'{name} film against the offline one: {off:.1e} of the peak apart')
+
+
+def recommend() -> None:
+    """Ask the running planner for an index."""
+    say('An index recommended by the running planner')
+    with Cell(PREFIX) as cell:
+        cell.start('index_planner')
+        answer = cell.recommend_index(target_um=20.0, tolerance=0.05, width_m=0.9)
+    print(answer.message)
+
+
+def diagnose(folder: Path) -> None:
+    """Explain a measured door, and judge the models on readings they never saw."""
+    say('A measured door: what does the model of 2002 miss?')
+    output = folder / 'diagnosis'
+    paint('diagnose', MEASURED / 'campaign.yaml', '-o', output, show=True)
+    errors = []
+    for name in ('model_before.yaml', 'model.yaml'):
+        figures = paint('compare', MEASURED / 'unseen.yaml', '--model', output / name, '-o',
+                        folder / 'unseen' / Path(name).stem, '--json')  # fmt: skip
+        whole = json.loads(figures)['misfits'][0]
+        errors.append(whole['rmse_um'])
+    print(
+        f'{whole["readings"]} readings that no fit has seen: RMSE {errors[0]:.2f} um before, '
+        f'{errors[1]:.2f} um after'
+    )
+
+
+def paint(*arguments, show: bool = False) -> str:
+    """Run the command; returns what it printed."""
+    command = [str(PREFIX / 'paint'), *map(str, arguments)]
+    done = subprocess.run(
+        command, stdout=None if show else subprocess.PIPE, text=True, check=False
+    )
+    if done.returncode:
+        sys.exit(f'demo: `paint {arguments[0]}` ended with exit code {done.returncode}')
+    return done.stdout or ''
+
+
+def say(line: str) -> None:
+    """Print a heading."""
+    print(f'\n{line}\n{"-" * len(line)}', flush=True)
+
+
+if __name__ == '__main__':
+    main()
