@@ -29,24 +29,18 @@ FOOTPRINTS = ('elliptic', 'skewed', 'triangular_ring', 'two_lobes')
 STRANGE = ('charge_swirl', 'masking_tape', 'poor_ground', 'pump_pulsation', 'thermal_stripe')
 LAYOUTS = (('door',), ('door',), ('panel', 'door'), ('door', 'door_vertical'))
 PARCELS = 4_000_000
-# Parameter in which truth and model speak of the same amount: (name, other name, sign).
-SAME_AMOUNT = {
-    'flow_drift': 'drift_per_pass',
-    'fog_gradient': 'fog_um',
-    'tcp_standoff': 'offset_m',
-}
 
 
-def jobs(clean: int, each: int) -> list[tuple[int, str]]:
+def jobs(clean: int, each: int, first_seed: int) -> list[tuple[int, str]]:
     """(seed, truth) of every campaign; seeds are not those of any test."""
     from paint_deposition.effects.catalogue import EFFECTS
 
-    listed = [(910_000 + k, '') for k in range(clean)]
+    listed = [(first_seed + k, '') for k in range(clean)]
     truths = list(EFFECTS)
     truths += [f'footprint:{name}' for name in FOOTPRINTS]
     truths += [f'unknown:{name}' for name in STRANGE]
     for number, truth in enumerate(truths):
-        listed += [(920_000 + 100 * number + k, truth) for k in range(each)]
+        listed += [(first_seed + 10_000 + 100 * number + k, truth) for k in range(each)]
     return listed
 
 
@@ -93,7 +87,7 @@ def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict
         'seconds': seconds,
         **_said(diagnosis),
         'heldout': _held_out(folder, campaign, diagnosis),
-        'amount': _amount(folder, truth, diagnosis),
+        'amounts': _amounts(folder, truth, campaign, diagnosis),
         'bic': stepwise_bic(diagnosis),
     }
     if truth in EFFECTS and record['verdict'] != 'none_missing':
@@ -149,24 +143,24 @@ def _held_out(folder: Path, campaign, diagnosis) -> dict[str, float]:
     return found
 
 
-def _amount(folder: Path, truth: str, diagnosis) -> dict | None:
-    """The truth's amount beside the interval found, where both mean the same quantity."""
+def _amounts(folder: Path, truth: str, campaign, diagnosis) -> list[dict]:
+    """The truth's amounts beside the intervals found, where both mean the same quantity."""
+    from benchmarks.amounts import true_amounts
+
     hidden = json.loads((folder / 'truth' / 'truth.json').read_text())['hidden']
     found = next((c for c in diagnosis.classes if c.best == truth), None)
-    if not found or len(hidden) != 1 or truth not in diagnosis.accepted:
-        return None
-    true, parameters = hidden[0], found.parameters
-    if truth == 'air_drift':
-        vertical = abs(true['direction'][2]) > 0.5
-        interval = parameters['shift_down_m' if vertical else 'shift_across_m']
-        size = -true['amplitude'] * true['direction'][2] if vertical else None
-        if size is None:
-            return None
-    elif truth in SAME_AMOUNT and SAME_AMOUNT[truth] in parameters:
-        interval, size = parameters[SAME_AMOUNT[truth]], true['amplitude']
-    else:
-        return None
-    return {'true': size, 'low': float(interval.low), 'high': float(interval.high)}
+    if not found or truth not in diagnosis.accepted:
+        return []
+    passes = [int(e.path.spray_pass.max()) + 1 for e in campaign.experiments]
+    return [
+        {
+            'name': f'{truth}.{name}',
+            'true': float(value),
+            'low': float(found.parameters[name].low),
+            'high': float(found.parameters[name].high),
+        }
+        for name, value in true_amounts(hidden[0], passes).items()
+    ]
 
 
 def stepwise_bic(diagnosis) -> dict:
@@ -244,7 +238,7 @@ def summary(records: list[dict]) -> str:
              {m for members, _ in r['classes'] for m in members}]  # fmt: skip
     ratios = [r['heldout']['after'] for r in added]
     before = [r['heldout']['before'] for r in added]
-    amounts = [r['amount'] for r in hidden if r['amount']]
+    amounts = [a for r in hidden for a in r['amounts']]
     covered = sum(a['low'] <= a['true'] <= a['high'] for a in amounts)
     seconds = [r['seconds'] for r in sound]
     alarm = sum(r['verdict'] != 'none_missing' for r in clean)
@@ -291,19 +285,22 @@ def summary(records: list[dict]) -> str:
 @click.command()
 @click.option('--clean', default=100, show_default=True, help='Campaigns with nothing hidden.')
 @click.option('--each', default=6, show_default=True, help='Campaigns of each hidden cause.')
+@click.option('--first-seed', default=910_000, show_default=True, help='For other campaigns.')
 @click.option('--processes', default=2, show_default=True)
 @click.option(
     '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
 )
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
-def main(clean: int, each: int, processes: int, results: Path, only_summary: bool) -> None:
+def main(
+    clean: int, each: int, first_seed: int, processes: int, results: Path, only_summary: bool
+) -> None:
     """Score the diagnosis on doors with hidden effects."""
     results.parent.mkdir(parents=True, exist_ok=True)
     lines = results.read_text().splitlines() if results.exists() else []
     records = [json.loads(line) for line in lines]
     if not only_summary:
         known = {(r['seed'], r['truth']) for r in records}
-        todo = [job for job in jobs(clean, each) if job not in known]
+        todo = [job for job in jobs(clean, each, first_seed) if job not in known]
         # Causes are mixed, so that a run cut off early is a fair sample.
         np.random.default_rng(0).shuffle(todo)
         todo = [(int(seed), str(truth)) for seed, truth in todo]

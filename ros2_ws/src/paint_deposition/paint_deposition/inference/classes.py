@@ -29,7 +29,7 @@ class Candidate:
 
     Attributes:
         members: ids, most probable first.
-        probability: that one of them is missing, given that something is.
+        probability: that one of them is missing.
         fit: of the model with the best member.
     """
 
@@ -45,15 +45,17 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Ranking:
-    """What is missing, given that something is.
+    """How probable each answer is; what is left of one is that nothing is missing.
 
     Attributes:
         classes: most probable first; as two may be missing, they may sum to more than one.
+        named: probability that effects of the library explain it.
         unknown: probability that the library does not explain it.
         footprint: probability that the pattern itself deviates from eq. (1).
     """
 
     classes: tuple[Candidate, ...]
+    named: float
     unknown: float
     footprint: float
 
@@ -66,66 +68,74 @@ def rank(study: Study, fit: Fit, judged: Judgement) -> Ranking:
         fit: the model so far.
         judged: the linear evidence around it.
     """
-    hypotheses = judged.weighing.hypotheses[1:]
-    factors = judged.weighing.log_factors[1:].copy()
-    fits = _refit(study, fit, judged, hypotheses, factors)
-    alone: dict[str, float] = {}
-    for h, factor in zip(hypotheses, factors, strict=True):
-        if _is_single(h):
-            alone[h.effects[0]] = max(factor, alone.get(h.effects[0], -np.inf))
+    hypotheses = judged.weighing.hypotheses
+    factors, fits = _refit(study, fit, judged)
+    alone = _alone(hypotheses, factors)
     weights = posterior(hypotheses, factors)
     answers = np.array(
         [
             bool(h.effects)
-            and (not h.other or max(alone[e] for e in h.effects) >= SUFFICIENT * factor)
-            for h, factor in zip(hypotheses, factors, strict=True)
+            and (
+                not h.other or max(factors[alone[e]] for e in h.effects) >= SUFFICIENT * factors[k]
+            )
+            for k, h in enumerate(hypotheses)
         ]
     )
     other = np.array([h.other for h in hypotheses])
     classes = []
-    left = sorted(alone, key=lambda effect_id: -alone[effect_id])
+    left = list(alone)
     while left:
         members = alike(judged, left)
         left = [effect_id for effect_id in left if effect_id not in members]
         holds = np.array([bool(set(members) & set(h.effects)) for h in hypotheses])
         probability = float(weights[holds & answers].sum())
-        if probability >= WORTH_LISTING and members[0] in fits:
-            best = fits[members[0]].model
-            alone_fit = study.fit(Unknowns.of(best, *best.effects))
-            classes.append(Candidate(members, min(probability, 1.0), alone_fit))
+        if probability >= WORTH_LISTING:
+            first = alone[members[0]]
+            near = fits.get(first) or _fit_with(study, fit, judged, hypotheses[first])
+            classes.append(Candidate(members, min(probability, 1.0), _on_one_level(study, near)))
     return Ranking(
         tuple(sorted(classes, key=lambda c: -c.probability)),
+        float(weights[answers].sum()),
         float(weights[(other == 'unknown') & ~answers].sum()),
         float(weights[(other == 'footprint') & ~answers].sum()),
     )
 
 
-def _refit(
-    study: Study, fit: Fit, judged: Judgement, hypotheses: list[Hypothesis], factors: np.ndarray
-) -> dict[str, Fit]:
-    """Replace the linear evidence of the most probable by that of a full refit.
-
-    Returns the fits of single effects; ``factors`` is changed in place.
-    """
+def _refit(study: Study, fit: Fit, judged: Judgement) -> tuple[np.ndarray, dict[int, Fit]]:
+    """Evidence (H,), that of the most probable hypotheses by full refits, and those refits."""
+    hypotheses = judged.weighing.hypotheses
+    factors = judged.weighing.log_factors.copy()
     freedom = study.noise.degrees_of_freedom
-    fits: dict[str, Fit] = {}
     again = fit
     if study.levels is not None:
         again = study.fit(Unknowns.of(fit.model, *fit.model.effects), extra=study.levels)
     base = _log_evidence(again, freedom)
     weights = factors + np.log([h.prior for h in hypotheses])
-    order = np.argsort(-weights)
+    order = [k for k in np.argsort(-weights) if hypotheses[k].effects or hypotheses[k].other]
     near = [k for k in order if weights[k] > weights[order[0]] - REFITTED_WITHIN]
     singles = [k for k in order if _is_single(hypotheses[k])]
     shapeless = [k for k in order if not hypotheses[k].effects]
+    fits = {}
     for k in dict.fromkeys([*near[:MOST_REFITTED], *singles[:3], *shapeless[:2]]):
-        refitted = _fit_with(study, fit, judged, hypotheses[k])
-        factors[k] = _log_evidence(refitted, freedom) - base
+        fits[k] = _fit_with(study, fit, judged, hypotheses[k])
+        factors[k] = _log_evidence(fits[k], freedom) - base
+    return factors, fits
+
+
+def _alone(hypotheses: list[Hypothesis], factors: np.ndarray) -> dict[str, int]:
+    """Number of the best hypothesis of each effect alone, best effect first."""
+    found: dict[str, int] = {}
+    for k in np.argsort(-factors):
         if _is_single(hypotheses[k]):
-            rival = fits.get(hypotheses[k].effects[0])
-            if rival is None or refitted.chi_square < rival.chi_square:
-                fits[hypotheses[k].effects[0]] = refitted
-    return fits
+            found.setdefault(hypotheses[k].effects[0], int(k))
+    return found
+
+
+def _on_one_level(study: Study, fit: Fit) -> Fit:
+    """The fit without a level of its own for each part, which no model can have."""
+    if study.levels is None:
+        return fit
+    return study.fit(Unknowns.of(fit.model, *fit.model.effects))
 
 
 def _is_single(hypothesis: Hypothesis) -> bool:

@@ -12,12 +12,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 from scipy.stats import f as f_ratio
-from scipy.stats import t as student
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.inference.campaign import Campaign
 from paint_deposition.inference.classes import Candidate, Ranking, rank
 from paint_deposition.inference.cross_validation import hold_out
+from paint_deposition.inference.estimates import estimates
 from paint_deposition.inference.fit import Fit
 from paint_deposition.inference.judgement import Judgement, judge
 from paint_deposition.inference.signatures import Signature, neutral_shapes
@@ -80,7 +80,7 @@ def diagnose(
     nuisance: list[Signature] = []
     progress('weighing what may be missing')
     judged = first = judge(study, fit, neutral, nuisance, seed)
-    ranking = Ranking((), 0.0, 0.0)
+    ranking = Ranking((), 0.0, 0.0, 0.0)
     while judged.weighing.p_value < ALPHA and len(accepted) < MOST_EFFECTS:
         progress('refitting with the most probable effects')
         ranking = rank(study, fit, judged)
@@ -95,7 +95,7 @@ def diagnose(
         fit = best.fit
         progress(f'added {best.best}; weighing what is left')
         judged = judge(study, fit, neutral, nuisance, seed)
-        ranking = Ranking((), 0.0, 0.0)
+        ranking = Ranking((), 0.0, 0.0, 0.0)
     return _conclude(study, fit, first, judged, ranking, accepted, history, seed)
 
 
@@ -144,27 +144,18 @@ def _told(study: Study, candidate: Candidate, history: list[Step]) -> EffectClas
         candidate.members,
         candidate.probability,
         candidate.best,
-        intervals(study, candidate.fit, candidate.best),
+        intervals(candidate.fit, candidate.best),
         {'before': history[-2].holdout_rmse_um, 'after': history[-1].holdout_rmse_um},
     )
 
 
-def intervals(study: Study, fit: Fit, effect_id: str) -> dict[str, Interval]:
-    """95 % intervals of an effect's amplitudes, cut at the bounds of what is physical."""
-    freedom = min(study.noise.degrees_of_freedom, 1e6)
-    reach = float(student.ppf(0.975, freedom))
-    deviation = np.sqrt(np.diag(fit.covariance))
-    effect = next(e for e in fit.model.effects if e.id == effect_id)
-    info = type(effect).parameters()
+def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
+    """95 % intervals of an effect's amplitudes, within what is physical."""
     found = {}
-    for k, name in enumerate(fit.unknowns.names):
-        owner, _, parameter = name.partition('.')
+    for estimate in estimates(fit):
+        owner, _, parameter = estimate.name.partition('.')
         if owner == effect_id:
-            value = getattr(effect, parameter)
-            half = reach * deviation[k] * info[parameter]['typical']
-            low = max(value - half, info[parameter]['low'])
-            high = min(value + half, info[parameter]['high'])
-            found[parameter] = Interval(value, low, high)
+            found[parameter] = Interval(estimate.value, estimate.low, estimate.high)
     return found
 
 
@@ -181,7 +172,7 @@ def _conclude(
     open_question = judged.weighing.p_value < ALPHA
     others = tuple(
         EffectClass(
-            c.members, c.probability, c.best, intervals(study, c.fit, c.best),
+            c.members, c.probability, c.best, intervals(c.fit, c.best),
             {
                 'before': history[-1].holdout_rmse_um,
                 'after': Step.of(study, c.best, c.fit).holdout_rmse_um,
@@ -199,7 +190,7 @@ def _conclude(
     elif accepted and (not open_question or _explains_most(history, judged)):
         names = ' and '.join(c.best for c in accepted)
         verdict, reason = 'effect_missing', f'The readings show {names}.'
-    elif unexplained > 0.5 or not others:
+    elif unexplained > ranking.named or not others:
         footprint = ranking.footprint > ranking.unknown
         unknown = locate_unexplained(study, fit, footprint, seed)
         verdict, reason = (

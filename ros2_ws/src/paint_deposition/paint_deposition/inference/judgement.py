@@ -90,10 +90,13 @@ def _fields(study: Study, fit: Fit) -> list[np.ndarray]:
 
 
 def _detectable(base: BaseSpace, marks: list[Signature]) -> dict[str, float]:
-    """Smallest amplitude that stands out, for the shape that shows best."""
+    """Smallest amplitudes that stand out, for the shape that shows best, where physical."""
     info = type(marks[0].effect).parameters()
     found = {}
     for k, name in enumerate(marks[0].names):
         strength = max(float(np.linalg.norm(base.project(m.columns[:, [k]]))) for m in marks)
-        found[name] = SEEN * info[name]['typical'] / max(strength, 1e-9)
+        amount = SEEN * info[name]['typical'] / max(strength, 1e-9)
+        room = max(abs(info[name][end] - info[name]['neutral']) for end in ('low', 'high'))
+        if amount <= room:
+            found[name] = amount
     return found

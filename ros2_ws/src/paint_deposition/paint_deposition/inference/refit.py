@@ -75,7 +75,7 @@ def refit(
         (added.id,),
         probability,
         added.id,
-        intervals(study, best, added.id),
+        intervals(best, added.id),
         {'before': history[0].holdout_rmse_um, 'after': history[1].holdout_rmse_um},
     )
     verdict: Verdict = 'none_missing' if judged.weighing.p_value >= ALPHA else 'undecided'

@@ -1,0 +1,52 @@
+"""True amounts of hidden effects in the parameters of the model's laws.
+
+Only effects of which truth and law mean the same by their parameters: errors of the tool, shifts
+at the model plane, delays, levels and volumes. Attraction, shielding or losses follow laws of
+their own in the virtual paint shop, so their parameters cannot be compared.
+"""
+
+import numpy as np
+
+NAMES = {
+    'flow_drift': 'drift_per_pass',
+    'gauge_zero': 'offset_um',
+    'gun_wake': 'lag_s',
+    'overspray_fog': 'fog_um',
+    'pose_lag': 'lag_s',
+    'tcp_standoff': 'offset_z_m',
+}
+SAG_REFERENCE_UM = 20.0
+
+
+def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
+    """Parameter values that stand for a truth; none where the laws cannot be compared.
+
+    Args:
+        hidden: the truth's entry in ``truth.json``.
+        passes: number of passes of each experiment.
+    """
+    amplitude, truth = hidden['amplitude'], hidden['id']
+    if truth == 'tcp_offset':
+        angle = hidden['direction_rad']
+        return {
+            'offset_x_m': amplitude * np.cos(angle),
+            'offset_y_m': amplitude * np.sin(angle),
+        }
+    if truth == 'tcp_tilt':
+        angle = hidden['axis_rad']
+        return {'tilt_x_rad': amplitude * np.cos(angle), 'tilt_y_rad': amplitude * np.sin(angle)}
+    if truth == 'air_drift':
+        # The skin faces +y, so that its right side, seen by the gun, is -x.
+        x, _, z = hidden['direction']
+        return {'shift_down_m': -amplitude * z, 'shift_across_m': -amplitude * x}
+    if truth == 'sag':
+        return {'run_m': amplitude / SAG_REFERENCE_UM}
+    if truth == 'flow_drift':
+        return {'drift_per_pass': float(np.mean([_growth(amplitude, n) for n in passes]))}
+    return {NAMES[truth]: amplitude} if truth in NAMES else {}
+
+
+def _growth(drift: float, passes: int) -> float:
+    """Mean growth from pass to pass where the flow is linear about the middle of the job."""
+    half = 0.5 * (passes - 1)
+    return ((1.0 + drift * half) / (1.0 - drift * half)) ** (1.0 / (passes - 1)) - 1.0
