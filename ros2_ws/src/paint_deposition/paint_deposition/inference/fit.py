@@ -4,7 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
-from scipy.optimize import OptimizeResult, least_squares
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+from scipy.stats import norm, qmc
 
 from paint_deposition.inference.forward import Forward
 from paint_deposition.inference.unknowns import PATTERN, Unknowns
@@ -13,7 +14,14 @@ from paint_deposition.model.deposition_model import DepositionModel
 # Steps of the finite differences, in the vector's units.
 STEP = 1e-3
 SPREAD_OF_STARTS = 0.8
+# Shapes that are tried for each start that is kept.
+TRIED_A_START = 8
+# Steps of the first search from each start, and how many of the best are taken to the end.
 SCREENING_STEPS = 6
+FINISHED = 4
+MOST_STEPS = 60
+# Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
+EVENNESS = 0.05
 
 
 @dataclass(frozen=True)
@@ -79,7 +87,8 @@ def fit_readings(
         forward: predicts the points.
         measured_um, sigma_um: (P,) point means and their standard deviations [um].
         unknowns: what is varied; its start model is the first start.
-        starts: how many starts; others are drawn around the first with the given seed.
+        starts: how many starts; others are the best of many shapes of the pattern around the
+            first, drawn with the given seed.
         extra: (P, n) directions, over the standard deviation, along which the readings may
             deviate further with unit variance.
     """
@@ -90,20 +99,15 @@ def fit_readings(
         lower = cholesky(np.eye(len(measured_um)) + extra @ extra.T, lower=True)
     problem = _Problem(forward, measured_um, sigma_um, unknowns, lower)
     first = problem.scaled_to_mean(unknowns.encode(unknowns.start))
-    candidates = [first]
-    random = np.random.default_rng(seed)
-    pattern = np.arange(len(unknowns)) < len(PATTERN)
-    for _ in range(starts - 1):
-        away = np.where(pattern, SPREAD_OF_STARTS * width * random.normal(size=len(width)), 0.0)
-        candidates.append(problem.scaled_to_mean(np.clip(first + away, low, high)))
-
-    found = []
-    for start in candidates:
-        rough = problem.search(start, SCREENING_STEPS if starts > 1 else 60)
-        found.append((rough.cost, tuple(rough.x), rough))
-    best = min(found, key=lambda item: item[:2])[2]
     if starts > 1:
-        best = problem.search(best.x, 60)
+        candidates = [first, *_promising(problem, first, starts - 1, seed)]
+        rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
+        rough.sort(key=lambda result: result.cost)
+        candidates = [result.x for result in rough[:FINISHED]]
+    else:
+        candidates = [first]
+    found = [problem.search(start, MOST_STEPS) for start in candidates]
+    best = min(found, key=lambda result: result.cost)
     model = unknowns.decode(best.x)
     predicted = forward.predict_um(model)
     return Fit(
@@ -116,6 +120,23 @@ def fit_readings(
         bool(best.status > 0),
         0.0 if lower is None else 2.0 * float(np.sum(np.log(np.diag(lower)))),
     )
+
+
+def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """The best of many shapes of the pattern, spread evenly over what bells usually have.
+
+    For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
+    so that only these three need be searched (variable projection, Golub and Pereyra 1973).
+    """
+    shape = [k for k, c in enumerate(PATTERN) if c.name in ('r_m', 'log_sigma1', 'log_sigma2')]
+    _, width = problem.unknowns.prior
+    spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
+    tried = []
+    for away in spread:
+        vector = first.copy()
+        vector[shape] += SPREAD_OF_STARTS * width[shape] * away
+        tried.append(problem.with_best_gains(np.clip(vector, problem.low, problem.high)))
+    return sorted(tried, key=problem.cost)[:count]
 
 
 def derivatives(
@@ -184,6 +205,29 @@ class _Problem:
         scaled = vector.copy()
         scaled[0] += np.log(max(ratio, 1e-3))
         return np.clip(scaled, self.low, self.high)
+
+    def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
+        """The same with the best K1, K2, K3 and phi, as far as other effects are linear."""
+        parts = np.tile(vector, (4, 1))
+        parts[:, 0] = 0.0
+        # Ring alone, centre alone, and the ring lopsided along x and along y.
+        parts[:, 1:4] = [[0, 0, 0], [1, 0, 0], [0, 0.9, 0], [0, 0, 0.9]]
+        films = np.stack([self.predict(part) for part in parts]) / self.sigma
+        films[2:] = (films[2:] - films[0]) / 0.9
+        even = EVENNESS * np.linalg.norm(films[0])
+        solved = lsq_linear(
+            np.vstack([films.T, np.diag([0.0, 0.0, even, even])[2:]]),
+            np.concatenate([self.measured / self.sigma, np.zeros(2)]),
+            bounds=([0.0, 0.0, -np.inf, -np.inf], np.inf),
+        ).x
+        ring, centre, *lopsided = solved
+        if ring <= 0.0:
+            return self.scaled_to_mean(vector)
+        gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
+        return np.clip([*gains, *vector[4:]], self.low, self.high)
+
+    def cost(self, vector: np.ndarray) -> float:
+        return float(np.sum(self.residuals(vector) ** 2))
 
     def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
         margin = 1e-9 * (self.high - self.low)

@@ -36,6 +36,21 @@ def check_enough(points: int) -> None:
         )
 
 
+def check_unit(readings: Readings) -> None:
+    """Refuse readings in another unit.
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    highest = float(readings.thickness_um.max())
+    if highest < THINNEST_FILM_UM:
+        unit, factor = ('mils', UM_PER_MIL) if highest > THINNEST_MILS else ('mm', UM_PER_MM)
+        raise ReadingsError(
+            f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
+            f'multiply by {factor:g}'
+        )
+
+
 def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     """Refuse readings that no film gives.
 
@@ -55,13 +70,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
             'is not negative, zero the gauge on bare metal'
         )
     _refuse_mixed_units(readings)
-    highest = float(film.max())
-    if highest < THINNEST_FILM_UM:
-        unit, factor = ('mils', UM_PER_MIL) if highest > THINNEST_MILS else ('mm', UM_PER_MM)
-        raise ReadingsError(
-            f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
-            f'multiply by {factor:g}'
-        )
 
 
 def check_panel(

@@ -12,6 +12,7 @@ from paint_deposition.inference.covariates import Covariate, Rays, covariates
 from paint_deposition.inference.fit import Fit, fit_readings
 from paint_deposition.inference.forward import Forward
 from paint_deposition.inference.noise import GaugeNoise, gauge_noise
+from paint_deposition.inference.readings_checks import check_unit
 from paint_deposition.inference.unknowns import Unknowns
 from paint_deposition.model.deposition_model import DepositionModel
 
@@ -47,7 +48,13 @@ class Study:
 
     @staticmethod
     def of(campaign: Campaign, effects: tuple[Effect, ...] = ()) -> 'Study':
-        """Prepare a campaign; ``effects`` are those whose amplitudes may be varied."""
+        """Prepare a campaign; ``effects`` are those whose amplitudes may be varied.
+
+        Raises:
+            ReadingsError: readings in another unit, with the remedy.
+        """
+        for experiment in campaign.experiments:
+            check_unit(experiment.readings)
         noise = gauge_noise([e.readings for e in campaign.experiments])
         measured = np.concatenate([e.means.mean_um for e in campaign.experiments])
         variances, start = [], 0

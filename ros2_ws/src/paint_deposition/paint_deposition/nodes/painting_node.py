@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any
 
@@ -37,7 +38,7 @@ POSES_FACING = 50
 POSES_CONSIDERED = 2000
 
 
-class PaintingNode(PaintNode):
+class PaintingNode(PaintNode, ABC):
     """Paints points of a part with a model as the motion comes in.
 
     A subclass says which points, with ``_points_on``, and shows the film.
@@ -94,9 +95,9 @@ class PaintingNode(PaintNode):
 
     # --- for the subclass
 
+    @abstractmethod
     def _points_on(self, surface: Surface) -> SurfacePoints:
         """The points of the part to paint."""
-        raise NotImplementedError
 
     def _read_part(self) -> None:
         """Read what is needed to choose the points, before the part is taken."""
@@ -119,9 +120,9 @@ class PaintingNode(PaintNode):
     def _changed(self, names: set[str]) -> None:
         """Parameters of the subclass have changed; ``self.values`` has the new ones."""
 
+    @abstractmethod
     def publish(self) -> None:
         """Publish the film, if it has changed."""
-        raise NotImplementedError
 
     # --- motion
 
