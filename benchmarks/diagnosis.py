@@ -306,7 +306,9 @@ def main(
         todo = [(int(seed), str(truth)) for seed, truth in todo]
         pool = multiprocessing.get_context('spawn').Pool(processes)
         with results.open('a') as file, pool:
-            for record in tqdm(pool.imap_unordered(run_one, todo), total=len(todo)):
+            for record in tqdm(
+                pool.imap_unordered(run_one, todo), total=len(todo), mininterval=20
+            ):
                 records.append(record)
                 file.write(json.dumps(record, default=float) + '\n')
                 file.flush()

