@@ -6,7 +6,7 @@ import pytest
 from booth import MODEL, painted, panel, panel_with_screen, path_of, serpentine, spot
 from paint_deposition.effects.convex_attraction import ConvexAttraction
 from paint_deposition.effects.faraday_shielding import FaradayShielding
-from paint_deposition.effects.flow_drift import FlowDrift
+from paint_deposition.effects.flow_drift import MIDDLE_PASS, FlowDrift
 from paint_deposition.effects.fog_gradient import FogGradient
 from paint_deposition.effects.gauge_curvature_bias import GaugeCurvatureBias
 from paint_deposition.effects.gauge_gain import GaugeGain
@@ -77,7 +77,7 @@ def test_flow_drifts_from_pass_to_pass():
         one_pass = path.select(path.spray_pass == number)
         plain = painted(panel(), one_pass).raw_um
         film = painted(panel(), one_pass, drifting).raw_um
-        np.testing.assert_allclose(film, plain * 0.95**number, rtol=1e-9)
+        np.testing.assert_allclose(film, plain * 0.95 ** (number - MIDDLE_PASS), rtol=1e-9)
 
 
 @pytest.mark.parametrize('attraction', [-1.0, 0.5, 2.0])

@@ -46,6 +46,12 @@ def deviation(fit: Fit) -> np.ndarray:
     return fit.residual + fit.jacobian @ (fit.vector - fit.unknowns.prior[0])
 
 
+def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of amplitudes with these signs, ten typical sizes wide."""
+    sides = np.array(sides, dtype=float)
+    return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)
+
+
 def hypothesis(base: BaseSpace, columns: np.ndarray, sides=None, **named) -> Hypothesis:
     """Something missing along these directions of the readings."""
     sides = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from inference.linear import linear_fit
+from inference.linear import bounds, linear_fit
 from paint_deposition.effects.air_drift import AirDrift
 from paint_deposition.effects.edge_build import EdgeBuild
 from paint_deposition.effects.faraday_shielding import FaradayShielding
@@ -20,9 +20,7 @@ MARK, OTHER, THIRD = np.linalg.qr(np.random.default_rng(1).normal(size=(READINGS
 
 
 def mark(effect, *columns, sides) -> Signature:
-    return Signature(
-        effect, type(effect).amplitudes(), np.column_stack(columns), np.array(sides, dtype=float)
-    )
+    return Signature(effect, type(effect).amplitudes(), np.column_stack(columns), *bounds(sides))
 
 
 def members(*signatures) -> tuple[str, ...]:
@@ -38,9 +36,15 @@ def members(*signatures) -> tuple[str, ...]:
 def test_parallel_marks_are_one_class():
     assert members(
         mark(EdgeBuild(), MARK, sides=[1]),
-        mark(OversprayFog(), 0.2 * MARK, sides=[1]),
+        mark(OversprayFog(), 0.5 * MARK, sides=[1]),
         mark(FaradayShielding(), OTHER, sides=[1]),
     ) == ('edge_build', 'overspray_fog')
+
+
+def test_an_effect_that_would_have_to_be_huge_is_no_rival():
+    for strength, expected in ((0.5, True), (0.1, False)):
+        weak = mark(OversprayFog(), strength * MARK, sides=[1])
+        assert ('overspray_fog' in members(mark(EdgeBuild(), MARK, sides=[1]), weak)) == expected
 
 
 def test_opposite_marks_of_signed_effects_are_no_rivals():

@@ -11,7 +11,7 @@ from paint_deposition.inference.campaign import Campaign, Experiment
 from paint_deposition.inference.fit import derivatives, fit_readings
 from paint_deposition.inference.forward import Forward
 from paint_deposition.inference.readings import Readings
-from paint_deposition.inference.study import LEVEL_SHARE, TEXTURE_SHARE, Study
+from paint_deposition.inference.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
 from paint_deposition.inference.unknowns import PATTERN, Unknowns
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
@@ -155,16 +155,16 @@ def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     assert study.levels is None
 
 
-def test_each_of_several_parts_has_a_level_of_its_own():
+def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
     parts = tuple(
         painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)) for height in (0.4, 0.6)
     )
     study = Study.of(Campaign(parts))
-    assert study.levels.shape == (36, 2)
-    assert (study.levels[:18, 1] == 0.0).all()
-    assert study.levels[:18, 0] == pytest.approx(
-        LEVEL_SHARE * study.measured_um[:18] / study.sigma_um[:18]
-    )
+    sigma = study.sigma_um[:18]
+    level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
+    none = np.zeros(18)
+    assert study.levels[:18] == pytest.approx(np.column_stack([level, none, zero, none]))
+    assert study.levels[18:, [0, 2]] == pytest.approx(0.0)
     patches, bands = study.patches(), study.bands(TRUTH)
     for blocks in (patches, bands):
         assert set(blocks[:18]).isdisjoint(blocks[18:])

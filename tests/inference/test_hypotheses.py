@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from inference.linear import linear_fit
+from inference.linear import bounds, linear_fit
 from paint_deposition.effects.air_drift import AirDrift
 from paint_deposition.effects.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.edge_build import EdgeBuild
@@ -26,7 +26,7 @@ def marks():
 
     def mark(effect, strength, sides):
         columns = strength * random.normal(size=(READINGS, len(sides)))
-        return Signature(effect, type(effect).amplitudes(), columns, np.array(sides))
+        return Signature(effect, type(effect).amplitudes(), columns, *bounds(sides))
 
     return [
         mark(AirDrift(), 0.8, (0.0, 0.0)),

@@ -12,8 +12,9 @@ class AirDrift(Effect):
     Acts on the motion: the pattern is shifted on the model plane by the drift's components in
     the tool's x and y. On the part the shift is a L / Omega, as drops that fly further drift
     longer: at the model plane's distance Omega it is a. Its direction is fixed in the booth,
-    however the gun is turned. Positive ``shift_down_m``: along gravity; positive
-    ``shift_across_m``: horizontally, to the right as the gun sees the part.
+    however the gun is turned. ``shift_down_m``: along gravity, and never up, as drops sink and
+    booths blow down; positive ``shift_across_m``: horizontally, to the right as the gun sees the
+    part.
     """
 
     id = 'air_drift'
@@ -26,7 +27,7 @@ class AirDrift(Effect):
     )
 
     shift_down_m: float = parameter(
-        0.0, low=-0.1, high=0.1, typical=0.015, unit='m',
+        0.0, low=0.0, high=0.1, typical=0.015, unit='m',
         description='a, shift of the pattern at the model plane; positive along gravity',
     )  # fmt: skip
     shift_across_m: float = parameter(

@@ -5,12 +5,15 @@ import numpy as np
 from paint_deposition.effects.base import Effect, PathContext, parameter
 from paint_deposition.motion.path import SprayPath
 
+# The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.
+MIDDLE_PASS = 2.5
+
 
 class FlowDrift(Effect):
     """Pump, temperature and viscosity drift: each pass delivers a little more, or less.
 
-    Acts on the flow: times (1 + a)^n on pass n, the first pass being 0. Positive a: later passes
-    deliver more.
+    Acts on the flow: times (1 + a)^(n - 2.5) on pass n, the first pass being 0, so that the middle
+    of six passes is as calibrated. Positive a: later passes deliver more.
     """
 
     id = 'flow_drift'
@@ -29,4 +32,5 @@ class FlowDrift(Effect):
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         passes_before = np.maximum(path.spray_pass, 0)
-        return path.with_(flow=path.flow * (1.0 + self.drift_per_pass) ** passes_before)
+        growth = (1.0 + self.drift_per_pass) ** (passes_before - MIDDLE_PASS)
+        return path.with_(flow=path.flow * growth)

@@ -3,24 +3,27 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import lsq_linear
 from scipy.stats import norm
 
 from paint_deposition.inference.evidence import Hypothesis, Judge
 from paint_deposition.inference.fit import Fit
 from paint_deposition.inference.hypotheses import posterior
 from paint_deposition.inference.judgement import Judgement
+from paint_deposition.inference.signatures import Signature
 from paint_deposition.inference.study import Study
 from paint_deposition.inference.unknowns import PATTERN, Unknowns
 
 # Effects whose marks on these readings are parallel to within this cosine are rivals.
 ALIKE = 0.9
+# ... with amplitudes up to this many times their typical size.
+PLAUSIBLE = 4.0
 # Hypotheses this far behind the best by the linear evidence are not refitted.
 REFITTED_WITHIN = 7.0
 MOST_REFITTED = 10
 # An effect beside an unknown cause is the answer if it gives this share of their evidence.
 SUFFICIENT = 0.75
-WORTH_LISTING = 0.01
+WORTH_LISTING = 0.02
 
 
 @dataclass(frozen=True)
@@ -142,16 +145,19 @@ def _is_single(hypothesis: Hypothesis) -> bool:
     return len(hypothesis.effects) == 1 and not hypothesis.other
 
 
+def _mark(judged: Judgement, hypothesis: Hypothesis, effect_id: str) -> Signature:
+    """The signature that stands for an effect of the hypothesis, in its shape."""
+    return next(
+        s for s in judged.signatures if s.id == effect_id and set(s.shape) <= set(hypothesis.shape)
+    )
+
+
 def _fit_with(study: Study, fit: Fit, judged: Judgement, hypothesis: Hypothesis) -> Fit:
     """The model as the hypothesis has it, from where the linear evidence sees its effects."""
     amplitudes = Judge(hypothesis).amplitudes(judged.base.deviation)
     effects, used = [], 0
     for effect_id in hypothesis.effects:
-        mark = next(
-            s
-            for s in judged.signatures
-            if s.id == effect_id and set(s.shape) <= set(hypothesis.shape)
-        )
+        mark = _mark(judged, hypothesis, effect_id)
         info = type(mark.effect).parameters()
         values = {}
         for name, amount in zip(mark.names, amplitudes[used:], strict=False):
@@ -200,10 +206,10 @@ def alike(judged: Judgement, ordered: list[str]) -> tuple[str, ...]:
     members = [ordered[0]]
     for effect_id in ordered[1:]:
         other = best[effect_id][0]
-        # Fixed signs become non-negative unknowns; free ones are split into two of them.
-        free = other.sides == 0.0
-        signed = other.columns * np.where(free, 1.0, other.sides)
-        _, rest = nnls(np.hstack([signed, -signed[:, free]]), mark)
+        limits = _mark(judged, other, effect_id)
+        low, high = np.maximum(limits.low, -PLAUSIBLE), np.minimum(limits.high, PLAUSIBLE)
+        solved = lsq_linear(other.columns, mark, bounds=(low, high)).x
+        rest = np.linalg.norm(mark - other.columns @ solved)
         if length > 0.0 and np.sqrt(max(0.0, 1.0 - (rest / length) ** 2)) > ALIKE:
             members.append(effect_id)
     return tuple(members)

@@ -62,7 +62,7 @@ def weigh(
 
     Args:
         base: deviations with the base model's freedom taken out.
-        signatures: of the testable effects, several shapes of one effect each on its own.
+        signatures: of the effects, several shapes of one effect each on its own.
         fields: (P, n) square roots of the random fields' covariances, whitened by the noise.
         deviations: (P, n) pattern deviations of each kind, whitened by the noise.
         freedom: degrees of freedom behind the noise's size.

@@ -24,8 +24,8 @@ class Judgement:
     Attributes:
         base: deviations with the model's own freedom taken out.
         weighing: all hypotheses with their evidence, and the test.
-        signatures: of the testable effects, by shape.
-        not_testable: ids that do not show at typical amplitude.
+        signatures: of all effects, by shape.
+        not_testable: ids that do not show at typical amplitude; larger they may be there.
         detectable: smallest visible amplitude of each testable effect, by parameter.
     """
 
@@ -56,14 +56,13 @@ def judge(
     if study.levels is not None:
         columns.append(study.levels)
     base = BaseSpace.of(fit, np.hstack(columns) if columns else None)
-    visible: list[Signature] = []
+    signatures: list[Signature] = []
     not_testable, detectable = [], {}
     for effect_id, shapes in neutral.items():
         marks = [signature(study.forward, fit, shape, study.sigma_um) for shape in shapes]
-        clear = [m for m in marks if visibility(base.project(m.columns)) >= TESTABLE]
-        visible += clear
-        if clear:
-            detectable[effect_id] = _detectable(base, clear)
+        signatures += marks
+        if max(visibility(base.project(m.columns)) for m in marks) >= TESTABLE:
+            detectable[effect_id] = _detectable(base, marks)
         else:
             not_testable.append(effect_id)
     by_part = [pattern_deviations_um(fit.model, rays) for rays in study.rays(fit.model)]
@@ -72,13 +71,13 @@ def judge(
     ]
     weighing = weigh(
         base,
-        visible,
+        signatures,
         _fields(study, fit),
         deviations,
         study.noise.degrees_of_freedom,
         seed,
     )
-    return Judgement(base, weighing, visible, tuple(not_testable), detectable)
+    return Judgement(base, weighing, signatures, tuple(not_testable), detectable)
 
 
 def _fields(study: Study, fit: Fit) -> list[np.ndarray]:

@@ -25,18 +25,24 @@ class Signature:
         effect: at the point of linearisation: neutral, or as fitted.
         names: the amplitudes, one a column.
         columns: (P, n) change of the readings for a typical amplitude, over the noise.
-        sides: (n,) +1 where only growth above neutral is physical, -1 below, 0 either.
+        low, high: (n,) bounds of the amplitudes, from neutral, in typical sizes.
     """
 
     effect: Effect
     names: tuple[str, ...]
     columns: np.ndarray
-    sides: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
 
     @property
     def id(self) -> str:
         """The effect's id."""
         return self.effect.id
+
+    @property
+    def sides(self) -> np.ndarray:
+        """(n,) +1 where only growth above neutral is physical, -1 below, 0 either."""
+        return 1.0 * (self.low >= 0.0) - 1.0 * (self.high <= 0.0)
 
     @property
     def shape(self) -> tuple[tuple[str, str, float], ...]:
@@ -72,7 +78,7 @@ def signature(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) 
     """
     info = type(effect).parameters()
     names = type(effect).amplitudes()
-    columns, sides = [], []
+    columns, lows, highs = [], [], []
     base = forward.predict_um(fit.model.with_effect(effect))
     for name in names:
         here, typical = getattr(effect, name), info[name]['typical']
@@ -89,8 +95,9 @@ def signature(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) 
         else:
             slope = (moved[0] - base) / (STEP if ends[0] > here else -STEP)
         columns.append(slope / sigma_um)
-        sides.append(1.0 if low >= neutral else -1.0 if high <= neutral else 0.0)
-    return Signature(effect, names, np.column_stack(columns), np.array(sides))
+        lows.append((low - neutral) / typical)
+        highs.append((high - neutral) / typical)
+    return Signature(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))
 
 
 def visibility(projected: np.ndarray) -> float:

@@ -24,6 +24,9 @@ TEXTURE_SHARE = 0.01
 # Parts painted alike differ in their mean film by about this share: 4 % was found for clearcoat
 # on 40 panels, the gauge and the booth's day included.
 LEVEL_SHARE = 0.03
+# A gauge put down and zeroed anew, by another hand, reads otherwise by about this much; 0.3 to
+# 1 um are usual.
+SESSION_UM = 0.5
 FEWEST_PATCHES = 4
 
 
@@ -105,12 +108,16 @@ class Study:
 
     @cached_property
     def levels(self) -> np.ndarray | None:
-        """(P, E) each part's own level, over the noise; None with one part, where K1 is it."""
+        """(P, 2 E) each part's own level, and its gauge's own zero, over the noise.
+
+        None with one part, where K1 and the effects on the gauge stand for them.
+        """
         parts = len(self.campaign.experiments)
         if parts == 1:
             return None
         own = self.experiment_of[:, np.newaxis] == np.arange(parts)
-        return own * (LEVEL_SHARE * self.measured_um / self.sigma_um)[:, np.newaxis]
+        sizes_um = LEVEL_SHARE * self.measured_um, np.full(len(self), SESSION_UM)
+        return np.hstack([own * (size / self.sigma_um)[:, np.newaxis] for size in sizes_um])
 
     def rays(self, model: DepositionModel) -> list[Rays]:
         """The rays of each experiment for a model's pattern and projection."""
