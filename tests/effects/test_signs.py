@@ -84,7 +84,7 @@ EXPECTED = {
     ('corner_slowdown', 'gain'): (volume, panel, PASSES),
     ('trigger_lag', 'rise_s'): (loss, panel, PASS),
     ('trigger_lag', 'fall_s'): (volume, panel, PASS),
-    ('flow_drift', 'drift_per_pass'): (volume, panel, PASSES),
+    ('flow_drift', 'drift_per_pass'): (downward, panel, PASSES),
     ('fog_gradient', 'fog_um'): (downward, panel, NEAR),
     ('overspray_fog', 'fog_um'): (volume, panel, NEAR),
     ('gauge_gain', 'gain'): (volume, panel, NEAR),
