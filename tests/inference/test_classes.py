@@ -25,11 +25,11 @@ def mark(effect, *columns, sides) -> Signature:
 
 def members(*signatures) -> tuple[str, ...]:
     """The class of the first, which acted on the readings."""
-    base = BaseSpace.of(linear_fit(np.random.default_rng(2), READINGS, np.zeros(READINGS)))
+    fit = linear_fit(np.random.default_rng(2), READINGS, np.zeros(READINGS))
     base = BaseSpace(np.eye(READINGS), signatures[0].columns[:, 0])
     fields = [0.01 * np.random.default_rng(3).normal(size=(READINGS, 2))]
     weighing = weigh(base, list(signatures), fields, [], np.inf, seed=0)
-    judged = Judgement(base, weighing, list(signatures), (), {})
+    judged = Judgement(fit, base, weighing, list(signatures), (), {})
     return alike(judged, [s.id for s in signatures])
 
 

@@ -63,16 +63,15 @@ class Ranking:
     footprint: float
 
 
-def rank(study: Study, fit: Fit, judged: Judgement) -> Ranking:
+def rank(study: Study, judged: Judgement) -> Ranking:
     """Refit the most probable hypotheses and sum probabilities by class.
 
     Args:
         study: the readings.
-        fit: the model so far.
-        judged: the linear evidence around it.
+        judged: the model so far and the linear evidence around it.
     """
     hypotheses = judged.weighing.hypotheses
-    factors, fits = _refit(study, fit, judged)
+    factors, fits = _refit(study, judged)
     alone = _alone(hypotheses, factors)
     weights = posterior(hypotheses, factors)
     answers = np.array(
@@ -94,7 +93,7 @@ def rank(study: Study, fit: Fit, judged: Judgement) -> Ranking:
         probability = float(weights[holds & answers].sum())
         if probability >= WORTH_LISTING:
             first = alone[members[0]]
-            near = fits.get(first) or _fit_with(study, fit, judged, hypotheses[first])
+            near = fits.get(first) or _fit_with(study, judged, hypotheses[first])
             classes.append(Candidate(members, min(probability, 1.0), _on_one_level(study, near)))
     return Ranking(
         tuple(sorted(classes, key=lambda c: -c.probability)),
@@ -104,15 +103,12 @@ def rank(study: Study, fit: Fit, judged: Judgement) -> Ranking:
     )
 
 
-def _refit(study: Study, fit: Fit, judged: Judgement) -> tuple[np.ndarray, dict[int, Fit]]:
+def _refit(study: Study, judged: Judgement) -> tuple[np.ndarray, dict[int, Fit]]:
     """Evidence (H,), that of the most probable hypotheses by full refits, and those refits."""
     hypotheses = judged.weighing.hypotheses
     factors = judged.weighing.log_factors.copy()
     freedom = study.noise.degrees_of_freedom
-    again = fit
-    if study.levels is not None:
-        again = study.fit(Unknowns.of(fit.model, *fit.model.effects), extra=study.levels)
-    base = _log_evidence(again, freedom)
+    base = _log_evidence(judged.fit, freedom)
     weights = factors + np.log([h.prior for h in hypotheses])
     order = [k for k in np.argsort(-weights) if hypotheses[k].effects or hypotheses[k].other]
     near = [k for k in order if weights[k] > weights[order[0]] - REFITTED_WITHIN]
@@ -120,7 +116,7 @@ def _refit(study: Study, fit: Fit, judged: Judgement) -> tuple[np.ndarray, dict[
     shapeless = [k for k in order if not hypotheses[k].effects]
     fits = {}
     for k in dict.fromkeys([*near[:MOST_REFITTED], *singles[:3], *shapeless[:2]]):
-        fits[k] = _fit_with(study, fit, judged, hypotheses[k])
+        fits[k] = _fit_with(study, judged, hypotheses[k])
         factors[k] = _log_evidence(fits[k], freedom) - base
     return factors, fits
 
@@ -152,7 +148,7 @@ def _mark(judged: Judgement, hypothesis: Hypothesis, effect_id: str) -> Signatur
     )
 
 
-def _fit_with(study: Study, fit: Fit, judged: Judgement, hypothesis: Hypothesis) -> Fit:
+def _fit_with(study: Study, judged: Judgement, hypothesis: Hypothesis) -> Fit:
     """The model as the hypothesis has it, from where the linear evidence sees its effects."""
     amplitudes = Judge(hypothesis).amplitudes(judged.base.deviation)
     effects, used = [], 0
@@ -165,7 +161,7 @@ def _fit_with(study: Study, fit: Fit, judged: Judgement, hypothesis: Hypothesis)
             values[name] = min(max(wanted, info[name]['low']), info[name]['high'])
         used += len(mark.names)
         effects.append(mark.effect.model_copy(update=values))
-    start = fit.model
+    start = judged.fit.model
     for effect in effects:
         start = start.with_effect(effect)
     free = judged.base.lower @ hypothesis.columns[:, used:]

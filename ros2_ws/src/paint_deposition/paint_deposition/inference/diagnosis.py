@@ -83,7 +83,7 @@ def diagnose(
     ranking = Ranking((), 0.0, 0.0, 0.0)
     while judged.weighing.p_value < ALPHA and len(accepted) < MOST_EFFECTS:
         progress('refitting with the most probable effects')
-        ranking = rank(study, fit, judged)
+        ranking = rank(study, judged)
         best = ranking.classes[0] if ranking.classes else None
         if best is None or best.probability <= SURE or not _predicts_better(study, fit, best.fit):
             break

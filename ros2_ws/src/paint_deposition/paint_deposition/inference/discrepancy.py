@@ -22,8 +22,8 @@ SIZES = (1.0, 2.5)
 NEGLIGIBLE = 1e-4
 
 RADIAL_SPLINES = 9
-# Deviations are alike over this many of them.
-RADIAL_LENGTH = 1.5
+# Deviations are alike over this many of them: bumps, and changes of the whole profile.
+RADIAL_LENGTHS = (1.5, 4.0)
 HARMONICS = 2
 # How far a pattern may deviate from eq. (1), as a share of its local flux.
 PATTERN_DEVIATIONS = (0.1, 0.3)
@@ -62,7 +62,8 @@ def pattern_deviations_um(model: DepositionModel, rays: Rays) -> list[np.ndarray
     """Film (P, n) of the pattern's deviations from eq. (1), of relative size one, by kind.
 
     A deviation is a smooth function of the radius times a harmonic of the angle. The kinds are
-    the radial profile, each harmonic of the angle, and everything together.
+    the radial profile, each harmonic of the angle, and everything together; each as bumps and as
+    a change of the whole profile.
     """
     planar = model.planar
     reach = planar.r_m + 3.0 * max(planar.sigma1_m, planar.sigma2_m)
@@ -72,15 +73,21 @@ def pattern_deviations_um(model: DepositionModel, rays: Rays) -> list[np.ndarray
     angle = np.arctan2(rays.y_m, rays.x_m)
     basis = BSpline.design_matrix(radius.ravel(), knots, 3)
     steps = np.arange(basis.shape[1])
-    smooth = _root(_bell(steps[:, np.newaxis] - steps, RADIAL_LENGTH))
-    kinds = []
+    radial = []
     for order in range(HARMONICS + 1):
         waves = [np.cos(order * angle)] + ([np.sin(order * angle)] if order else [])
-        radial = [
-            [np.sum(_column(basis, k, rays.share) * wave, axis=0) for k in steps] for wave in waves
-        ]
-        kinds.append(np.hstack([np.array(columns).T @ smooth for columns in radial]))
-    return [*kinds, np.hstack(kinds)]
+        radial.append(
+            [
+                np.array([np.sum(_column(basis, k, rays.share) * wave, axis=0) for k in steps]).T
+                for wave in waves
+            ]
+        )
+    kinds = []
+    for length in RADIAL_LENGTHS:
+        smooth = _root(_bell(steps[:, np.newaxis] - steps, length))
+        orders = [np.hstack([columns @ smooth for columns in waves]) for waves in radial]
+        kinds += [*orders, np.hstack(orders)]
+    return kinds
 
 
 def _column(basis: csr_array, k: int, share: np.ndarray) -> np.ndarray:

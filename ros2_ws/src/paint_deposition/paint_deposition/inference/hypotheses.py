@@ -15,8 +15,9 @@ from paint_deposition.inference.evidence import (
 )
 from paint_deposition.inference.signatures import Signature
 
-# Probabilities before the readings: half that nothing is missing, the rest by kind.
-PRIOR = {'none': 0.5, 'one': 0.28, 'two': 0.08, 'unknown': 0.06, 'footprint': 0.04, 'mixed': 0.04}
+# Probabilities before the readings: half that nothing is missing, the rest by kind. No measured
+# pattern is exactly a pair of Gaussians.
+PRIOR = {'none': 0.5, 'one': 0.26, 'two': 0.06, 'unknown': 0.06, 'footprint': 0.08, 'mixed': 0.04}
 DRAWS = 2000
 # Pairs are made of the effects that explain most; the rest hardly matter.
 PAIRED = 14

@@ -22,6 +22,7 @@ class Judgement:
     """What the readings say beside a fitted model.
 
     Attributes:
+        fit: of the model with each part at a level of its own; all is linear around it.
         base: deviations with the model's own freedom taken out.
         weighing: all hypotheses with their evidence, and the test.
         signatures: of all effects, by shape.
@@ -29,6 +30,7 @@ class Judgement:
         detectable: smallest visible amplitude of each testable effect, by parameter.
     """
 
+    fit: Fit
     base: BaseSpace
     weighing: Weighing
     signatures: list[Signature]
@@ -52,6 +54,8 @@ def judge(
         nuisance: signatures that the test must not see: rivals of what was accepted.
         seed: of the simulated deviations.
     """
+    levelled = study.with_levels(fit)
+    fit = study.plain(levelled)
     columns = [s.columns for s in nuisance]
     if study.levels is not None:
         columns.append(study.levels)
@@ -77,7 +81,7 @@ def judge(
         study.noise.degrees_of_freedom,
         seed,
     )
-    return Judgement(base, weighing, signatures, tuple(not_testable), detectable)
+    return Judgement(levelled, base, weighing, signatures, tuple(not_testable), detectable)
 
 
 def _fields(study: Study, fit: Fit) -> list[np.ndarray]:

@@ -1,6 +1,6 @@
 """A campaign made ready for inference: point means, noise, blocks and forward model."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -9,7 +9,7 @@ from scipy.cluster.vq import kmeans2
 from paint_deposition.effects.base import Effect
 from paint_deposition.inference.campaign import Campaign
 from paint_deposition.inference.covariates import Covariate, Rays, covariates
-from paint_deposition.inference.fit import Fit, fit_readings
+from paint_deposition.inference.fit import Fit, derivatives, fit_readings
 from paint_deposition.inference.forward import Forward
 from paint_deposition.inference.noise import GaugeNoise, gauge_noise
 from paint_deposition.inference.readings_checks import check_unit
@@ -26,7 +26,7 @@ TEXTURE_SHARE = 0.01
 LEVEL_SHARE = 0.03
 # A gauge put down and zeroed anew, by another hand, reads otherwise by about this much; 0.3 to
 # 1 um are usual.
-SESSION_UM = 0.5
+SESSION_UM = 0.7
 FEWEST_PATCHES = 4
 
 
@@ -83,6 +83,25 @@ class Study:
         """Fit these unknowns to the points; see ``fit_readings``."""
         return fit_readings(
             self.forward, self.measured_um, self.sigma_um, unknowns, starts, seed, extra
+        )
+
+    def with_levels(self, fit: Fit) -> Fit:
+        """The fit once more, each of several parts at a level of its own."""
+        if self.levels is None:
+            return fit
+        return self.fit(Unknowns.of(fit.model, *fit.model.effects), extra=self.levels)
+
+    def plain(self, fit: Fit) -> Fit:
+        """The same model, residuals and derivatives over nothing but the points' own noise."""
+        if self.levels is None:
+            return fit
+        return replace(
+            fit,
+            residual=(self.measured_um - fit.predicted_um) / self.sigma_um,
+            jacobian=derivatives(
+                self.forward, fit.unknowns, fit.vector, self.sigma_um, fit.predicted_um
+            ),
+            extra_log_det=0.0,
         )
 
     @property
