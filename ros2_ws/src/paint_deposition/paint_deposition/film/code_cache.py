@@ -2,26 +2,29 @@
 
 import hashlib
 import inspect
-from collections.abc import Callable
+import sys
+from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
-from types import CodeType
+from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
 import numba
+import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from paint_deposition.effects.base import Ray
 
 
 def identity(laws: list[Callable[..., float]], *variant: object) -> str:
-    """A name for the code of laws, of everything that is compiled with them, and the variant."""
+    """A name for the code of laws, of everything that is compiled with them, and the variant.
+
+    Compiled code refers to the laws' modules by name, so those names are part of it: the module
+    of a user's own effect is named by its source.
+    """
     parts = [_code_around(), repr((numba.__version__, variant)).encode()]
     for law in laws:
-        parts.append(_fingerprint(law.__code__))
-        named = {n: law.__globals__.get(n) for n in sorted(law.__code__.co_names)}
-        numbers = {n: v for n, v in named.items() if isinstance(v, (int, float))}
-        parts.append(repr(numbers).encode())
+        parts.extend(_compiled_with(law, set()))
     return hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
 
 
@@ -29,6 +32,38 @@ def identity(laws: list[Callable[..., float]], *variant: object) -> str:
 def _code_around() -> bytes:
     files = [*sorted(Path(__file__).parent.glob('*.py')), Path(inspect.getfile(Ray))]
     return b'\0'.join(file.read_bytes() for file in files)
+
+
+def _compiled_with(value: Any, seen: set[int]) -> Iterator[bytes]:
+    """What a function or constant brings into compiled code, with all that it names in turn."""
+    function = getattr(value, 'py_func', value)
+    if isinstance(function, FunctionType):
+        if id(function.__code__) in seen:
+            return
+        seen.add(id(function.__code__))
+        yield _fingerprint(function.__code__)
+        yield _source_of(function.__module__)
+        named = inspect.getclosurevars(function)
+        for name, other in sorted((dict(named.globals) | dict(named.nonlocals)).items()):
+            yield name.encode()
+            yield from _compiled_with(other, seen)
+    elif isinstance(value, ModuleType):
+        yield _source_of(value.__name__)
+    elif isinstance(value, np.ndarray):
+        yield repr((value.dtype, value.shape)).encode() + value.tobytes()
+    elif isinstance(value, (int, float, complex, str, tuple)):
+        yield repr(value).encode()
+
+
+@cache
+def _source_of(module: str) -> bytes:
+    """A module's name and a digest of its file."""
+    file = getattr(sys.modules.get(module), '__file__', None)
+    try:
+        source = Path(file).read_bytes() if file else b''
+    except OSError:
+        source = b''
+    return module.encode() + hashlib.sha256(source).digest()
 
 
 def _fingerprint(code: CodeType) -> bytes:
