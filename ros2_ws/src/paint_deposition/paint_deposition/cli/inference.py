@@ -146,7 +146,7 @@ def refit_command(
     Writes model.yaml with its history, residuals.csv, the residual as coloured meshes,
     comparison.png and report.html. To go on from there, give that model.yaml as --model.
     """
-    from paint_deposition.effects.catalogue import effect_class
+    from paint_deposition.effects.catalogue import EFFECTS, effect_class
     from paint_deposition.inference.refit import refit
 
     if effect == 'none':
@@ -158,7 +158,7 @@ def refit_command(
     with _Steps('refit') as tell:
         data = _campaign(campaign, tell)
         start = _start_or_default(data, model_file)
-        diagnosis = refit(data, start.model, added, seed, tell)
+        diagnosis = refit(data, start.model, added, EFFECTS, seed, tell)
         content = _write_diagnosis(output, diagnosis, {}, start, tell)
     _say(diagnosis, content, output, as_json)
 

@@ -72,7 +72,7 @@ def diagnose(
     history = [Step.of(study, '', fit)]
     trouble = trouble_with(study, fit)
     if trouble:
-        return Diagnosis(study, 'fit_broken', trouble, 1.0, (), (), tuple(history))
+        return Diagnosis(study, 'fit_broken', trouble, np.nan, (), (), tuple(history))
 
     for effect in start.effects:
         neutral.pop(effect.id, None)
@@ -80,12 +80,13 @@ def diagnose(
     nuisance: list[Signature] = []
     progress('weighing what may be missing')
     judged = first = judge(study, fit, neutral, nuisance, seed)
-    ranking = Ranking((), 0.0, 0.0, 0.0)
-    while judged.weighing.p_value < ALPHA and len(accepted) < MOST_EFFECTS:
-        progress('refitting with the most probable effects')
-        ranking = rank(study, judged)
-        best = ranking.classes[0] if ranking.classes else None
-        if best is None or best.probability <= SURE or not _predicts_better(study, fit, best.fit):
+    while True:
+        ranking = None
+        if judged.weighing.p_value < ALPHA:
+            progress('refitting with the most probable effects')
+            ranking = rank(study, judged)
+        best = _to_add(study, fit, ranking) if len(accepted) < MOST_EFFECTS else None
+        if best is None:
             break
         history.append(Step.of(study, best.best, best.fit))
         accepted.append(_told(study, best, history))
@@ -95,7 +96,6 @@ def diagnose(
         fit = best.fit
         progress(f'added {best.best}; weighing what is left')
         judged = judge(study, fit, neutral, nuisance, seed)
-        ranking = Ranking((), 0.0, 0.0, 0.0)
     return _conclude(study, fit, first, judged, ranking, accepted, history, seed)
 
 
@@ -126,6 +126,15 @@ def trouble_with(study: Study, fit: Fit) -> str:
                 f'their noise says ({study.noise.source}); give their true sigma_um or repeats'
             )
     return ''
+
+
+def _to_add(study: Study, fit: Fit, ranking: Ranking | None) -> Candidate | None:
+    """The best class if it is probable enough and helps to predict, else None."""
+    if ranking is None or not ranking.classes:
+        return None
+    best = ranking.classes[0]
+    sure = best.probability > SURE and _predicts_better(study, fit, best.fit)
+    return best if sure else None
 
 
 def _predicts_better(study: Study, before: Fit, after: Fit) -> bool:
@@ -164,12 +173,11 @@ def _conclude(
     fit: Fit,
     first: Judgement,
     judged: Judgement,
-    ranking: Ranking,
+    ranking: Ranking | None,
     accepted: list[EffectClass],
     history: list[Step],
     seed: int,
 ) -> Diagnosis:
-    open_question = judged.weighing.p_value < ALPHA
     others = tuple(
         EffectClass(
             c.members, c.probability, c.best, intervals(c.fit, c.best),
@@ -178,19 +186,18 @@ def _conclude(
                 'after': Step.of(study, c.best, c.fit).holdout_rmse_um,
             },
         )
-        for c in ranking.classes
+        for c in (ranking.classes if ranking else ())
     )  # fmt: skip
     verdict: Verdict
     unknown = None
-    unexplained = ranking.unknown + ranking.footprint
-    if not open_question and not accepted:
+    if ranking is None and not accepted:
         verdict, reason = 'none_missing', (
             'The readings agree with the model to within the noise of the gauge.'
         )  # fmt: skip
-    elif accepted and (not open_question or _explains_most(history, judged)):
-        names = ' and '.join(c.best for c in accepted)
+    elif ranking is None or (accepted and _explains_most(history, judged)):
+        names = ', and '.join(_in_words(c) for c in accepted)
         verdict, reason = 'effect_missing', f'The readings show {names}.'
-    elif unexplained > ranking.named or not others:
+    elif ranking.unknown + ranking.footprint > ranking.named or not others:
         footprint = ranking.footprint > ranking.unknown
         unknown = locate_unexplained(study, fit, footprint, seed)
         verdict, reason = (
@@ -219,6 +226,12 @@ def _conclude(
         first.detectable,
         _notes(study),
     )
+
+
+def _in_words(found: EffectClass) -> str:
+    if len(found.members) == 1:
+        return found.best
+    return f'{found.best} (or what they cannot tell from it: {", ".join(found.members[1:])})'
 
 
 def _explains_most(history: list[Step], judged: Judgement) -> bool:

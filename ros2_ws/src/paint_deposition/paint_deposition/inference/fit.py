@@ -221,7 +221,7 @@ class _Problem:
             bounds=([0.0, 0.0, -np.inf, -np.inf], np.inf),
         ).x
         ring, centre, *lopsided = solved
-        if ring < LEAST_RING * (ring + centre):
+        if ring <= LEAST_RING * (ring + centre):
             return self.scaled_to_mean(vector)
         gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
         return np.clip([*gains, *vector[4:]], self.low, self.high)

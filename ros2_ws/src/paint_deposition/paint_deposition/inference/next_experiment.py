@@ -7,6 +7,7 @@ it longer where the two differ; another spray makes them differ.
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 
@@ -41,7 +42,7 @@ class Spray:
     """An experiment to do: what, which two effects it separates, and how well.
 
     Attributes:
-        what: in words.
+        what: in words; names the part where there are several.
         separates: two effect ids.
         separation: standard deviations between the two after it, for what was found so far.
         now: the same without it.
@@ -86,21 +87,19 @@ def propose_for(
 
 def propose(study: Study, rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
     """Places to measure on the parts at hand, and sprays, best first."""
-    experiments = study.campaign.experiments
     sigma = study.noise.typical_um
     here = _marks(study.campaign, rivals, study.sigma_um)
     now = _separation([here])
+    names = rivals.first.id, rivals.second.id
     sprays = []
-    for what, change in MENU.items():
-        changed = [
-            replace(e, path=change(e.path, e), name=f'{e.name}, {what}') for e in experiments[-1:]
-        ]
-        other = Campaign(tuple(changed))
+    for experiment, (what, change) in product(study.campaign.experiments, MENU.items()):
+        other = Campaign((replace(experiment, path=change(experiment.path, experiment)),))
         marks = _marks(other, rivals, np.full(len(other), sigma))
-        gain = _separation([here, marks])
-        sprays.append(Spray(what, (rivals.first.id, rivals.second.id), gain, now))
+        if len(study.campaign.experiments) > 1:
+            what = f'{what}, on {experiment.name}'
+        sprays.append(Spray(what, names, _separation([here, marks]), now))
     places = _places(study, rivals, here, sigma, seed)
-    return places, sorted(sprays, key=lambda spray: -spray.separation)
+    return places, sorted(sprays, key=lambda spray: -spray.separation)[: len(MENU)]
 
 
 @dataclass(frozen=True)
@@ -140,19 +139,13 @@ def _separation(parts: list[_Marks]) -> float:
 
 
 def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: int) -> list[Place]:
-    """Add one point after the other, each where it separates most."""
-    experiment = study.campaign.experiments[-1]
-    surface = experiment.surface
-    random = np.random.default_rng(seed)
-    chosen = random.permutation(len(surface.vertices_m))[: 4 * CANDIDATES]
-    points = surface.points().select(chosen)
-    inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:CANDIDATES]
-    readings = Readings.of(
-        surface.vertices_m[inside], np.zeros(len(inside)), normals=surface.normals[inside]
-    )
-    candidate = Experiment.of(experiment.name, surface, experiment.path, readings)
-    there = Campaign((candidate,))
-    marks = _marks(there, rivals, np.full(len(inside), sigma_um))
+    """Add one point after the other, on any part, each where it separates most."""
+    parts_of = study.campaign.experiments
+    count = CANDIDATES // len(parts_of)
+    there = Campaign(tuple(_candidates(e, count, seed + k) for k, e in enumerate(parts_of)))
+    part = np.repeat(np.arange(len(parts_of)), [len(e) for e in there.experiments])
+    positions_m = np.concatenate([e.points.positions_m[: len(e)] for e in there.experiments])
+    marks = _marks(there, rivals, np.full(len(part), sigma_um))
     reached = Forward(there).predict_um(rivals.base.model)
     usable = reached > 0.2 * np.mean(study.measured_um)
     places: list[Place] = []
@@ -167,15 +160,29 @@ def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: i
         if best < 0:
             break
         parts.append(marks.at(best))
-        where = candidate.points.positions_m[best]
+        where = positions_m[best]
         why = (
             f'separates {rivals.first.id} from {rivals.second.id}: '
             f'{before:.1f} to {gain:.1f} standard deviations'
         )
-        places.append(Place(where, experiment.name, why))
-        usable &= np.linalg.norm(surface.vertices_m[inside] - where, axis=1) > SPACING_M
+        places.append(Place(where, parts_of[part[best]].name, why))
+        near = np.linalg.norm(positions_m - where, axis=1) < SPACING_M
+        usable &= ~(near & (part == part[best]))
         before = gain
     return places
+
+
+def _candidates(experiment: Experiment, count: int, seed: int) -> Experiment:
+    """The experiment with no readings yet at some points of its skin, clear of free edges."""
+    surface = experiment.surface
+    random = np.random.default_rng(seed)
+    chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
+    points = surface.points().select(chosen)
+    inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]
+    readings = Readings.of(
+        surface.vertices_m[inside], np.zeros(len(inside)), normals=surface.normals[inside]
+    )
+    return Experiment.of(experiment.name, surface, experiment.path, readings)
 
 
 def _gun_rolled(path: SprayPath, experiment: Experiment) -> SprayPath:

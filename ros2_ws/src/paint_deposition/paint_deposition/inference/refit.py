@@ -1,14 +1,19 @@
 """Add an effect that the user chose and fit the model with it."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+from scipy.special import expit, logsumexp
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.campaign import Campaign
 from paint_deposition.inference.diagnosis import ALPHA, SURE, intervals, trouble_with
-from paint_deposition.inference.judgement import judge
+from paint_deposition.inference.judgement import Judgement, judge
 from paint_deposition.inference.signatures import neutral_shapes
 from paint_deposition.inference.study import Study
+from paint_deposition.inference.unexplained import locate_unexplained
 from paint_deposition.inference.unknowns import Unknowns
 from paint_deposition.inference.verdict import Diagnosis, EffectClass, Step, Verdict
 from paint_deposition.model.deposition_model import DepositionModel
@@ -20,6 +25,7 @@ def refit(
     campaign: Campaign,
     start: DepositionModel,
     added: type[Effect] | None,
+    library: Mapping[str, type[Effect]] = MappingProxyType({}),
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Diagnosis:
@@ -29,6 +35,7 @@ def refit(
         campaign: the readings.
         start: the model so far; its effects are refitted too.
         added: the effect, or None to fit what is there.
+        library: effects to test for beside it, by id.
         seed: of starts and simulated deviations.
         progress: called with a line for each step of the work.
 
@@ -39,38 +46,29 @@ def refit(
         raise ModelError(
             f'{added.id} is in the model already; to fit it anew, add none, or take it out'
         )
-    shapes = neutral_shapes(added) if added else []
-    study = Study.of(campaign, (*start.effects, *shapes[:1]))
+    neutral = {
+        key: neutral_shapes(effect) for key, effect in library.items() if not start.effect(key)
+    }
+    if added:
+        neutral[added.id] = neutral_shapes(added)
+    study = Study.of(campaign, (*start.effects, *(shapes[0] for shapes in neutral.values())))
     progress('fitting the model as it is')
     fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed)
     history = [Step.of(study, '', fit)]
     trouble = trouble_with(study, fit)
     if trouble:
-        return Diagnosis(study, 'fit_broken', trouble, 1.0, (), (), tuple(history))
+        return Diagnosis(study, 'fit_broken', trouble, np.nan, (), (), tuple(history))
+    judged = judge(study, fit, neutral, [], seed)
     if added is None:
-        judged = judge(study, fit, {}, [], seed)
-        rest = judged.weighing.p_value
-        return Diagnosis(
-            study,
-            'none_missing' if rest >= ALPHA else 'unknown_effect',
-            'The model was fitted as it is.',
-            rest,
-            (),
-            (),
-            tuple(history),
-        )
-    judged = judge(study, fit, {added.id: shapes}, [], seed)
+        return _as_it_is(study, history[0], judged, seed)
     progress(f'fitting with {added.id}')
     fits = [
         study.fit(Unknowns.of(fit.model.with_effect(shape), *start.effects, shape))
-        for shape in shapes
+        for shape in neutral[added.id]
     ]
     best = min(fits, key=lambda f: f.chi_square + f.penalty)
     history.append(Step.of(study, added.id, best))
-    hypotheses, weights = judged.weighing.hypotheses, judged.weighing.posterior
-    probability = sum(
-        float(w) for h, w in zip(hypotheses, weights, strict=True) if added.id in h.effects
-    )
+    probability = _probability(judged, added.id)
     effect = EffectClass(
         (added.id,),
         probability,
@@ -90,4 +88,30 @@ def refit(
         tuple(history),
         not_testable=judged.not_testable,
         detectable=judged.detectable,
+    )
+
+
+def _probability(judged: Judgement, effect_id: str) -> float:
+    """That the effect is missing and not nothing, which had the same chance before."""
+    hypotheses = judged.weighing.hypotheses
+    shapes = [k for k, h in enumerate(hypotheses) if h.effects == (effect_id,) and not h.other]
+    factors = judged.weighing.log_factors[shapes]
+    return float(expit(logsumexp(factors, b=1.0 / len(shapes))))
+
+
+def _as_it_is(study: Study, step: Step, judged: Judgement, seed: int) -> Diagnosis:
+    """The verdict on a model to which nothing was added."""
+    missing = judged.weighing.p_value < ALPHA
+    reason = 'The model was fitted as it is'
+    return Diagnosis(
+        study,
+        'unknown_effect' if missing else 'none_missing',
+        reason + ('; something is missing, which diagnose can tell.' if missing else '.'),
+        judged.weighing.p_value,
+        (),
+        (),
+        (step,),
+        locate_unexplained(study, step.fit, False, seed) if missing else None,
+        judged.not_testable,
+        judged.detectable,
     )

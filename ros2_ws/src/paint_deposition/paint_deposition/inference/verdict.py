@@ -93,7 +93,7 @@ class Diagnosis:
         study: the readings.
         verdict: the headline.
         reason: one sentence for a person.
-        p_value: that as much evidence appears when nothing is missing.
+        p_value: that as much evidence appears when nothing is missing; nan if not tested.
         accepted: ids of the effects added to the model, in order.
         classes: accepted ones in that order, then others by probability.
         history: the models, base first.

@@ -203,7 +203,7 @@ def _sure(row: dict) -> str:
 
 def _chance(data: ReportData) -> str:
     p_value = data.diagnosis.p_value
-    if p_value >= 1.0:
+    if not p_value < 1.0:
         return ''
     share = 'fewer than 0.1 %' if p_value < 1e-3 else f'{100.0 * p_value:.2g} %'
     return f'If nothing were missing, readings would look this suspicious in {share} of cases.'
