@@ -76,7 +76,10 @@ def test_down_and_the_model_are_taken_over(campaign, folder):
         ({'speed': 1}, "unknown key 'speed' in experiment 1; the nearest known key is"),
         ({'mesh_scale': 0}, "'mesh_scale' is 0; expected above 0"),
         ({'mesh_scale': True}, "'mesh_scale' is True; expected above 0"),
-        ({'mesh_scale': 1000.0}, "experiment 'door': .*looks like millimetres"),
+        (
+            {'mesh_scale': 1000.0},
+            "experiment 'door': .*millimetres; use .* mesh_scale: 0.001 in a campaign",
+        ),
         ({'max_pose_gap_s': 'long'}, "'max_pose_gap_s' is 'long'; expected above 0"),
         ({'down': 'z'}, "'down' is 'z'; expected"),
         ({'down': [0, 0, float('nan')]}, "'down' is .*nan.*; expected"),

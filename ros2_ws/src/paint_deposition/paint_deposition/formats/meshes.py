@@ -150,12 +150,12 @@ def _check_extent(path: Path, corners_m: np.ndarray) -> None:
     if extent > LARGEST_M:
         raise MeshError(
             f'{path}: the part would be {extent:.4g} m large, it looks like millimetres; '
-            'use --mesh-scale 0.001 (node parameter mesh_scale)'
+            "use --mesh-scale 0.001, or mesh_scale: 0.001 in a campaign or as the node's parameter"
         )
     if extent < SMALLEST_M:
         raise MeshError(
             f'{path}: the part would be only {extent * 1e3:.3g} mm large, it looks scaled down; '
-            'use a larger --mesh-scale (node parameter mesh_scale)'
+            "use a larger --mesh-scale, or mesh_scale in a campaign or as the node's parameter"
         )
 
 
