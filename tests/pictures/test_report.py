@@ -146,13 +146,15 @@ def other_verdicts(diagnosis):
         diagnosis, verdict='undecided', **base | {'classes': two}
     )  # fmt: skip
     yield 'no known effect explains', replace(diagnosis, verdict='unknown_effect', **base)
-    yield (
-        'do not call for',
-        replace(diagnosis, classes=(replace(diagnosis.classes[0], probability=0.02),)),
-    )
+    # A diagnosis that added what it was sure of, and is left with more.
+    left = replace(two[1], members=('fog_gradient', 'tcp_tilt'))
+    yield 'Something more is, most likely fog gradient (or TCP tilt) (40 %).', replace(
+        diagnosis, verdict='undecided', classes=(diagnosis.classes[0], left)
+    )  # fmt: skip
+    yield 'no known effect explains', replace(diagnosis, verdict='unknown_effect')
 
 
-@pytest.mark.parametrize('which', range(5))
+@pytest.mark.parametrize('which', range(6))
 def test_every_verdict_has_its_report(tmp_path, diagnosis, models, which):
     words, other = list(other_verdicts(diagnosis))[which]
     chosen = models if len(other.history) > 1 else models[:1]
@@ -160,6 +162,42 @@ def test_every_verdict_has_its_report(tmp_path, diagnosis, models, which):
     page = page_of(tmp_path / 'report.html')
     assert words in page.text
     assert page.open == page.clashes == []
+    assert ('Air drift was added with' in page.text) == ('air_drift' in other.accepted)
+    assert ('no effect was added' in page.text) == (not other.accepted)
+
+
+@pytest.mark.parametrize('verdict', ['none_missing', 'undecided', 'unknown_effect'])
+@pytest.mark.parametrize(
+    ('probability', 'title'),
+    [
+        (0.02, 'The readings do not call for air drift'),
+        (0.7, 'The readings do not settle whether air drift was missing'),
+    ],
+)
+def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
+    tmp_path, diagnosis, models, verdict, probability, title
+):
+    asked = replace(diagnosis.classes[0], probability=probability)
+    write_report(
+        tmp_path / 'report.html', diagnosis.study, models,
+        replace(diagnosis, verdict=verdict, classes=(asked,)),
+    )  # fmt: skip
+    text = page_of(tmp_path / 'report.html').text
+    assert title in text
+    assert 'Air drift was added with' in text
+    assert 'no effect was added' not in text
+
+
+def test_a_refit_tells_what_it_added_to_readings_that_lack_nothing(tmp_path):
+    campaign = small_campaign(tmp_path, truth=None, amplitude=None)
+    done = refit(campaign, DepositionModel(), AirDrift)
+    models = [(step.model, compare(done.study, step.model)) for step in done.history]
+    write_report(tmp_path / 'report.html', done.study, models, done)
+    assert [effect.id for effect in done.model.effects] == ['air_drift']
+    text = page_of(tmp_path / 'report.html').text
+    assert 'Added as asked' in text
+    assert 'Air drift was added with' in text
+    assert 'no effect was added' not in text
 
 
 def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, models):

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
+from paint_deposition.inference.diagnosis import SURE
 from paint_deposition.pictures.report_data import ReportData
 from paint_deposition.pictures.report_tables import class_rows, effect_rows
 from paint_deposition.pictures.report_words import (
@@ -19,8 +20,8 @@ from paint_deposition.pictures.report_words import (
 
 # Chance of deviations this large from the gauge alone, below which the model is called off.
 CHANCE = 0.01
-# Per cent; an effect less probable than this is not called missing.
-LIKELY = 50.0
+# An effect less probable than this is not called for.
+LIKELY = 0.5
 
 
 @dataclass(frozen=True)
@@ -45,6 +46,8 @@ def headline(data: ReportData) -> Headline:
     """Verdict, facts and key figures."""
     if data.diagnosis is None:
         tone, kicker, title, facts = _compared(data)
+    elif _least_probable(data) <= SURE:
+        tone, kicker, title, facts = _asked_for(data)
     else:
         verdict = data.diagnosis.verdict
         tone, kicker, title, facts = {
@@ -58,50 +61,61 @@ def headline(data: ReportData) -> Headline:
 
 
 def _missing(data: ReportData):
-    rows = [row for row in class_rows(data) if row['accepted']]
+    rows = _accepted_rows(data)
     names = joined([_with_rivals(row) for row in rows])
-    if rows and max(row['share'] for row in rows) < LIKELY:
-        return _asked_for(data, rows)
     facts = [
         ('What is missing', ' '.join(f'{_capital(r["name"])}: {r["meaning"]}' for r in rows)),
         ('How sure', ' '.join(_sure(row) for row in rows) + f' {_chance(data)}'),
-        ('What it costs', ' '.join(_cost(row) for row in effect_rows(data))),
-        ('What changes', _gain(data)),
+        ('What it costs', _costs(data)),
+        ('What changes', _changes(data)),
     ]
     return 'found', 'An effect is missing', f'The model lacked {names}', facts
 
 
-def _asked_for(data: ReportData, rows: list[dict]):
-    """An effect that the user had added although the readings do not call for it."""
+def _least_probable(data: ReportData) -> float:
+    """Of the effects added, the least probability; a diagnosis adds only what it is sure of."""
+    accepted = data.diagnosis.accepted
+    return min((c.probability for c in data.diagnosis.classes if c.best in accepted), default=1.0)
+
+
+def _asked_for(data: ReportData):
+    """An effect that the user had added although the readings do not show it for sure."""
+    rows = _accepted_rows(data)
     names = joined([row['name'] for row in rows])
+    title = (
+        f'The readings do not call for {names}'
+        if _least_probable(data) < LIKELY
+        else f'The readings do not settle whether {names} was missing'
+    )
     facts = [
         ('What was added', ' '.join(f'{_capital(r["name"])}: {r["meaning"]}' for r in rows)),
         ('How sure', ' '.join(_sure(row) for row in rows) + f' {_chance(data)}'),
-        ('What it does', ' '.join(_cost(row) for row in effect_rows(data))),
-        ('What changes', _gain(data)),
+        ('What it does', _costs(data)),
+        ('What changes', _changes(data)),
     ]
-    return 'open', 'Added as asked', f'The readings do not call for {names}', facts
+    return 'open', 'Added as asked', title, facts
 
 
 def _nothing(data: ReportData):
     facts = [
         ('What is missing', 'Nothing that these readings can show.'),
         ('How sure', _chance(data) + _blind(data)),
-        ('What changes', 'Only the pattern was fitted; no effect was added.'),
+        ('What changes', _changes(data)),
     ]
     return 'good', 'Nothing is missing', 'The model agrees with the readings', facts
 
 
 def _undecided(data: ReportData):
-    rows = class_rows(data)
+    rows = [row for row in class_rows(data) if not row['accepted']]
     causes = [f'{_with_rivals(row)} ({row["probability"]})' for row in rows[:3]]
     facts = [
-        ('What is missing', f'Something is, most likely {joined(causes, "or")}.'),
+        ('What is missing', f'Something {_more(data)}is, most likely {joined(causes, "or")}.'),
         ('How sure', f'{_chance(data)} No single cause is probable enough to be added.'),
-        ('What changes', 'Nothing was added to the model.'),
+        ('What changes', _changes(data)),
         ('What to do', _next(data)),
     ]
-    return 'open', 'Undecided', 'Something is missing; the readings do not say which', facts
+    title = f'Something {_more(data)}is missing; the readings do not say which'
+    return 'open', 'Undecided', title, facts
 
 
 def _unknown(data: ReportData):
@@ -120,6 +134,7 @@ def _unknown(data: ReportData):
         facts.append(('Where it shows', f'{where}; {clearest}.'))
     facts += [
         ('How sure', _chance(data)),
+        ('What changes', _changes(data)),
         ('What to do', 'Spray one straight pass on a flat panel and measure across it.' if pattern
          else 'Write the effect you suspect as a file of your own and add it; see the charts of '
               'the residual below for its shape.'),
@@ -130,8 +145,8 @@ def _unknown(data: ReportData):
 def _broken(data: ReportData):
     facts = [
         ('Why', _capital(data.diagnosis.reason) + '.'),
-        ('What changes', 'No conclusion was drawn and nothing was added. The charts below show '
-                         'the fit as it stands, to find the fault.'),
+        ('What changes', f'{_changes(data)} No conclusion was drawn. The charts below show the '
+                         'fit as it stands, to find the fault.'),
     ]  # fmt: skip
     return 'bad', 'Not usable', 'The fit cannot be trusted', facts
 
@@ -217,10 +232,27 @@ def _cost(row: dict) -> str:
     )
 
 
-def _gain(data: ReportData) -> str:
+def _costs(data: ReportData) -> str:
+    accepted = data.diagnosis.accepted
+    return ' '.join(_cost(row) for row in effect_rows(data) if row['id'] in accepted)
+
+
+def _accepted_rows(data: ReportData) -> list[dict]:
+    return [row for row in class_rows(data) if row['accepted']]
+
+
+def _more(data: ReportData) -> str:
+    """After what was added already."""
+    return 'more ' if data.diagnosis.accepted else ''
+
+
+def _changes(data: ReportData) -> str:
+    """What the model written has that the one fitted before had not."""
+    if not data.diagnosis.accepted:
+        return 'The model was fitted as it is; no effect was added.'
     first, last = data.diagnosis.history[0], data.diagnosis.history[-1]
     floor = data.study.noise_floor_um
-    text = ' '.join(_added(row) for row in class_rows(data) if row['accepted'])
+    text = ' '.join(_added(row) for row in _accepted_rows(data))
     text += (
         f' At points left out of the fit the error goes from {micrometres(first.holdout_rmse_um)} '
         f'to {micrometres(last.holdout_rmse_um)}; the gauge itself scatters by '
