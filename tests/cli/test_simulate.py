@@ -209,6 +209,19 @@ def test_a_bare_part_is_told_with_the_reason(panel, one_pass, tmp_path):
     assert json.loads(done.stdout)['transfer_efficiency'] is None
 
 
+def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
+    log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
+    bag = write_pose_bag(tmp_path / 'pass', log)
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', bag, *COARSE, '--json',
+        '-o', tmp_path / 'out',
+    )  # fmt: skip
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f'note: recording {bag}: /atomizer/state (std_msgs/msg/Bool) is not')
+    assert '--state-topic' in line
+    assert line == f'note: {json.loads(done.stdout)["notes"][0]}'
+
+
 def refused(tmp_path, *arguments):
     """What `paint simulate` says; nothing may have been written."""
     done = paint('simulate', *arguments, '-o', tmp_path / 'out')

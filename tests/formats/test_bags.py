@@ -78,7 +78,14 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     state = read_trajectory(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
-    assert len(read_trajectory(folder).trigger_stamps_ns) == 0
+    unused = read_trajectory(folder)
+    assert len(unused.trigger_stamps_ns) == 0
+    assert unused.notes == (
+        f'recording {folder}: /state (paint_msgs/msg/AtomizerState) and /gun (std_msgs/msg/Bool) '
+        'are not used, the gun sprays whenever poses flow; add `state_topic: /state` '
+        '(--state-topic) if that is the trigger',
+    )
+    assert gun.notes == ()
 
 
 def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):

@@ -63,6 +63,19 @@ def test_down_and_the_model_are_taken_over(campaign, folder):
     assert read.experiments[0].name == '7'
 
 
+def test_a_trigger_that_is_not_named_is_noted(campaign):
+    """Without it the gun would spray on the way between passes, which changes every answer."""
+    told = []
+    read_campaign(campaign(), told.append)
+    (note,) = (line for line in told if 'state_topic' in line)
+    assert note.startswith('door: recording ')
+    assert '/atomizer/state (std_msgs/msg/Bool) is not used' in note
+    assert 'add `state_topic: /atomizer/state`' in note
+    told.clear()
+    read_campaign(campaign(state_topic='atomizer/state'), told.append)
+    assert told == ['reading door']
+
+
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
+from paint_deposition.cli.campaigns import read_noted
+
 if TYPE_CHECKING:
     from paint_deposition.effects.base import Effect
     from paint_deposition.formats.model_file import ModelFile
@@ -59,7 +61,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
     from paint_deposition.pictures.report import write_report
 
     with _Steps('compare') as tell:
-        data = _campaign(campaign, tell)
+        data = read_noted(campaign, tell)
         start = _start(data, model_file)
         study = Study.of(data, start.model.effects if start else ())
         if start:
@@ -121,7 +123,7 @@ def diagnose_command(
 
     library = dict(EFFECTS) | {e.id: e for e in _own(effect_files)}
     with _Steps('diagnose') as tell:
-        data = _campaign(campaign, tell)
+        data = read_noted(campaign, tell)
         start = _start_or_default(data, model_file)
         diagnosis = diagnose(data, start.model, library, seed, tell)
         content = _write_diagnosis(output, diagnosis, library, start, tell)
@@ -156,7 +158,7 @@ def refit_command(
     else:
         added = effect_class(effect)
     with _Steps('refit') as tell:
-        data = _campaign(campaign, tell)
+        data = read_noted(campaign, tell)
         start = _start_or_default(data, model_file)
         diagnosis = refit(data, start.model, added, EFFECTS, seed, tell)
         content = _write_diagnosis(output, diagnosis, {}, start, tell)
@@ -181,17 +183,6 @@ class _Steps:
     def _tell(self, line: str) -> None:
         self._bar.set_postfix_str(line)
         self._bar.update()
-
-
-def _campaign(path: Path, tell: Callable[[str], None]) -> Campaign:
-    from paint_deposition.formats.campaign_file import read_campaign
-
-    def show(line: str) -> None:
-        tell(line)
-        if not line.startswith('reading '):
-            click.echo(f'note: {line}', err=True)
-
-    return read_campaign(path, show)
 
 
 def _start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:

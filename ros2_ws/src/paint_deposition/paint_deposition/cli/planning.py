@@ -10,6 +10,8 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
+from paint_deposition.cli.campaigns import read_noted
+
 POSITIVE = click.FloatRange(min=0.0, min_open=True)
 NOT_NEGATIVE = click.FloatRange(min=0.0)
 SHOW_PROGRESS_AFTER_S = 2.0
@@ -59,7 +61,6 @@ def calibrate(
     model to start from are fitted along, its projection is kept.
     """
     from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
-    from paint_deposition.formats.campaign_file import read_campaign
     from paint_deposition.formats.model_file import read_model
     from paint_deposition.inference import calibration as calibrating
     from paint_deposition.pictures.calibration import write_calibration_pictures
@@ -73,7 +74,7 @@ def calibrate(
             bar.set_postfix_str(line)
             bar.update()
 
-        data = read_campaign(campaign, tell)
+        data = read_noted(campaign, tell)
         chosen = model_file or data.model_file
         start = read_model(chosen) if chosen else None
         result = calibrating.calibrate(data, start, seed, tell)

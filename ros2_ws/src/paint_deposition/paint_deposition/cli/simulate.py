@@ -132,7 +132,7 @@ def simulate_command(
             'effects': [effect.id for effect in model.effects],
             'spraying_time_s': path.spraying_time_s,
             'poses': counts.as_dict(),
-            'notes': list(surface.notes),
+            'notes': [*surface.notes, *recorded.notes],
         }
         tell('writing')
         files = write_film(output, surface, film_um, statistics, details=details, overwrite=True)
@@ -141,7 +141,7 @@ def simulate_command(
             write_predictions(files[-1], readings_file, predicted_um)
         tell('drawing')
         files.append(_draw(output, surface, film_um, statistics, details, path))
-    for note in surface.notes:
+    for note in details['notes']:
         click.echo(f'note: {note}', err=True)
     if statistics.coverage == 0.0:
         click.echo(f'warning: the part stays bare: {_why_bare(surface, path)}', err=True)

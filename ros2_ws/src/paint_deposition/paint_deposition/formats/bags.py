@@ -15,7 +15,8 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.formats import definitions
 from paint_deposition.formats.bag_files import Bag, BagTopic, open_bag
-from paint_deposition.formats.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.formats.mcap_run import RunTopic, RunWriter
+from paint_deposition.formats.recorded_qos import offered_qos
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import relative_flow
 
@@ -39,7 +40,8 @@ def read_trajectory(
         path: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP, split or not) or lone .mcap.
         pose_topic: its PoseStamped topic, leading slash or not; None takes the only one.
         state_topic: paint_msgs/AtomizerState, which counts from its header stamp, or
-            std_msgs/Bool, which counts from its log time. None: the gun always sprays.
+            std_msgs/Bool, which counts from its log time. None: the gun always sprays, and
+            topics that could be its trigger are noted.
 
     Returns:
         The poses as recorded, unscreened, with stamps in integer nanoseconds.
@@ -50,6 +52,7 @@ def read_trajectory(
     with open_bag(path) as bag:
         poses = choose_pose_topic(bag, pose_topic)
         state = choose_state_topic(bag, state_topic) if state_topic else None
+        notes = () if state else _unused_triggers(bag)
         read = _read_poses(bag, poses)
         changes = sorted(_flow_changes(bag, state), key=lambda change: change[0]) if state else []
         if state and state.type == BOOL_TYPE:
@@ -61,6 +64,7 @@ def read_trajectory(
         frame_id=read.frame_id,
         trigger_stamps_ns=np.array([stamp for stamp, _ in changes], dtype=np.int64),
         trigger_flow=np.array([flow for _, flow in changes], dtype=float),
+        notes=notes,
     )
 
 
@@ -107,6 +111,25 @@ def _listed(candidates: list[str], kind: str = 'PoseStamped') -> str:
     if not candidates:
         return f'it has no {kind} topic'
     return f'its {kind} topics: {" ".join(candidates)}'
+
+
+def _unused_triggers(bag: Bag) -> tuple[str, ...]:
+    """One note that names the topics that could be the trigger; none where there are none."""
+    # States say what they are, a Bool may be anything: the first is the likeliest trigger.
+    topics = [
+        topic
+        for kind in (STATE_TYPE, BOOL_TYPE)
+        for topic in bag.topics
+        if topic.type == kind and topic.message_count
+    ]
+    if not topics:
+        return ()
+    named = ' and '.join(f'{topic.name} ({topic.type})' for topic in topics)
+    return (
+        f'recording {bag.path}: {named} {"is" if len(topics) == 1 else "are"} not used, the gun '
+        f'sprays whenever poses flow; add `state_topic: {topics[0].name}` (--state-topic) if '
+        'that is the trigger',
+    )
 
 
 class _Poses(NamedTuple):

@@ -75,7 +75,7 @@ def _read_experiment(
     gap = float(entry.get('max_pose_gap_s', DEFAULT_MAX_POSE_GAP_S))
     path, counts = spray_path(trajectory, gap)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
-    for note in surface.notes:
+    for note in (*surface.notes, *trajectory.notes):
         progress(f'{name}: {note}')
     if counts.rejected:
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')

@@ -53,6 +53,7 @@ class Trajectory:
         trigger_stamps_ns: (M,) int64 times at which the flow changes; empty: always spraying.
         trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
             Before the first of them the gun is off.
+        notes: remarks on the recording for the user, a line each.
 
     Raises:
         RecordingError: the arrays do not have these shapes.
@@ -64,6 +65,7 @@ class Trajectory:
     frame_id: str = ''
     trigger_stamps_ns: np.ndarray = field(default_factory=_no_stamps)
     trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         count = len(self.stamps_ns)
