@@ -14,7 +14,8 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.formats.bags import read_trajectory, write_pose_bag
 from paint_deposition.formats.definitions import standard
 from paint_deposition.formats.mcap_recovery import recover
-from paint_deposition.formats.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.formats.mcap_run import RunTopic, RunWriter
+from paint_deposition.formats.recorded_qos import offered_qos
 
 BOOL = 'std_msgs/msg/Bool'
 

@@ -6,14 +6,9 @@ from collections.abc import Sequence
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags.interfaces import Qos, QosTime
+
+from paint_deposition.formats.recorded_qos import offered_qos
 
 # Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
 # builds one mesh marker, whatever the reliability: a full queue drops its oldest message.
@@ -65,17 +60,17 @@ def accepting(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
 
 
 def as_recorded(profile: QoSProfile) -> Qos:
-    """A profile as bags store it."""
-    return Qos(
-        QosHistory[profile.history.name],
+    """A publisher's profile, as the middleware tells it, the way bags store it."""
+    return offered_qos(
         profile.depth,
-        QosReliability[profile.reliability.name],
-        QosDurability[profile.durability.name],
-        _as_time(profile.deadline),
-        _as_time(profile.lifespan),
-        QosLiveliness[profile.liveliness.name],
-        _as_time(profile.liveliness_lease_duration),
-        profile.avoid_ros_namespace_conventions,
+        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
+        latched=profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+        history=profile.history.name,
+        liveliness=profile.liveliness.name,
+        deadline=_as_time(profile.deadline),
+        lifespan=_as_time(profile.lifespan),
+        lease=_as_time(profile.liveliness_lease_duration),
+        plain_names=profile.avoid_ros_namespace_conventions,
     )
 
 
