@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import importlib.metadata
+import importlib.util
 import os
 import py_compile
 import re
@@ -126,15 +127,43 @@ def test_launch_file_compiles(tmp_path):
     py_compile.compile(source, cfile=tmp_path / 'compiled.pyc', doraise=True)
 
 
-def test_launch_file_describes_every_node():
+def launch_description():
+    """What the launch file describes; needs a ROS installation."""
     pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
     source = SOURCES / PACKAGE / 'launch' / 'paint_cell.launch.py'
     spec = importlib.util.spec_from_file_location('paint_cell', source)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    entities = module.generate_launch_description().entities
+    return module.generate_launch_description()
+
+
+def test_launch_file_describes_every_node():
+    entities = launch_description().entities
     executables = {e.node_executable for e in entities if hasattr(e, 'node_executable')}
     assert executables == set(NODES)
+
+
+@pytest.mark.parametrize(
+    ('given', 'count'),
+    [
+        ({}, '1'),
+        ({'record': 'runs'}, '2'),
+        ({'measurements': "painter's.csv"}, '2'),
+        ({'record': '1', 'measurements': 'readings.csv'}, '3'),
+        ({'wait_for_subscribers': '5'}, '5'),
+    ],
+)
+def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
+    description = launch_description()
+    from launch import LaunchContext
+    from launch.actions import DeclareLaunchArgument
+
+    context = LaunchContext()
+    context.launch_configurations.update(given)
+    for entity in description.entities:
+        if isinstance(entity, DeclareLaunchArgument):
+            entity.execute(context)
+    assert context.launch_configurations['wait_for_subscribers'] == count
 
 
 def test_parameter_file_names_every_node():

@@ -9,6 +9,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
@@ -20,10 +21,12 @@ from paint_deposition.formats.bags import read_trajectory, write_pose_bag
 from paint_deposition.formats.meshes import read_mesh
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes import qos
 
 SIMULATOR = 'paint_deposition.nodes.deposition_simulator'
 COMPARISON = 'paint_deposition.nodes.model_comparison'
 PLAYER = 'paint_deposition.nodes.bag_player'
+RECORDER = 'paint_deposition.nodes.run_recorder'
 EDGE_M = 0.03
 
 
@@ -73,6 +76,35 @@ def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wai
     offline = integrator.film_um
     assert offline.max() > 5.0
     assert np.abs(live[:, 3] - offline).max() < 1e-6 * offline.max()
+
+
+def test_a_replay_waits_for_who_is_still_loading(
+    ros_domain, call, onlooker, wait_until, tmp_path
+):
+    """The recorder is there at once, the simulator seconds later; both get every pose."""
+    mesh = write_panel(tmp_path / 'panel.stl')
+    bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
+    statistics = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    with (
+        NodeProcess(tmp_path / 'player', PLAYER, bag=bag, wait_for_subscribers=2) as player,
+        NodeProcess(
+            tmp_path / 'recorder', RECORDER, output_directory=tmp_path, name='run'
+        ) as recorder,
+        NodeProcess(
+            tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, max_edge_length_m=EDGE_M
+        ) as simulator,
+    ):
+        wait_until(lambda: player.exit_code is not None, timeout_s=120.0, what='the replay')
+        assert player.exit_code == 0, player.err
+        wait_until(
+            lambda: statistics.newest('thickness/stats').poses_received == 300,
+            what='every pose painted',
+        )
+        assert call(Trigger, '/run_recorder/stop', Trigger.Request()).success
+        assert recorder.wait() == 0, recorder.err
+        simulator.interrupt_as_launch_does()
+        assert simulator.wait() == 0, simulator.err
+    assert len(read_trajectory(tmp_path / 'run')) == 300
 
 
 def test_ctrl_c_while_a_model_is_compiled_ends_it_at_once(ros_domain, call, tmp_path):

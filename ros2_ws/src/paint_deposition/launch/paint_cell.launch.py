@@ -12,6 +12,7 @@ from launch.substitutions import (
     LaunchConfiguration,
     NotEqualsSubstitution,
     PathJoinSubstitution,
+    PythonExpression,
 )
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
@@ -31,6 +32,15 @@ def text(argument):
 
 def given(argument):
     return IfCondition(NotEqualsSubstitution(LaunchConfiguration(argument), ''))
+
+
+def count_with(*arguments):
+    """One for the simulator, and one for each of these launch arguments that is given."""
+    expression = ['1']
+    for argument in arguments:
+        is_given = NotEqualsSubstitution(LaunchConfiguration(argument), '')
+        expression += [" + ('", is_given, "'.lower() == 'true')"]
+    return PythonExpression(expression)
 
 
 def cell_node(name, parameters=None, condition=None):
@@ -92,6 +102,13 @@ def generate_launch_description():
             default_value='',
             description='Gauge readings to compare with, CSV; empty: no comparison [path]',
         ),
+        # Whoever is still loading when the replay starts would miss its start.
+        DeclareLaunchArgument(
+            'wait_for_subscribers',
+            default_value=count_with('record', 'measurements'),
+            description='Nodes that take the poses and must be there before the replay; '
+            'as many as are started here [count]',
+        ),
         DeclareLaunchArgument(
             'parameters',
             default_value=shared('config', 'cell.yaml'),
@@ -114,6 +131,9 @@ def generate_launch_description():
         'pose_topic': text('pose_topic'),
         'state_topic': text('state_topic'),
         'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
+        'wait_for_subscribers': ParameterValue(
+            LaunchConfiguration('wait_for_subscribers'), value_type=int
+        ),
     }
     nodes = [
         cell_node('deposition_simulator', part),
