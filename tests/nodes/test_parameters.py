@@ -10,16 +10,22 @@ from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.bag_player import BagPlayer
+from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.parameters import NodeParameter, declare_parameters
 from paint_deposition.nodes.run_recorder import RunRecorder
+
+NODES = (BagPlayer, DepositionSimulator, IndexPlanner, ModelComparison, RunRecorder)
 
 TABLE = (
     NodeParameter('rate_hz', 2.0, 'Rate [Hz]', low=0.1, high=100.0),
     NodeParameter('target_um', 0.0, 'Target film, 0: none [um]', low=0.0),
     NodeParameter('queue_depth', 500, 'Queue [messages]', low=1),
-    NodeParameter('mesh_file', '', 'Mesh [path]', read_only=True),
+    NodeParameter('mesh_file', '', 'Mesh [path]', is_path=True, fixed_because='it is read once'),
+    NodeParameter('model_file', '', 'Model [path]', is_path=True),
     NodeParameter('compression', 'zstd', 'Compression [name]', choices=('zstd', 'none')),
-    NodeParameter('topics', [], 'Topics [names]', element=str, read_only=True),
+    NodeParameter('topics', [], 'Topics [names]', element=str, fixed_because='of the run'),
     NodeParameter('down', [0.0, 0.0, -1.0], 'Gravity [1]'),
     NodeParameter(
         'odd', 1, 'Odd number [1]', constraints='an odd number', allows=lambda value: value % 2
@@ -116,6 +122,43 @@ def test_a_later_change_that_fits(declared):
     node, _ = declared()
     (result,) = node.set_parameters([Parameter('compression', value='none')])
     assert result.successful
+
+
+def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tmp_path):
+    monkeypatch.setenv('HOME', str(tmp_path))
+    node, values = declared(mesh_file='~/door.stl', model_file='models~/a.yaml')
+    assert values['mesh_file'] == node.get_parameter('mesh_file').value == f'{tmp_path}/door.stl'
+    assert values['model_file'] == 'models~/a.yaml'
+    assert node.set_parameters([Parameter('model_file', value='~/b.yaml')])[0].successful
+    assert node.get_parameter('model_file').value == f'{tmp_path}/b.yaml'
+    (result,) = node.set_parameters([Parameter('model_file', value=7)])
+    assert 'Wrong parameter type' in result.reason
+
+
+@pytest.mark.parametrize('node_class', NODES)
+def test_every_path_knows_the_home_folder(node_class):
+    for row in node_class.PARAMETERS:
+        assert row.is_path == row.description.endswith('[path]'), row.name
+
+
+@pytest.mark.parametrize('node_class', [BagPlayer, RunRecorder])
+def test_a_fixed_parameter_says_why(node_class):
+    for row in node_class.PARAMETERS:
+        assert len(row.fixed_because) > 20, row.name
+
+
+def test_a_running_recorder_says_why_it_refuses(ros_context, executor, tmp_path):
+    recorder = RunRecorder(
+        context=ros_context,
+        parameter_overrides=[Parameter('output_directory', value=str(tmp_path))],
+    )
+    executor.add_node(recorder)
+    (result,) = recorder.set_parameters([Parameter('compression', value='none')])
+    assert not result.successful
+    assert result.reason == (
+        "compression cannot change while the node runs: the run's file is open; call ~/stop and "
+        'start another recorder'
+    )
 
 
 def test_sim_time_and_qos_overrides_are_not_ours(declared):

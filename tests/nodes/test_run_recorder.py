@@ -29,6 +29,7 @@ from paint_deposition.formats.bags import read_trajectory, stamp_ns, write_pose_
 from paint_deposition.formats.mcap_recovery import recover
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.bag_player import BagPlayer
+from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.messages import to_time
 from paint_deposition.nodes.run_recorder import RunRecorder
 
@@ -91,12 +92,13 @@ def finish(recorder: RunRecorder) -> dict:
 
 
 def counts(information: dict) -> dict[str, int]:
-    """Messages by topic, but for the recorder's own diagnostics."""
+    """Messages by topic, but for what the nodes say of themselves."""
     found = {
         entry['topic_metadata']['name']: entry['message_count']
         for entry in information['topics_with_message_count']
     }
-    return {name: count for name, count in found.items() if name != '/diagnostics'}
+    of_nodes = ('/diagnostics', '/parameter_events')
+    return {name: count for name, count in found.items() if name not in of_nodes}
 
 
 def offered(information: dict, topic: str) -> list[dict]:
@@ -268,6 +270,25 @@ def test_what_the_run_was_made_with_is_kept(record, tmp_path):
     assert notes['mesh_file'] == str(mesh)
     assert len(notes['mesh_sha256']) == 64
     assert notes['model_yaml'] == 'planar: {K1_cm3_per_s: 1.9}\n'
+
+
+def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin, wait_until):
+    planner = IndexPlanner(context=ros_context)
+    spin(planner)
+    recorder = record()
+    events = [p for p in planner.publishers if p.topic_name == '/parameter_events']
+    wait_until(
+        lambda: all(p.get_subscription_count() > 0 for p in events), what='the subscription'
+    )
+    (result,) = planner.set_parameters([Parameter('width_m', value=0.75)])
+    assert result.successful
+    wait_until(lambda: recorder.recorded('/parameter_events') >= 1, what='the event')
+    finish(recorder)
+    with open_bag(recorder.folder) as bag:
+        (event,) = (event for _, _, event in bag.decoded(['/parameter_events']))
+    assert event.node == '/index_planner'
+    (change,) = event.changed_parameters
+    assert (change.name, change.value.double_value) == ('width_m', 0.75)
 
 
 def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):

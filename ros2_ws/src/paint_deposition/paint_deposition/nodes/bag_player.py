@@ -25,7 +25,7 @@ from paint_deposition.nodes import qos
 from paint_deposition.nodes.audience import Audience
 from paint_deposition.nodes.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.messages import to_time
-from paint_deposition.nodes.parameters import NodeParameter
+from paint_deposition.nodes.player_parameters import PLAYER
 from paint_deposition.nodes.replay import ReplayMessage, replay_messages
 from paint_deposition.nodes.shutdown import PaintNode, run_node
 
@@ -43,56 +43,7 @@ class BagPlayer(PaintNode):
     stamps jump back to the start of the bag with every round.
     """
 
-    PARAMETERS = (
-        NodeParameter(
-            'bag',
-            '',
-            'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]',
-            read_only=True,
-        ),
-        NodeParameter(
-            'pose_topic',
-            '',
-            "PoseStamped topic in the bag; empty: the bag's only one [topic]",
-            read_only=True,
-        ),
-        NodeParameter(
-            'state_topic',
-            '',
-            'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]',
-            read_only=True,
-        ),
-        NodeParameter(
-            'rate',
-            1.0,
-            'Speed relative to the recording; 0: as fast as the subscribers take [-]',
-            low=0.0,
-            read_only=True,
-        ),
-        NodeParameter('loop', False, 'Start again at the end [true/false]', read_only=True),
-        NodeParameter(
-            'start_paused',
-            False,
-            'Wait for ~/resume before the start [true/false]',
-            read_only=True,
-        ),
-        NodeParameter(
-            'wait_for_subscribers',
-            1,
-            'Subscribers of atomizer/pose to wait for before the start [count]',
-            low=0,
-            read_only=True,
-        ),
-        NodeParameter(
-            'window',
-            200,
-            'Poses ahead of the slowest subscriber at rate 0 [count]',
-            low=1,
-            high=10_000,
-            read_only=True,
-        ),
-        NodeParameter('publish_clock', True, 'Publish /clock [true/false]', read_only=True),
-    )
+    PARAMETERS = PLAYER
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)

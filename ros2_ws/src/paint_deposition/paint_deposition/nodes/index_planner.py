@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import Any
 
 from nav_msgs.msg import Path as PathMessage
@@ -136,7 +135,7 @@ class IndexPlanner(PaintNode):
 
 
 def _model_of(model_file: str) -> DepositionModel:
-    return read_model(Path(model_file).expanduser()) if model_file else DepositionModel()
+    return read_model(model_file) if model_file else DepositionModel()
 
 
 def _given(value: float) -> float | None:

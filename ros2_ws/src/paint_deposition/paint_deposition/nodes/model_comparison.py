@@ -49,6 +49,7 @@ class ModelComparison(PaintingNode):
             'measurements_file',
             '',
             'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
+            is_path=True,
             fixed_because=AT_START,
         ),
         NodeParameter(

@@ -30,6 +30,7 @@ PART = (
         'mesh_file',
         '',
         "The part's mesh: STL, PLY or OBJ [path]",
+        is_path=True,
         fixed_because='the film lies on this mesh; restart the node for another part',
     ),
     NodeParameter(
@@ -131,6 +132,7 @@ MODEL = (
         '',
         'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
         'reads it and paints the motion so far again [path]',
+        is_path=True,
     ),
     NodeParameter(
         'repaint',

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -44,6 +45,7 @@ class NodeParameter:
     bool), for an empty list has none. `low` and `high` are inclusive; one of them may be left out.
     `constraints` is the plain English of what `allows` (value -> bool) checks beyond the range.
     `fixed_because` makes the parameter read-only and says why it cannot change at run time.
+    `is_path` marks a file or folder: a `~` in front is the home folder, as in a shell.
     """
 
     name: str
@@ -52,11 +54,11 @@ class NodeParameter:
     low: float | None = None
     high: float | None = None
     choices: tuple[str, ...] = ()
-    read_only: bool = False
     constraints: str = ''
     allows: Callable[[Any], bool] | None = None
     element: type | None = None
     fixed_because: str = ''
+    is_path: bool = False
 
     @property
     def ros_type(self) -> Parameter.Type:
@@ -71,7 +73,7 @@ class NodeParameter:
             type=self.ros_type.value,
             description=self.description,
             additional_constraints=self._constraints_text(),
-            read_only=self.read_only or bool(self.fixed_because),
+            read_only=bool(self.fixed_because),
         )
         if self.low is None and self.high is None:
             return descriptor
@@ -88,9 +90,14 @@ class NodeParameter:
         return descriptor
 
     def coerced(self, value: Any) -> Any:
-        """`value` as its type: YAML says 2 for 2.0, and ROS makes no value of an empty list."""
+        """`value` as its type: YAML says 2 for 2.0, and ROS makes no value of an empty list.
+
+        No shell has expanded the `~` of a path in a parameter file or behind `:=`.
+        """
         if value is None and isinstance(self.default, list):
             return []
+        if self.is_path and isinstance(value, str):
+            return os.path.expanduser(value)
         if self.ros_type == Parameter.Type.DOUBLE and type(value) is int:
             return float(value)
         if self.ros_type == Parameter.Type.DOUBLE_ARRAY and isinstance(value, Sequence):
@@ -128,6 +135,7 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     rows = {row.name: row for row in table}
     overrides = _overrides(node)
     _refuse_unknown(node, rows, overrides)
+    node.add_pre_set_parameters_callback(lambda changes: _with_homes(rows, changes))
     node.add_on_set_parameters_callback(lambda changes: _check_changes(rows, changes))
     for row in table:
         _declare(node, row, row.coerced(overrides.get(row.name, row.default)))
@@ -191,6 +199,15 @@ def refusal_of_fixed(node: Node, table: ParameterTable, changes: list[Parameter]
         if change.name in reasons and node.describe_parameter(change.name).read_only:
             return f'{change.name} cannot change while the node runs: {reasons[change.name]}'
     return None
+
+
+def _with_homes(rows: dict[str, NodeParameter], changes: list[Parameter]) -> list[Parameter]:
+    return [
+        Parameter(change.name, change.type_, rows[change.name].coerced(change.value))
+        if change.name in rows and rows[change.name].is_path and change.value is not None
+        else change
+        for change in changes
+    ]
 
 
 def _check_changes(

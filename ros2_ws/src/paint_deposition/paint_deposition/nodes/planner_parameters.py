@@ -17,6 +17,7 @@ RECOMMENDING = (
         '',
         'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
         'reads it [path]',
+        is_path=True,
     ),
     NodeParameter(
         'width_m',
@@ -59,6 +60,7 @@ PLANNING = (
         'mesh_file',
         '',
         "The part's mesh to plan passes on: STL, PLY or OBJ; empty: none [path]",
+        is_path=True,
         fixed_because=AT_START,
     ),
     NodeParameter(

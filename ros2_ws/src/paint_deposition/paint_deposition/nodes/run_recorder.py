@@ -17,14 +17,14 @@ from std_srvs.srv import Trigger
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.formats import definitions
 from paint_deposition.formats.bags import POSE_TYPE
-from paint_deposition.formats.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.formats.mcap_run import RunTopic, RunWriter
 from paint_deposition.formats.provenance import provenance
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.audience import PROGRESS_TOPIC
 from paint_deposition.nodes.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.messages import to_time
-from paint_deposition.nodes.parameters import NodeParameter
 from paint_deposition.nodes.recorded_topic import RecordedTopic
+from paint_deposition.nodes.recorder_parameters import RECORDER
 from paint_deposition.nodes.shutdown import PaintNode, run_node
 
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
@@ -37,6 +37,7 @@ DEFAULT_TOPICS = (
     'comparison/stats',
     'planned_path',
     '/diagnostics',
+    '/parameter_events',
 )
 DISCOVERY_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.1
@@ -55,43 +56,7 @@ class RunRecorder(PaintNode):
     the node says so and ends with an error; `paint recover` reads what is there.
     """
 
-    PARAMETERS = (
-        NodeParameter(
-            'topics',
-            [],
-            'Topics to record; empty: motion, film, plan and diagnostics [topics]',
-            read_only=True,
-            element=str,
-        ),
-        NodeParameter(
-            'output_directory', 'runs', 'Folder to make the run in [path]', read_only=True
-        ),
-        NodeParameter(
-            'name', '', "Run's name; empty: run_<date>_<time> [text]", read_only=True
-        ),
-        NodeParameter(
-            'compression',
-            'zstd',
-            'Compression of the chunks in the file [name]',
-            choices=tuple(COMPRESSIONS),
-            read_only=True,
-        ),
-        NodeParameter(
-            'max_pose_gap_s',
-            0.25,
-            'Longest interval between pose stamps that is no gap [s]',
-            low=0.001,
-            high=60.0,
-            read_only=True,
-        ),
-        NodeParameter(
-            'mesh_file', '', 'Mesh whose digest to keep with the run; empty: none [path]',
-            read_only=True,
-        ),
-        NodeParameter(
-            'model_file', '', 'Model to keep with the run; empty: none [path]', read_only=True
-        ),
-    )  # fmt: skip
+    PARAMETERS = RECORDER
 
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)

@@ -46,5 +46,7 @@ SIMULATOR = (
         low=0.0,
         high=THICKEST_UM,
     ),
-    NodeParameter('output_directory', 'runs', 'Where ~/save_film writes [path]'),
+    NodeParameter(
+        'output_directory', 'runs', 'Where ~/save_film writes [path]', is_path=True
+    ),
 )  # fmt: skip
