@@ -41,6 +41,7 @@ _paint_prepend PATH "$VIRTUAL_ENV/bin"
 
 if [ -z "$PAINT_UNDERLAY_ONLY" ] && [ -f "$_paint_root/ros2_ws/install/local_setup.bash" ]; then
     . "$_paint_root/ros2_ws/install/local_setup.bash"
+    _paint_prepend PATH "$_paint_root/ros2_ws/install/lib/paint_deposition"
 fi
 
 [ -z "$_paint_nounset" ] || set -u

@@ -78,9 +78,7 @@ def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wai
     assert np.abs(live[:, 3] - offline).max() < 1e-6 * offline.max()
 
 
-def test_a_replay_waits_for_who_is_still_loading(
-    ros_domain, call, onlooker, wait_until, tmp_path
-):
+def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wait_until, tmp_path):
     """The recorder is there at once, the simulator seconds later; both get every pose."""
     mesh = write_panel(tmp_path / 'panel.stl')
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))

@@ -56,3 +56,12 @@ def test_environment_can_be_sourced_twice(repository):
     source = '. setup/environment.sh'
     script = f'set -eu; {source}; first=$PATH; {source}; [ "$PATH" = "$first" ]'
     subprocess.run(['bash', '-c', script], cwd=repository, check=True)
+
+
+def test_paint_is_a_command_once_the_environment_is_sourced(repository):
+    script = '. setup/environment.sh; command -v paint bag_player'
+    done = subprocess.run(
+        ['bash', '-c', script], cwd=repository, check=True, capture_output=True, text=True
+    )
+    folder = repository / 'ros2_ws' / 'install' / 'lib' / 'paint_deposition'
+    assert done.stdout.split() == [str(folder / 'paint'), str(folder / 'bag_player')]
