@@ -30,7 +30,8 @@ def door_alone(tmp_path_factory):
     content = {'experiments': content['experiments'][1:], 'model': 'start.yaml'}
     (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
     (folder / 'start.yaml').write_text(
-        'planar: {K1_cm3_per_s: 1.0}\n'
+        'name: bell 7\nplanar: {K1_cm3_per_s: 1.0}\n'
+        'uncertainty: {planar: {r_m: 9.0}, projection: {model_plane_m: 0.002}}\n'
         'history: [{added: pattern, rmse_um: 9}, {added: a wish, rmse_um: 8}]\n'
     )
     return folder / 'campaign.yaml'
@@ -126,8 +127,24 @@ def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, t
     assert content['accepted'] == [HIDDEN]
     assert content['classes'][0]['parameters']['attraction']['value'] > 0.5
     model = read_model_file(tmp_path / 'model.yaml')
+    assert model.name == 'bell 7'
+    assert model.uncertainty['projection'] == {'model_plane_m': 0.002}
+    assert model.uncertainty['planar']['r_m'] < 0.1
+    assert 0.0 < model.uncertainty[HIDDEN]['attraction'] < 1.0
     assert [step['added'] for step in model.history] == ['pattern', 'a wish', HIDDEN]
-    assert model.history[1]['rmse_um'] == pytest.approx(content['rmse_um']['before'], abs=1e-4)
+    assert model.history[0] == {'added': 'pattern', 'rmse_um': 9}
+    errors = content['rmse_um']
+    for step, when in zip(model.history[1:], ('before', 'after'), strict=True):
+        assert step['rmse_um'] == pytest.approx(errors[when], abs=1e-4)
+        assert step['holdout_rmse_um'] == pytest.approx(errors[f'holdout_{when}'], abs=1e-4)
+        assert step['noise_floor_um'] == pytest.approx(errors['noise_floor'], abs=1e-4)
+        assert step['campaign'] == str(door_alone)
+    before = read_model_file(tmp_path / 'model_before.yaml')
+    assert before.name == model.name
+    assert before.history == model.history[:2]
+    report = (tmp_path / 'report.html').read_text()
+    assert '<td>+ a wish</td>' in report
+    assert str(door_alone) in report
     again = paint(
         'refit', door_alone, '--model', tmp_path / 'model.yaml', '--add', HIDDEN, '-o', tmp_path
     )

@@ -62,7 +62,7 @@ def test_every_effect_reads_back(effect, tmp_path: Path):
 NUMBERS = st.floats(1e-12, 1.0)
 
 
-@given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(-0.1, 0.1), st.booleans())
+@given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(0.0, 0.1), st.booleans())
 def test_numbers_read_back_to_the_bit(tmp_path_factory, k1, k2, sigma, shift, occlusion):
     model = DepositionModel(
         planar=PlanarPattern(K1_cm3_per_s=k1, K2=k2, sigma1_m=sigma),
@@ -146,6 +146,7 @@ def test_what_is_left_out_has_its_default(written):
         ('effects: [{file: none.py}]', 'none.py: cannot be read (No such file or directory)'),
         ('name: 3', 'name is 3; expected text'),
         ('history: {}', 'history is {}; expected a list'),
+        ('history: [{}, 3]', 'history, entry 2 is 3; expected a mapping'),
         ('', 'holds no model; expected the keys planar and projection'),
         ('planar: {K2: .1, K2: .2}', "cannot be read as YAML (line 1: 'K2' is given twice)"),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),

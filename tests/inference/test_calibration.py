@@ -17,7 +17,7 @@ from inference.panels import (
 )
 from paint_deposition.errors import ReadingsError
 from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
-from paint_deposition.formats.model_file import read_model_file
+from paint_deposition.formats.model_file import ModelFile, read_model_file
 from paint_deposition.inference.calibration import calibrate, predict, started_from
 from paint_deposition.inference.campaign import Campaign, Experiment
 from paint_deposition.inference.collapse_fit import fit_collapse
@@ -173,6 +173,18 @@ def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
     content = json.loads(files[1].read_text())
     assert content.keys() == calibration_as_dict(calibrated).keys()
     assert content['parameters']['phi_rad']['determined'] is False
+    (step,) = written.history
+    assert step['added'] == 'pattern'
+    assert step['noise_floor_um'] == pytest.approx(calibrated.study.noise_floor_um, abs=1e-4)
+
+
+def test_a_calibration_carries_on_what_it_started_from(calibrated, tmp_path):
+    older = [{'added': 'pattern', 'rmse_um': 3.0, 'campaign': 'another.yaml'}]
+    start = ModelFile(calibrated.model, 'bell 7', {}, older)
+    written = read_model_file(write_calibration(tmp_path, calibrated, start)[0])
+    assert written.name == 'bell 7'
+    assert written.history[:1] == older
+    assert [step['added'] for step in written.history] == ['pattern', 'refit']
 
 
 # --- readings that cannot be what they are said to be

@@ -188,6 +188,24 @@ def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
     assert 'no effect was added' not in text
 
 
+def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnosis, models):
+    older = [
+        {'added': 'pattern', 'rmse_um': 7.77, 'holdout_rmse_um': 8.88, 'noise_floor_um': 0.66,
+         'campaign': 'panel.yaml'},
+        {'added': 'tcp_tilt', 'rmse_um': 6.66, 'campaign': 'panel.yaml'},
+    ]  # fmt: skip
+    campaign = replace(diagnosis.study.campaign, name='door.yaml')
+    done = replace(diagnosis, study=replace(diagnosis.study, campaign=campaign))
+    write_report(tmp_path / 'report.html', done.study, models, done, older=older)
+    errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in done.history]
+    floor = f'{done.noise_floor_um:.2f}'
+    assert (
+        'pattern of eq. (1) alone panel.yaml 7.77 8.88 0.66 + TCP tilt panel.yaml 6.66 '
+        f'model as given, fitted anew door.yaml {errors[0]} {floor} '
+        f'+ air drift door.yaml {errors[1]} {floor}'
+    ) in page_of(tmp_path / 'report.html').text
+
+
 def test_a_refit_tells_what_it_added_to_readings_that_lack_nothing(tmp_path):
     campaign = small_campaign(tmp_path, truth=None, amplitude=None)
     done = refit(campaign, DepositionModel(), AirDrift)

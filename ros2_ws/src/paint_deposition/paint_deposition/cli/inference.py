@@ -223,13 +223,9 @@ def _write_diagnosis(
     start: ModelFile,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    from paint_deposition.formats.inference_files import (
-        diagnosis_as_dict,
-        history_as_list,
-        write_residuals,
-    )
+    from paint_deposition.formats.fitted_model import write_fitted
+    from paint_deposition.formats.inference_files import diagnosis_as_dict, write_residuals
     from paint_deposition.formats.json_files import write_json
-    from paint_deposition.formats.model_file import write_model
     from paint_deposition.inference.comparison import compare
     from paint_deposition.inference.next_experiment import propose_for
     from paint_deposition.pictures.report import write_report
@@ -241,13 +237,13 @@ def _write_diagnosis(
     places, sprays = propose_for(diagnosis, library)
     content = diagnosis_as_dict(diagnosis, comparisons[0][1].regions, places, sprays)
     tell('writing the report')
-    history = history_as_list(diagnosis.history, start.history)
     write_json(output / 'diagnosis.json', content)
-    write_model(output / 'model_before.yaml', diagnosis.history[0].model)
-    write_model(output / 'model.yaml', diagnosis.model, history=history)
+    write_fitted(output / 'model_before.yaml', study, diagnosis.history[:1], start)
+    write_fitted(output / 'model.yaml', study, diagnosis.history, start)
     write_residuals(output / 'residuals.csv', study, comparisons[-1][1])
     _write_pictures(output, study, comparisons)
-    write_report(output / 'report.html', study, comparisons, diagnosis, places, sprays)
+    write_report(output / 'report.html', study, comparisons, diagnosis, places, sprays,
+                 start.history)  # fmt: skip
     return content
 
 

@@ -61,7 +61,7 @@ def calibrate(
     model to start from are fitted along, its projection is kept.
     """
     from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
-    from paint_deposition.formats.model_file import read_model
+    from paint_deposition.formats.model_file import read_model_file
     from paint_deposition.inference import calibration as calibrating
     from paint_deposition.pictures.calibration import write_calibration_pictures
 
@@ -76,10 +76,10 @@ def calibrate(
 
         data = read_noted(campaign, tell)
         chosen = model_file or data.model_file
-        start = read_model(chosen) if chosen else None
-        result = calibrating.calibrate(data, start, seed, tell)
+        start = read_model_file(chosen) if chosen else None
+        result = calibrating.calibrate(data, start.model if start else None, seed, tell)
         tell('writing')
-        files = write_calibration(output, result)
+        files = write_calibration(output, result, start)
         files += write_calibration_pictures(output, result)
     if as_json:
         click.echo(json.dumps(calibration_as_dict(result), indent=2))

@@ -1,14 +1,14 @@
 """A calibration on disk: the model with its uncertainty, and figures."""
 
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from paint_deposition.formats.fitted_model import write_fitted
 from paint_deposition.formats.json_files import write_json
-from paint_deposition.formats.model_file import write_model
+from paint_deposition.formats.model_file import ModelFile
 from paint_deposition.inference.calibration import Calibration, PanelFit
-from paint_deposition.inference.unknowns import PATTERN_NAMES
+from paint_deposition.inference.verdict import Step
 from paint_deposition.model.uniformity import sigma_n_closed_form
 
 SHOWN_CORRELATIONS = 10
@@ -46,28 +46,24 @@ def calibration_as_dict(calibration: Calibration) -> dict[str, Any]:
 
 
 def write_calibration(
-    folder: str | Path, calibration: Calibration, history: Sequence[dict[str, Any]] = ()
+    folder: str | Path, calibration: Calibration, start: ModelFile | None = None
 ) -> list[Path]:
-    """Write ``model.yaml`` and ``calibration.json``; older ones are replaced."""
+    """Write ``model.yaml`` and ``calibration.json``; older ones are replaced.
+
+    Args:
+        folder: made if it is not there.
+        calibration: what to write.
+        start: the model it started from, whose name and history are carried on.
+    """
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    uncertainty: dict[str, Any] = {
-        'planar': {
-            value.name: float(f'{value.sigma:.3g}')
-            for value in calibration.parameters
-            if value.name in PATTERN_NAMES
-        }
-    }
-    for value in calibration.parameters:
-        if value.name not in PATTERN_NAMES:
-            effect, _, name = value.name.partition('.')
-            uncertainty.setdefault(effect, {})[name] = float(f'{value.sigma:.3g}')
-    write_model(
+    study = calibration.study
+    write_fitted(
         folder / 'model.yaml',
-        calibration.model,
-        header_comment='\n'.join(_headline(calibration)),
-        history=history,
-        uncertainty=uncertainty,
+        study,
+        [Step.of(study, '', calibration.fit)],
+        start,
+        '\n'.join(_headline(calibration)),
     )
     write_json(folder / 'calibration.json', calibration_as_dict(calibration))
     return [folder / 'model.yaml', folder / 'calibration.json']

@@ -58,7 +58,8 @@ def read_campaign(
             experiments.append(_read_experiment(path.parent, name, entry, progress))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
-    return Campaign(tuple(experiments), None if model is None else str(path.parent / model))
+    start = None if model is None else str(path.parent / model)
+    return Campaign(tuple(experiments), start, str(path))
 
 
 def _read_experiment(

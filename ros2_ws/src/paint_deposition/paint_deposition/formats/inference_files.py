@@ -1,6 +1,6 @@
 """Results of comparing and diagnosing as JSON and CSV; names as others rely on them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -10,7 +10,7 @@ from paint_deposition.inference.comparison import Comparison
 from paint_deposition.inference.next_experiment import Place, Spray
 from paint_deposition.inference.regions import Region
 from paint_deposition.inference.study import Study
-from paint_deposition.inference.verdict import Diagnosis, Step
+from paint_deposition.inference.verdict import Diagnosis
 
 
 def comparison_as_dict(comparison: Comparison) -> dict[str, Any]:
@@ -89,28 +89,6 @@ def diagnosis_as_dict(
         },
         'notes': list(diagnosis.notes),
     }
-
-
-def history_as_list(
-    history: Sequence[Step], older: Sequence[Mapping[str, Any]] = ()
-) -> list[dict[str, Any]]:
-    """What was added to a model and the errors it left, for the model's file.
-
-    Args:
-        history: the models, the one started from first.
-        older: what the start model's own file says; its last entry is that model, now refitted.
-    """
-    steps = [
-        {
-            'added': step.added or 'pattern',
-            'rmse_um': round(step.rmse_um, 4),
-            'holdout_rmse_um': round(step.holdout_rmse_um, 4),
-        }
-        for step in history
-    ]
-    if older:
-        steps[0]['added'] = older[-1].get('added', 'pattern')
-    return [*(dict(step) for step in older[:-1]), *steps]
 
 
 def write_residuals(path: str | Path, study: Study, comparison: Comparison) -> None:

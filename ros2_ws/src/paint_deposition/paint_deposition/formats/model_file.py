@@ -109,8 +109,15 @@ def _model_file(content: dict[str, Any], folder: Path) -> ModelFile:
         DepositionModel(**sections, effects=effects),
         _of_type('name', content.get('name'), str, ''),
         _of_type('uncertainty', content.get('uncertainty'), dict, {}),
-        _of_type('history', content.get('history'), list, []),
+        _history(content.get('history')),
     )
+
+
+def _history(entries: Any) -> list[dict[str, Any]]:
+    return [
+        _of_type(f'history, entry {number}', entry, dict, {})
+        for number, entry in enumerate(_of_type('history', entries, list, []), start=1)
+    ]
 
 
 def _section(key: str, values: Any) -> BaseModel:

@@ -1,10 +1,11 @@
 """A campaign: painted parts with their gauge readings, ready to be compared with the model."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.outliers import left_out_lines
 from paint_deposition.inference.readings import PointMeans, Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -25,8 +26,9 @@ class Experiment:
         name: for reports.
         surface: the refined part.
         path: sub-steps with what lies ahead known.
-        readings: as taken.
+        readings: those that are used.
         means: the readings averaged over repeats; its P points are what is fitted.
+        taken: all readings; used: (N,) which of them are used.
         points: the P places on the skin, with covariates and slope stencils behind them.
         files: where mesh, trajectory and readings came from, for reports.
     """
@@ -37,6 +39,8 @@ class Experiment:
     readings: Readings
     means: PointMeans
     points: SurfacePoints
+    taken: Readings
+    used: np.ndarray
     files: dict[str, str] = field(default_factory=dict)
 
     @staticmethod
@@ -60,7 +64,30 @@ class Experiment:
         if normals is not None:
             _refuse_other_side(readings, means, place.angle_rad)
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
-        return Experiment(name, surface, path, readings, means, points, files or {})
+        used = np.ones(len(readings), dtype=bool)
+        return Experiment(
+            name, surface, path, readings, means, points, readings, used, files or {}
+        )
+
+    def without(self, left_out: np.ndarray) -> 'Experiment':
+        """The same part without some of the readings (N,) that were used.
+
+        Raises:
+            ReadingsError: no reading is left.
+        """
+        if not left_out.any():
+            return self
+        if left_out.all():
+            raise ReadingsError(
+                f'{self.readings.source}: its {len(left_out)} readings contradict each other; '
+                'measure again'
+            )
+        used = self.used.copy()
+        used[used] = ~left_out
+        kept = Experiment.of(
+            self.name, self.surface, self.path, self.taken.select(used), self.files
+        )
+        return replace(kept, taken=self.taken, used=used)
 
     def __len__(self) -> int:
         return len(self.means.mean_um)
@@ -78,18 +105,39 @@ class Campaign:
     Attributes:
         experiments: at least one.
         model_file: the start model's file, or None.
+        name: that of its file, '' for none; errors compare within one campaign only.
     """
 
     experiments: tuple[Experiment, ...]
     model_file: str | None = None
+    name: str = ''
 
     def __len__(self) -> int:
         return sum(len(experiment) for experiment in self.experiments)
 
     @property
     def reading_count(self) -> int:
-        """Readings with repeats counted singly."""
+        """Readings that are used, repeats counted singly."""
         return sum(len(experiment.readings) for experiment in self.experiments)
+
+    def without(self, left_out: np.ndarray) -> 'Campaign':
+        """The same without some of the readings, (N,) in the order of the experiments.
+
+        Raises:
+            ReadingsError: an experiment has no reading left.
+        """
+        ends = np.cumsum([len(experiment.readings) for experiment in self.experiments])
+        parts = zip(self.experiments, np.split(left_out, ends[:-1]), strict=True)
+        return replace(self, experiments=tuple(e.without(rows) for e, rows in parts))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Readings that were left out, a line for each point."""
+        return tuple(
+            f'{experiment.name}: {line}'
+            for experiment in self.experiments
+            for line in left_out_lines(experiment.taken, experiment.used)
+        )
 
 
 def _refuse_far(readings: Readings, means: PointMeans, distance_m: np.ndarray) -> None:

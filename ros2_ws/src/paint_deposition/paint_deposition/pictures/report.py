@@ -1,7 +1,7 @@
 """The report: one HTML file that needs no network, for the browser and for paper."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -34,6 +34,7 @@ def write_report(
     diagnosis: Diagnosis | None = None,
     places: Sequence[Place] = (),
     sprays: Sequence[Spray] = (),
+    older: Sequence[Mapping[str, Any]] = (),
 ) -> None:
     """Write the report as one HTML file, whole or not at all.
 
@@ -43,8 +44,10 @@ def write_report(
         models: with their comparisons, base first, best last; one where nothing was added.
         diagnosis: None after a comparison alone.
         places, sprays: what to measure and spray next.
+        older: history of the model that a diagnosis started from, as in its file.
     """
-    write_text(path, report_html(ReportData.of(study, models, diagnosis, places, sprays)))
+    data = ReportData.of(study, models, diagnosis, places, sprays, older)
+    write_text(path, report_html(data))
 
 
 def report_html(data: ReportData) -> str:

@@ -1,12 +1,14 @@
 """Figures and arrays that the report shows, computed once from the inference's results."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.fitted_model import history_as_list
 from paint_deposition.inference.campaign import Experiment
 from paint_deposition.inference.comparison import Comparison
 from paint_deposition.inference.next_experiment import Place, Spray
@@ -44,6 +46,7 @@ class ReportData:
         models, comparisons: base first, best last; one where nothing was added.
         diagnosis: or None after a comparison alone.
         places, sprays: what to measure and spray next.
+        history: of the model, oldest first, as in its file.
     """
 
     study: Study
@@ -52,6 +55,7 @@ class ReportData:
     diagnosis: Diagnosis | None = None
     places: tuple[Place, ...] = ()
     sprays: tuple[Spray, ...] = ()
+    history: tuple[Mapping[str, Any], ...] = ()
 
     @staticmethod
     def of(
@@ -60,6 +64,7 @@ class ReportData:
         diagnosis: Diagnosis | None = None,
         places: Sequence[Place] = (),
         sprays: Sequence[Spray] = (),
+        older: Sequence[Mapping[str, Any]] = (),
     ) -> 'ReportData':
         """Put the results together; models between the first and the last are history."""
         chosen = [models[0], models[-1]] if len(models) > 1 else [models[0]]
@@ -70,6 +75,7 @@ class ReportData:
             diagnosis,
             tuple(places),
             tuple(sprays),
+            tuple(history_as_list(study, diagnosis.history, older)) if diagnosis else (),
         )
 
     @property

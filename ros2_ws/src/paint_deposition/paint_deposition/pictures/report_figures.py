@@ -19,7 +19,7 @@ from paint_deposition.pictures.report_style import (
     figure,
     grid_domains,
 )
-from paint_deposition.pictures.report_words import covariate_label, effect_name, p_words
+from paint_deposition.pictures.report_words import covariate_label, p_words, step_words
 
 COVARIATES_A_ROW = 4
 MOST_COVARIATES = 8
@@ -131,11 +131,11 @@ def _dependence_traces(x, residual, label, marker, where, first) -> list[dict]:
 
 
 def history_figure(data: ReportData) -> dict[str, Any] | None:
-    """Errors of each model of the history against the gauge's noise."""
+    """Errors of each model fitted to this campaign against the gauge's noise."""
     if data.diagnosis is None or len(data.diagnosis.history) < 2:
         return None
     steps = data.diagnosis.history
-    names = [f'+ {effect_name(s.added)}' if s.added else 'pattern alone' for s in steps]
+    names = [step_words(step) for step in data.history[-len(steps) :]]
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, INK),
         ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),

@@ -1,5 +1,6 @@
 """Rows of the report's tables."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from paint_deposition.pictures.report_words import (
     number,
     percent,
     percent_words,
+    step_words,
 )
 
 DRAWS = 400
@@ -180,18 +182,22 @@ def _size(value: float | None, unit: str) -> str:
 
 
 def history_rows(data: ReportData) -> list[dict[str, Any]]:
-    """Models in the order in which they were made."""
-    if data.diagnosis is None:
-        return []
+    """Models in the order in which they were made; what a file does not tell is None."""
     return [
         {
-            'added': effect_name(step.added) if step.added else 'pattern of eq. (1) alone'
-            if not step.model.effects else 'model as given, refitted',
-            'rmse': step.rmse_um,
-            'holdout': step.holdout_rmse_um,
+            'added': step_words(step),
+            'campaign': str(step.get('campaign', '')),
+            'rmse': _figure(step, 'rmse_um'),
+            'holdout': _figure(step, 'holdout_rmse_um'),
+            'noise': _figure(step, 'noise_floor_um'),
         }
-        for step in data.diagnosis.history
-    ]  # fmt: skip
+        for step in data.history
+    ]
+
+
+def _figure(step: Mapping[str, Any], name: str) -> float | None:
+    value = step.get(name)
+    return value if isinstance(value, int | float) else None
 
 
 def misfit_rows(data: ReportData) -> list[dict[str, Any]]:

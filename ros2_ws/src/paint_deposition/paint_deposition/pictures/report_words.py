@@ -2,9 +2,11 @@
 
 import re
 from collections.abc import Mapping
+from typing import Any
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.formats.fitted_model import PATTERN, REFIT
 from paint_deposition.inference.study import Study
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
@@ -46,6 +48,13 @@ def effect_name(effect_id: str) -> str:
     """'air_drift' as 'air drift'; names are kept for file and command line."""
     name = effect_id.replace('tcp_', 'TCP ').replace('faraday', 'Faraday')
     return name.replace('_', ' ')
+
+
+def step_words(step: Mapping[str, Any]) -> str:
+    """What one step of a model's history added."""
+    added = str(step.get('added', PATTERN))
+    known = {PATTERN: 'pattern of eq. (1) alone', REFIT: 'model as given, fitted anew'}
+    return known.get(added) or f'+ {effect_name(added)}'
 
 
 def effect_class_of(effect_id: str, *models) -> type[Effect] | None:
