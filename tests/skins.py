@@ -5,6 +5,9 @@ from collections.abc import Callable
 import numpy as np
 from scipy.spatial import Delaunay
 
+from paint_deposition.part.creases import Edges
+from paint_deposition.part.normals import mean_normals
+
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
@@ -33,3 +36,25 @@ def triangulated(
     faces = faces[np.abs(doubled) > 1e-6 * spacing_m**2]
     x, z = flat.T
     return np.stack([x, depth(x, z), z], axis=1), faces
+
+
+def solid(
+    vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float, drawn_along: str = 'normals'
+) -> tuple[np.ndarray, np.ndarray]:
+    """Close a sheet whose outward side is -y: an inner skin behind it, and a rim.
+
+    ``drawn_along`` says where the inner skin lies: along the sheet's 'normals', or along 'y'.
+    """
+    inward = np.tile([0.0, 1.0, 0.0], (len(vertices_m), 1))
+    if drawn_along == 'normals':
+        inward = -mean_normals(vertices_m, faces)
+    inner = vertices_m + thickness_m * inward
+    count = len(vertices_m)
+    edges = Edges.of(faces).single
+    start, end = faces.ravel()[edges], np.roll(faces, -1, axis=1).ravel()[edges]
+    rim = np.concatenate(
+        [np.stack([end, start, start + count], 1), np.stack([end, start + count, end + count], 1)]
+    )
+    return np.concatenate([vertices_m, inner]), np.concatenate(
+        [faces, faces[:, ::-1] + count, rim]
+    )

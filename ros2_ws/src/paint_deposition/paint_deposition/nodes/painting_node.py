@@ -62,6 +62,7 @@ class PaintingNode(PaintNode, ABC):
     def __init__(self, name: str, **kwargs: Any):
         self._repainting: Repainting | None = None
         self._facing_settled = False
+        self._notes_told = 0
         self.load = Load()
         super().__init__(name, **kwargs)
         try:
@@ -106,11 +107,12 @@ class PaintingNode(PaintNode, ABC):
         return 'double'
 
     def _take_surface(self, surface: Surface) -> None:
-        """Take the part, at the start and when it turns out to be inside out."""
+        """Take the part, at the start and when the gun shows which side is outward."""
         self.surface = surface
         self.points = self._points_on(surface)
-        for note in surface.notes:
+        for note in surface.notes[self._notes_told :]:
             self.get_logger().warning(note)
+        self._notes_told = len(surface.notes)
 
     def _check(self, values: Mapping[str, Any]) -> None:
         """Raise PaintError if these parameter values do not go together."""
@@ -254,8 +256,9 @@ class PaintingNode(PaintNode, ABC):
         )
         positions = poses.positions_m[finite]
         seen = facing(self.surface, positions, axes)
-        if seen.reversed:
-            self._take_surface(toward_the_gun(self.surface, positions, axes))
+        faced = toward_the_gun(self.surface, positions, axes)
+        if faced is not self.surface:
+            self._take_surface(faced)
             turned = self._make_film(self.film.model)
             turned.follow(self.film.log.events)
             self.film = turned

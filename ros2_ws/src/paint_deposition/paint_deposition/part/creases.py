@@ -12,7 +12,8 @@ from paint_deposition.part.refinement import face_normals
 # Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
 CREASE_RAD = np.radians(30.0)
 # A convex fold at least this sharp ends the skin as a free edge does: a hem, the rim of a plate.
-RIM_FOLD_RAD = np.radians(75.0)
+# Rims that are cut along one direction meet a crowned skin at less than a right angle.
+RIM_FOLD_RAD = np.radians(60.0)
 
 
 @dataclass(frozen=True)

@@ -3,9 +3,14 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+from paint_deposition.part.creases import RIM_FOLD_RAD
+
 RADIUS_M = 0.03
 # Skin whose normal points further away than this is another side of the part.
 OTHER_SIDE_COSINE = -0.25
+# Skin that has turned so far away from the gun within the radius lies round a rim.
+RIM_COSINE = np.cos(RIM_FOLD_RAD)
+SAME_PLACE_M = 1e-6
 BLOCK = 4096
 
 
@@ -26,6 +31,8 @@ def curvature_per_m(
     The divergence is that of a linear function fitted to the normals of the skin within the
     radius, so a fold narrower than the radius appears smoothed, and the triangulation does not
     show. On cylinders and balls the tangential components of the normal are exactly linear.
+    Skin round a rim does not count: a sheet that is drawn with its thickness has the curvature of
+    one without.
 
     Args:
         points_m, normals: (N, 3) where it is wanted.
@@ -40,15 +47,23 @@ def curvature_per_m(
             tree, radius_m, output_type='ndarray'
         )
         i, j = near['i'], near['j']
-        same_side = np.einsum('ij,ij->i', normals[block][i], skin_normals[j]) > OTHER_SIDE_COSINE
-        i, j = i[same_side], j[same_side]
-        weight = skin_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
         offset = skin_m[j] - points_m[block][i]
+        same_side = _same_side(normals[block][i], skin_normals[j], offset)
+        i, j, offset = i[same_side], j[same_side], offset[same_side]
+        weight = skin_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
         axes = tangents(normals[block])
         place = np.einsum('kni,ni->kn', axes[:, i], offset)
         lean = np.einsum('kni,ni->kn', axes[:, i], skin_normals[j])
         result[block] = -_divergence(i, weight, place, lean, len(axes[0]))
     return result
+
+
+def _same_side(normals: np.ndarray, others: np.ndarray, offset_m: np.ndarray) -> np.ndarray:
+    """(K,) bool: whether skin is of the same side of the part; a hollow may turn further."""
+    cosine = np.einsum('ij,ij->i', normals, others)
+    # Copies of a vertex on both sides of a rim lie at one place, but for the last bits.
+    convex = np.einsum('ij,ij->i', others - normals, offset_m) > -SAME_PLACE_M
+    return cosine > np.where(convex, RIM_COSINE, OTHER_SIDE_COSINE)
 
 
 def tangents(normals: np.ndarray) -> np.ndarray:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from paint_deposition.part.orientation import CANCELLED, is_one_sided
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
@@ -37,36 +38,55 @@ def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Fac
         positions_m: (N, 3) TCP [m]; long recordings are thinned to MAX_POSES.
         z_axes: (N, 3) tool z, from the bell to the surface.
     """
-    some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
-    positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
-    face = surface.occluder.first_faces(positions_m, z_axes)
-    met = face >= 0
-    normals = face_normals(surface.vertices_m, surface.faces[face[met]])
-    front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
-    return Facing(front, int(met.sum()) - front, int(np.sum(~met)))
+    normals, axes, past = _met(surface, positions_m, z_axes)
+    front = int(np.sum(np.einsum('ij,ij->i', normals, axes) < 0.0))
+    return Facing(front, len(normals) - front, past)
 
 
 def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
-    """Turn a part round that is sprayed from behind, with a note: it would stay bare.
+    """Turn a part round that is sprayed from behind, and tell a closed one its outward side.
 
-    Which side of an open skin is outward depends on the program that exported it; the gun knows.
+    Which side of an open skin is outward depends on the program that exported it, and a closed
+    body has a skin on every side; the gun knows.
 
     Args:
         surface, positions_m, z_axes: as for ``facing``.
 
     Returns:
-        The surface, turned and with a note if most poses that look at it look at its back.
+        The surface itself if it faces the gun; turned and with a note, since it would stay bare,
+        if most poses that look at it look at its back; else with another outward side.
     """
-    seen = facing(surface, positions_m, z_axes)
-    if not seen.reversed:
+    normals, axes, _ = _met(surface, positions_m, z_axes)
+    away = np.einsum('ij,ij->i', normals, axes) >= 0.0
+    back, front = int(away.sum()), int(np.sum(~away))
+    if back > front:
+        note = (
+            f'{back} of {back + front} poses look at the back of the mesh: its '
+            'triangles were turned round'
+        )
+        surface = replace(
+            surface,
+            faces=np.ascontiguousarray(surface.faces[:, ::-1]),
+            normals=-surface.normals,
+            notes=(*surface.notes, note),
+        )
+    if not len(axes) or is_one_sided(surface.normals, surface.vertex_areas_m2):
         return surface
-    note = (
-        f'{seen.back} of {seen.back + seen.front} poses look at the back of the mesh: its '
-        'triangles were turned round'
-    )
-    return replace(
-        surface,
-        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
-        normals=-surface.normals,
-        notes=(*surface.notes, note),
-    )
+    gun_side = -axes.mean(axis=0)
+    if np.linalg.norm(gun_side) < CANCELLED:
+        return surface
+    known = replace(surface, gun_side=gun_side)
+    settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
+    return surface if settled else known
+
+
+def _met(
+    surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, int]:
+    """Normals of the skin that poses look at, (M, 3), their tool z, (M, 3), and how many miss."""
+    some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
+    positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
+    face = surface.occluder.first_faces(positions_m, z_axes)
+    met = face >= 0
+    normals = face_normals(surface.vertices_m, surface.faces[face[met]])
+    return normals, z_axes[met], int(np.sum(~met))

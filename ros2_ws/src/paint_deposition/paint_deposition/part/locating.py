@@ -7,6 +7,8 @@ from scipy.spatial import cKDTree
 
 # How much further away than the nearest skin the side that a normal points out of may be.
 THICKNESS_M = 0.06
+# Skin that leans further than this from the side that is painted is its back.
+BACK_COSINE = -0.5
 # Beyond this distance the place is only good to a triangle: nobody paints or measures there.
 FAR_M = 0.3
 FEW = 32
@@ -50,15 +52,26 @@ class SkinLocator:
         self._reach_m = float(np.linalg.norm(corners - self._centres[:, None], axis=2).max())
         self._tree = cKDTree(self._centres)
 
-    def locate(self, points_m: np.ndarray, normals: np.ndarray | None = None) -> Location:
-        """See ``Surface.locate``."""
+    def locate(
+        self,
+        points_m: np.ndarray,
+        normals: np.ndarray | None = None,
+        side: np.ndarray | None = None,
+    ) -> Location:
+        """See ``Surface.locate``.
+
+        Args:
+            points_m, normals: (N, 3).
+            side: (3,) outward unit normal of the only side that is painted, or None; where there
+                are no normals, its back is not taken.
+        """
         points_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
         face = np.empty(len(points_m), dtype=np.int64)
         place = np.empty((len(points_m), 3))
         for start in range(0, len(points_m), BLOCK):
             block = slice(start, start + BLOCK)
             wanted = None if normals is None else np.asarray(normals, dtype=np.float64)[block]
-            face[block], place[block] = self._closest(points_m[block], wanted)
+            face[block], place[block] = self._closest(points_m[block], wanted, side)
         weights = _barycentric(self._vertices_m[self._faces[face]], place)
         outward = np.einsum('nk,nki->ni', weights, self._normals[self._faces[face]])
         outward /= np.linalg.norm(outward, axis=1, keepdims=True)
@@ -66,14 +79,18 @@ class SkinLocator:
         return Location(place, outward, face, weights, distance, _angle(outward, normals))
 
     def _closest(
-        self, points_m: np.ndarray, normals: np.ndarray | None
+        self, points_m: np.ndarray, normals: np.ndarray | None, side: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
         from trimesh.triangles import closest_point
 
         nearest, few = self._tree.query(points_m, k=min(FEW, len(self._faces)))
         nearest, few = nearest.reshape(len(points_m), -1), few.reshape(len(points_m), -1)
         # No point of a triangle is further from its centre than the reach.
-        radius = nearest[:, 0] + self._reach_m + (0.0 if normals is None else THICKNESS_M)
+        radius = (
+            nearest[:, 0]
+            + self._reach_m
+            + (0.0 if normals is None and side is None else THICKNESS_M)
+        )
         far = nearest[:, 0] > FAR_M
         near = self._tree.query_ball_point(points_m, np.where(far, 0.0, radius))
         near = [few[n] if far[n] else faces for n, faces in enumerate(near)]
@@ -81,9 +98,12 @@ class SkinLocator:
         face = np.concatenate([np.asarray(faces, dtype=np.int64) for faces in near])
         place = closest_point(self._vertices_m[self._faces[face]], points_m[point])
         distance = np.linalg.norm(place - points_m[point], axis=1)
-        if normals is not None:
-            facing = self._normals[self._faces[face]].sum(axis=1)
-            averse = np.einsum('ij,ij->i', facing, normals[point]) < 0.0
+        if normals is not None or side is not None:
+            facing = self._normals[self._faces[face]].mean(axis=1)
+            if normals is not None:
+                averse = np.einsum('ij,ij->i', facing, normals[point]) < 0.0
+            else:
+                averse = facing @ side < BACK_COSINE
             distance = distance + THICKNESS_M * averse
         order = np.lexsort((distance, point))
         first = order[np.unique(point[order], return_index=True)[1]]

@@ -6,6 +6,8 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from paint_deposition.part.orientation import outward_side
+
 DOWN = (0.0, 0.0, -1.0)
 
 # A covariate, or how to get it once an effect asks for it.
@@ -136,15 +138,6 @@ class SurfacePoints:
         height = -self.positions_m @ self.down
         extent = np.ptp(height) if len(height) else 0.0
         return (height - height.min()) / extent if extent > 0 else np.zeros(len(height))
-
-
-def outward_side(normals: np.ndarray, areas_m2: np.ndarray | None, down: np.ndarray) -> np.ndarray:
-    """(3,) unit mean of the (V, 3) normals; where they cancel, as on a closed body, -y or z."""
-    mean = np.average(normals, axis=0, weights=areas_m2) if len(normals) else np.zeros(3)
-    length = np.linalg.norm(mean)
-    if length > 0.1:
-        return mean / length
-    return np.array([0.0, -1.0, 0.0]) if abs(down[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
 
 
 def box_centre_m(positions_m: np.ndarray) -> np.ndarray:

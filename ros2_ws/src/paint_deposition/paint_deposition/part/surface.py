@@ -9,12 +9,13 @@ import numpy as np
 from paint_deposition.part import creases, curvature, edge_distance, slope
 from paint_deposition.part.locating import Location, SkinLocator
 from paint_deposition.part.normals import skin_normals
-from paint_deposition.part.points import SurfacePoints, box_centre_m, outward_side
+from paint_deposition.part.orientation import gravity, outward_side
+from paint_deposition.part.points import SurfacePoints, box_centre_m
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.visibility import Occluder
 
-# A part whose mean normal leans less than this from the horizontal plane stands.
-STANDING_COSINE = 0.7
+# A gun whose mean direction is shorter has turned to more sides of the part than one.
+ONE_WAY = 0.9
 
 
 @dataclass(frozen=True)
@@ -30,6 +31,8 @@ class Surface:
         down: (3,) unit vector of gravity in the mesh frame.
         rim_m: (B, 2, 3) segments of the free edges [m].
         notes: what had to be put right in the file, for the user to read.
+        gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
+            of a part whose skin has several, a closed body.
     """
 
     vertices_m: np.ndarray
@@ -39,6 +42,7 @@ class Surface:
     down: np.ndarray
     rim_m: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 3)))
     notes: tuple[str, ...] = ()
+    gun_side: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept of rays and searches stays behind: it can be made again."""
@@ -94,8 +98,8 @@ class Surface:
 
     @cached_property
     def outward(self) -> np.ndarray:
-        """(3,) mean outward unit normal."""
-        return outward_side(self.normals, self.vertex_areas_m2, self.down)
+        """(3,) mean outward unit normal of the side that is painted."""
+        return outward_side(self.normals, self.vertex_areas_m2, self.down, self.gun_side)
 
     @cached_property
     def centre_m(self) -> np.ndarray:
@@ -125,9 +129,9 @@ class Surface:
         Args:
             points_m: (N, 3) [m].
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
-                agrees is taken.
+                agrees is taken. Without them it is the one that the gun paints, if only one is.
         """
-        return self._locator.locate(points_m, normals)
+        return self._locator.locate(points_m, normals, self._only_side)
 
     def at(
         self,
@@ -176,6 +180,12 @@ class Surface:
     def _locator(self) -> SkinLocator:
         return SkinLocator(self.vertices_m, self.faces, self.normals)
 
+    @property
+    def _only_side(self) -> np.ndarray | None:
+        if self.gun_side is None or np.linalg.norm(self.gun_side) < ONE_WAY:
+            return None
+        return self.outward
+
     @cached_property
     def longest_edge_m(self) -> float:
         """Longest edge after refinement [m]."""
@@ -199,11 +209,3 @@ class Surface:
         heights = -self.vertices_m @ self.down
         lowest, extent = heights.min(), np.ptp(heights)
         return (-positions_m @ self.down - lowest) / extent if extent else 0.0 * positions_m[:, 0]
-
-
-def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
-    """Guess which way is down: -z for a part that stands, -y for one drawn lying in x-y."""
-    mean = areas_m2 @ normals
-    length = np.linalg.norm(mean)
-    lies = length > 0.0 and abs(mean[2]) >= STANDING_COSINE * length
-    return np.array([0.0, -1.0, 0.0]) if lies else np.array([0.0, 0.0, -1.0])

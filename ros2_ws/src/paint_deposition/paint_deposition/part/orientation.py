@@ -1,0 +1,85 @@
+"""Which way a part faces and which way it hangs, for open sheets and closed bodies."""
+
+import numpy as np
+
+# Mean normals shorter than this share cancel, as on a closed body: they name no side.
+CANCELLED = 0.1
+# Parts whose mean normal is longer have their skin on one side, give or take a flange.
+ONE_SIDED = 0.5
+# Skin of the side that the gun paints leans less than this from the side's mean.
+SIDE_COSINE = 0.5
+MOST_ROUNDS = 32
+# A part whose mean normal leans less than this from the horizontal plane stands.
+STANDING_COSINE = 0.7
+# Share of a closed body's skin along one direction that makes it a plate.
+PLATE_SHARE = 0.7
+
+
+def outward_side(
+    normals: np.ndarray,
+    areas_m2: np.ndarray | None,
+    down: np.ndarray,
+    gun_side: np.ndarray | None = None,
+) -> np.ndarray:
+    """(3,) unit mean of the (V, 3) normals on the side of the part that is painted.
+
+    On a closed body it is the mean over the skin that faces the gun, found from roughly where
+    the gun is: which motion told it makes no difference, to the last bit, on a part that has
+    sides. Where the normals cancel and no gun is known, it is -y, or z.
+
+    Args:
+        normals: (V, 3) outward unit normals.
+        areas_m2: (V,) weights, or None.
+        down: (3,) gravity.
+        gun_side: (3,) roughly toward the gun, any length, or None.
+    """
+    mean = mean_normal(normals, areas_m2)
+    length = np.linalg.norm(mean)
+    if gun_side is not None and len(normals) and length < ONE_SIDED:
+        return _facing_side(normals, areas_m2, gun_side)
+    if length > CANCELLED:
+        return mean / length
+    return np.array([0.0, -1.0, 0.0]) if abs(down[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
+
+
+def is_one_sided(normals: np.ndarray, areas_m2: np.ndarray | None) -> bool:
+    """Whether the skin has one outward side by itself, as an open sheet has."""
+    return bool(np.linalg.norm(mean_normal(normals, areas_m2)) >= ONE_SIDED)
+
+
+def mean_normal(normals: np.ndarray, areas_m2: np.ndarray | None) -> np.ndarray:
+    """(3,) mean of the (V, 3) normals, of length 1 on a plane and 0 on a closed body."""
+    return np.average(normals, axis=0, weights=areas_m2) if len(normals) else np.zeros(3)
+
+
+def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
+    """Guess which way is down: -z for a part that stands, -y for one drawn lying in x-y.
+
+    A closed body lies if most of its skin does: that of a plate, not that of a block.
+    """
+    mean = mean_normal(normals, areas_m2)
+    length = np.linalg.norm(mean)
+    if length > CANCELLED:
+        lies = abs(mean[2]) >= STANDING_COSINE * length
+    else:
+        spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
+        shares, directions = np.linalg.eigh(spread)
+        lies = shares[-1] > PLATE_SHARE and abs(directions[2, -1]) >= STANDING_COSINE
+    return np.array([0.0, -1.0, 0.0]) if lies else np.array([0.0, 0.0, -1.0])
+
+
+def _facing_side(
+    normals: np.ndarray, areas_m2: np.ndarray | None, gun_side: np.ndarray
+) -> np.ndarray:
+    """Mean normal of the skin about it, from the nearest of 26 directions until it settles."""
+    direction = np.rint(1.2 * gun_side / np.abs(gun_side).max())
+    direction /= np.linalg.norm(direction)
+    chosen = None
+    for _ in range(MOST_ROUNDS):
+        about = normals @ direction > SIDE_COSINE
+        if not about.any() or (chosen is not None and np.array_equal(about, chosen)):
+            break
+        chosen = about
+        direction = mean_normal(normals[about], None if areas_m2 is None else areas_m2[about])
+        direction /= np.linalg.norm(direction)
+    return direction

@@ -1,0 +1,142 @@
+"""A sheet drawn as a solid, with thickness, inner skin and rim, is the same part to the gun."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.effects.base import PathContext
+from paint_deposition.model.projection import Projection
+from paint_deposition.part.facing import toward_the_gun
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from skins import solid, triangulated
+
+STANDOFF_M = 0.25
+SIDES = {'-y': 0.0, '+x': 90.0, '+y': 180.0, '-x': 270.0, 'askew': 205.0}
+WIDTH_M, HEIGHT_M = 0.6, 0.5
+
+
+def door_depth(x, z):
+    """A crowned door with a convex line of 24 degrees, in 8 facets, 0.1 m above the middle."""
+    lean = np.radians(12.0)
+    soft = 0.02
+    line = np.tan(lean) * soft * np.logaddexp((z - 0.1) / soft, (0.1 - z) / soft)
+    return 0.15 * x**2 + 0.1 * z**2 + line
+
+
+@cache
+def parts(side: str, thickness_m: float, drawn_along: str = 'normals') -> tuple[Surface, Surface]:
+    """The outer skin alone and the solid, both seen by the gun; see ``solid``."""
+    open_sheet = triangulated(door_depth, 0.015, 0.5 * WIDTH_M, 0.5 * HEIGHT_M, jitter=0.2)
+    turn = Rotation.from_euler('z', SIDES[side], degrees=True)
+    looking = turn.apply([0.0, 1.0, 0.0])
+    x, z = (w.ravel() for w in np.meshgrid([-0.4, -0.2, 0.0, 0.2], [-0.2, 0.0, 0.2]))
+    eyes = turn.apply(np.stack([x, np.full_like(x, -STANDOFF_M), z], axis=1))
+    seen = []
+    for vertices, faces in (open_sheet, solid(*open_sheet, thickness_m, drawn_along)):
+        surface = Surface.from_triangles(turn.apply(vertices), faces, 0.03)
+        seen.append(toward_the_gun(surface, eyes, np.tile(looking, (len(eyes), 1))))
+    return seen[0], seen[1]
+
+
+def on_both(sheet: Surface, shell: Surface) -> tuple[SurfacePoints, SurfacePoints]:
+    """The middles of the sheet's triangles, up to the rim, on the sheet and on the solid."""
+    alone = sheet.at(sheet.vertices_m[sheet.faces].mean(axis=1))
+    return alone, shell.at(alone.positions_m, alone.normals)
+
+
+def assert_same_edge(there: SurfacePoints, alone: SurfacePoints) -> None:
+    """Far from the edge that of the inner skin can be a little nearer than one's own."""
+    near = alone.edge_distance_m < 0.05
+    np.testing.assert_allclose(there.edge_distance_m[near], alone.edge_distance_m[near], atol=1e-9)
+    assert (there.edge_distance_m[~near] > 0.05).all()
+
+
+def context(surface: Surface) -> PathContext:
+    return PathContext(Projection(), surface.down, surface.outward, surface.centre_m)
+
+
+@pytest.mark.parametrize('thickness_m', [0.003, 0.012, 0.04])
+@pytest.mark.parametrize('side', SIDES)
+def test_the_outer_skin_of_the_solid_is_the_sheet(side, thickness_m):
+    sheet, shell = parts(side, thickness_m)
+    alone, there = on_both(sheet, shell)
+    np.testing.assert_allclose(there.positions_m, alone.positions_m, atol=1e-9)
+    np.testing.assert_allclose(there.normals, alone.normals, atol=1e-9)
+    assert np.ptp(alone.curvature_per_m) > 5.0
+    np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)
+    assert_same_edge(there, alone)
+
+
+@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
+@pytest.mark.parametrize('side', SIDES)
+def test_outward_is_where_the_gun_is(side, thickness_m):
+    sheet, shell = parts(side, thickness_m)
+    np.testing.assert_allclose(shell.outward, sheet.outward, atol=1e-9)
+    np.testing.assert_allclose(context(shell).across, context(sheet).across, atol=1e-9)
+    np.testing.assert_allclose(context(shell).downhill, context(sheet).downhill, atol=1e-9)
+    np.testing.assert_array_equal(shell.points().outward, shell.outward)
+
+
+@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
+@pytest.mark.parametrize('side', SIDES)
+def test_a_solid_stands_as_its_sheet_does(side, thickness_m):
+    sheet, shell = parts(side, thickness_m)
+    np.testing.assert_array_equal(sheet.down, [0, 0, -1])
+    np.testing.assert_array_equal(shell.down, [0, 0, -1])
+
+
+@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
+def test_a_solid_drawn_lying_lies(thickness_m):
+    vertices, faces = triangulated(door_depth, 0.03)
+    vertices, faces = solid(vertices, faces, thickness_m)
+    lying = Surface.from_triangles(vertices[:, [0, 2, 1]], faces[:, ::-1], 0.03)
+    np.testing.assert_array_equal(lying.down, [0, -1, 0])
+
+
+@pytest.mark.parametrize('tilt_deg', [-40.0, 0.0, 15.0, 40.0])
+@pytest.mark.parametrize('poses', [1, 7, 400])
+def test_any_motion_in_front_tells_the_same_side_to_the_last_bit(tilt_deg, poses):
+    _, shell = parts('+x', 0.012)
+    rng = np.random.default_rng(poses)
+    eyes = np.stack([np.full(poses, 0.2), *rng.uniform(-0.05, 0.05, (2, poses))], axis=1)
+    tilts = np.stack([np.zeros(poses), *rng.normal(0.0, 3.0, (2, poses))], axis=1)
+    tilts[:, 2] += tilt_deg
+    axes = Rotation.from_euler('xyz', tilts, degrees=True).apply([-1.0, 0.0, 0.0])
+    unseen = Surface(**{name: getattr(shell, name) for name in (
+        'vertices_m', 'faces', 'normals', 'vertex_areas_m2', 'down', 'rim_m')})  # fmt: skip
+    told = toward_the_gun(unseen, eyes, axes)
+    np.testing.assert_array_equal(told.outward, shell.outward)
+    assert toward_the_gun(shell, eyes, axes) is shell
+
+
+def test_a_rim_cut_straight_through_a_leaning_skin_is_an_edge():
+    sheet, shell = parts('-y', 0.012, drawn_along='y')
+    alone, there = on_both(sheet, shell)
+    np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)
+    assert_same_edge(there, alone)
+
+
+def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():
+    sheet, shell = parts('+x', 0.003)
+    rng = np.random.default_rng(2)
+    inner = np.flatnonzero(sheet.points().edge_distance_m > 0.01)
+    some = sheet.at(sheet.vertices_m[rng.choice(inner, 100)])
+    inside = sheet.outward * -rng.uniform(0.0016, 0.004, (100, 1))
+    place = shell.at(some.positions_m + inside)
+    assert (place.normals @ shell.outward > 0.8).all()
+    assert np.linalg.norm(place.positions_m - some.positions_m, axis=1).max() < 0.002
+
+
+@pytest.mark.parametrize('lean_deg', [10.0, 20.0])
+def test_a_fold_of_the_solid_is_still_curvature(lean_deg, fold):
+    vertices, faces = triangulated(fold(np.radians(lean_deg)), 0.02)
+    shell = Surface.from_triangles(*solid(vertices, faces, 0.012), 0.01)
+    z = np.linspace(-0.08, 0.08, 401)
+    ridge = np.stack([0 * z, np.abs(z) * np.tan(np.radians(lean_deg)), z], axis=1)
+    across = shell.at(ridge, np.tile([0.0, -1.0, 0.0], (401, 1)))
+    turn = np.trapezoid(across.curvature_per_m, z / np.cos(np.radians(lean_deg)))
+    assert turn == pytest.approx(-2.0 * np.radians(lean_deg), rel=0.15)
+    np.testing.assert_allclose(across.edge_distance_m, 0.2 - np.abs(z), atol=0.013)
