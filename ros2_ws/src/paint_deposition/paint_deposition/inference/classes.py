@@ -33,7 +33,7 @@ class Candidate:
     Attributes:
         members: ids, most probable first.
         probability: that one of them is missing.
-        fit: of the model with the best member.
+        fit: of the model with the best member, each part at a level of its own.
     """
 
     members: tuple[str, ...]
@@ -94,7 +94,7 @@ def rank(study: Study, judged: Judgement) -> Ranking:
         if probability >= WORTH_LISTING:
             first = alone[members[0]]
             near = fits.get(first) or _fit_with(study, judged, hypotheses[first])
-            classes.append(Candidate(members, min(probability, 1.0), _on_one_level(study, near)))
+            classes.append(Candidate(members, min(probability, 1.0), near))
     return Ranking(
         tuple(sorted(classes, key=lambda c: -c.probability)),
         float(weights[answers].sum()),
@@ -128,17 +128,6 @@ def _alone(hypotheses: list[Hypothesis], factors: np.ndarray) -> dict[str, int]:
         if _is_single(hypotheses[k]):
             found.setdefault(hypotheses[k].effects[0], int(k))
     return found
-
-
-def _on_one_level(study: Study, fit: Fit) -> Fit:
-    """The fit without a level of its own for each part, which no model can have."""
-    if study.levels is None:
-        return fit
-    return study.fit(Unknowns.of(fit.model, *fit.model.effects))
-
-
-def _is_single(hypothesis: Hypothesis) -> bool:
-    return len(hypothesis.effects) == 1 and not hypothesis.other
 
 
 def _mark(judged: Judgement, hypothesis: Hypothesis, effect_id: str) -> Signature:

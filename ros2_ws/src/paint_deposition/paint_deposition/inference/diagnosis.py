@@ -68,9 +68,9 @@ def diagnose(
     neutral = {key: neutral_shapes(effect) for key, effect in library.items()}
     study = Study.of(campaign, tuple(shapes[0] for shapes in neutral.values()))
     progress('fitting the pattern')
-    fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed)
-    history = [Step.of(study, '', fit)]
-    trouble = trouble_with(study, fit)
+    fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed, study.levels)
+    history = [Step.of(study, '', study.plain(fit))]
+    trouble = trouble_with(study, history[0].fit)
     if trouble:
         return Diagnosis(study, 'fit_broken', trouble, np.nan, (), (), tuple(history))
 
@@ -88,7 +88,7 @@ def diagnose(
         best = _to_add(study, fit, ranking) if len(accepted) < MOST_EFFECTS else None
         if best is None:
             break
-        history.append(Step.of(study, best.best, best.fit))
+        history.append(Step.of(study, best.best, study.plain(best.fit)))
         accepted.append(_told(study, best, history))
         nuisance += [s for s in judged.signatures if s.id in best.members[1:]]
         for member in best.members:
@@ -141,7 +141,8 @@ def _predicts_better(study: Study, before: Fit, after: Fit) -> bool:
     """Whether readings left out in patches and in passes are predicted better on average."""
     blockings = [study.patches(), study.bands(before.model)]
     gains = [
-        hold_out(after, blocks).log_score - hold_out(before, blocks).log_score
+        hold_out(study.plain(after), blocks).log_score
+        - hold_out(study.plain(before), blocks).log_score
         for blocks in blockings
         if len(np.unique(blocks)) > 2
     ]
@@ -183,7 +184,7 @@ def _conclude(
             c.members, c.probability, c.best, intervals(c.fit, c.best),
             {
                 'before': history[-1].holdout_rmse_um,
-                'after': Step.of(study, c.best, c.fit).holdout_rmse_um,
+                'after': Step.of(study, c.best, study.plain(c.fit)).holdout_rmse_um,
             },
         )
         for c in (ranking.classes if ranking else ())
@@ -199,7 +200,7 @@ def _conclude(
         verdict, reason = 'effect_missing', f'The readings show {names}.'
     elif ranking.unknown + ranking.footprint > ranking.named or not others:
         footprint = ranking.footprint > ranking.unknown
-        unknown = locate_unexplained(study, fit, footprint, seed)
+        unknown = locate_unexplained(study, study.plain(fit), footprint, seed)
         verdict, reason = (
             'unknown_effect',
             (

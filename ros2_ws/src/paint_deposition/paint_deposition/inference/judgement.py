@@ -49,13 +49,12 @@ def judge(
 
     Args:
         study: the readings.
-        fit: of the model so far.
+        fit: of the model so far, with each part at a level of its own.
         neutral: the candidate effects, each in a few shapes.
         nuisance: signatures that the test must not see: rivals of what was accepted.
         seed: of the simulated deviations.
     """
-    levelled = study.with_levels(fit)
-    fit = study.plain(levelled)
+    levelled, fit = fit, study.plain(fit)
     columns = [s.columns for s in nuisance]
     if study.levels is not None:
         columns.append(study.levels)

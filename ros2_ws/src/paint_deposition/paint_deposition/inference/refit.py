@@ -53,9 +53,9 @@ def refit(
         neutral[added.id] = neutral_shapes(added)
     study = Study.of(campaign, (*start.effects, *(shapes[0] for shapes in neutral.values())))
     progress('fitting the model as it is')
-    fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed)
-    history = [Step.of(study, '', fit)]
-    trouble = trouble_with(study, fit)
+    fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed, study.levels)
+    history = [Step.of(study, '', study.plain(fit))]
+    trouble = trouble_with(study, history[0].fit)
     if trouble:
         return Diagnosis(study, 'fit_broken', trouble, np.nan, (), (), tuple(history))
     judged = judge(study, fit, neutral, [], seed)
@@ -63,11 +63,13 @@ def refit(
         return _as_it_is(study, history[0], judged, seed)
     progress(f'fitting with {added.id}')
     fits = [
-        study.fit(Unknowns.of(fit.model.with_effect(shape), *start.effects, shape))
+        study.fit(
+            Unknowns.of(fit.model.with_effect(shape), *start.effects, shape), extra=study.levels
+        )
         for shape in neutral[added.id]
     ]
     best = min(fits, key=lambda f: f.chi_square + f.penalty)
-    history.append(Step.of(study, added.id, best))
+    history.append(Step.of(study, added.id, study.plain(best)))
     probability = _probability(judged, added.id)
     effect = EffectClass(
         (added.id,),

@@ -53,12 +53,15 @@ class Study:
     def of(campaign: Campaign, effects: tuple[Effect, ...] = ()) -> 'Study':
         """Prepare a campaign; ``effects`` are those whose amplitudes may be varied.
 
+        Readings that contradict others at their point are left out, see ``notes``.
+
         Raises:
             ReadingsError: readings in another unit, with the remedy.
         """
         for experiment in campaign.experiments:
             check_unit(experiment.readings)
         noise = gauge_noise([e.readings for e in campaign.experiments])
+        campaign, noise = campaign.without(noise.gross), noise.without_gross()
         measured = np.concatenate([e.means.mean_um for e in campaign.experiments])
         variances, start = [], 0
         for experiment in campaign.experiments:
@@ -85,14 +88,8 @@ class Study:
             self.forward, self.measured_um, self.sigma_um, unknowns, starts, seed, extra
         )
 
-    def with_levels(self, fit: Fit) -> Fit:
-        """The fit once more, each of several parts at a level of its own."""
-        if self.levels is None:
-            return fit
-        return self.fit(Unknowns.of(fit.model, *fit.model.effects), extra=self.levels)
-
     def plain(self, fit: Fit) -> Fit:
-        """The same model, residuals and derivatives over nothing but the points' own noise."""
+        """A fit that allowed for levels, seen over nothing but the points' own noise."""
         if self.levels is None:
             return fit
         return replace(
@@ -102,6 +99,17 @@ class Study:
                 self.forward, fit.unknowns, fit.vector, self.sigma_um, fit.predicted_um
             ),
             extra_log_det=0.0,
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the readings for the user."""
+        if self.noise.source != 'assumed':
+            return self.campaign.notes
+        return (
+            'The noise of the gauge was assumed (0.7 um and 1 %); take 6 or more repeats for '
+            'p-values that can be trusted.',
+            *self.campaign.notes,
         )
 
     @property
