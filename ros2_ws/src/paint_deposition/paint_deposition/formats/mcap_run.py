@@ -20,7 +20,6 @@ from rosbags.rosbag2.metadata import dump_qos_v9
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.formats.definitions import Definition
-from paint_deposition.formats.recorded_qos import offered_qos as offered_qos
 
 METADATA_VERSION = 9
 COMPRESSIONS = {
