@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import NoReturn
 
 import numpy as np
 import rclpy
@@ -27,13 +28,15 @@ PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE
 SAMPLES = Path(get_package_share_directory(PACKAGE)) / 'samples'
 DOOR, TRAJECTORY = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
 MEASURED = SAMPLES / 'measured_door'
+# In the folder of a demo: what it holds may be replaced by the next.
+MARKER = '.paint_demo'
 
 
 def main() -> None:
     """Run the demo; the results go to the folder given, those of an older demo are replaced."""
-    folder = Path(sys.argv[1]).resolve()
-    shutil.rmtree(folder, ignore_errors=True)
-    folder.mkdir(parents=True, exist_ok=True)
+    if len(sys.argv) != 2:
+        refuse('give one folder for the results')
+    folder = fresh_folder(Path(sys.argv[1]).resolve())
     with domain_id() as domain:
         # The nodes talk among themselves, whatever else runs on this machine.
         os.environ['ROS_DOMAIN_ID'] = str(domain)
@@ -53,6 +56,24 @@ def main() -> None:
         ('the model with what was missing', folder / 'diagnosis' / 'model.yaml'),
     ):
         print(f'  {what}:\n    {path}')
+
+
+def fresh_folder(folder: Path) -> Path:
+    """The folder, emptied if it is an older demo's; any other must be empty or not there."""
+    if folder.exists() and not (folder / MARKER).is_file():
+        if not folder.is_dir() or any(folder.iterdir()):
+            refuse(f'{folder} is there and no older demo; move it away or give another folder')
+    elif folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / MARKER).write_text('Made by demo/demo.py, which may replace this folder.\n')
+    return folder
+
+
+def refuse(why: str) -> NoReturn:
+    """End with one line."""
+    print(f'demo: {why}', file=sys.stderr)
+    sys.exit(2)
 
 
 def paint_live(folder: Path) -> tuple[Path, Path]:
