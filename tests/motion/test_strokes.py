@@ -43,7 +43,7 @@ def test_strokes_are_the_straight_legs():
     length = [
         np.sum((path.dwell_s * path.speed_m_per_s)[path.stroke == stroke]) for stroke in range(5)
     ]
-    # A turn shows after the first centimetre of the new leg.
+    # A turn shows after the first centimetres of the new leg.
     assert length == pytest.approx([1.2, 0.3, 1.2, 0.3, 1.2], abs=0.02)
 
 
@@ -94,12 +94,18 @@ def test_open_flow_is_that_of_the_last_opening():
     assert np.array_equal(path.open_flow, expected)
 
 
-def test_distances_to_turns_add_up_to_the_stroke():
+def test_distances_to_turns_add_up_to_the_leg():
     path, _ = spray_path(route(SERPENTINE))
-    for stroke in range(5):
-        rows = path.stroke == stroke
-        length = np.sum((path.dwell_s * path.speed_m_per_s)[rows])
-        assert np.allclose((path.from_turn_m + path.to_turn_m)[rows], length, atol=1e-9)
+    travelled_m = np.cumsum(path.dwell_s * path.speed_m_per_s)
+    for stroke, (begin_m, end_m) in enumerate([(0, 1.2), (1.2, 1.5), (1.5, 2.7), (2.7, 3.0)]):
+        # The new stroke shows some centimetres behind the turn; up to there it is the old one.
+        rows = (path.stroke == stroke) & (travelled_m < end_m)
+        assert np.all(
+            path.stroke[(travelled_m > begin_m + 0.04) & (travelled_m < end_m)] == stroke
+        )
+        to_m, from_m = path.to_turn_m[rows], path.from_turn_m[rows]
+        assert np.allclose(to_m + from_m, end_m - begin_m, atol=0.001)
+        assert np.ptp(to_m + from_m) < 1e-9
     # 0.3 m into the first pass.
     row = np.argmin(np.abs(path.position_m[path.stroke == 0, 0] - 0.3))
     assert path.from_turn_m[row] == pytest.approx(0.3, abs=0.005)

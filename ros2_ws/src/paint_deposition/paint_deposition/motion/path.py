@@ -17,7 +17,8 @@ class SprayPath:
         rotation: (M, 3, 3) tool axes x, y, z as columns.
         velocity_m_per_s: (M, 3) of the TCP [m/s].
         pattern_shift_m: (M, 2) displacement of the pattern on the model plane, tool x, y [m].
-        stroke: (M,) int, number of the straight stroke; a new one starts where the path turns.
+        stroke: (M,) int, number of the straight stroke; a new one starts where a turn of the path
+            shows, up to 40 mm behind it.
         spray_pass: (M,) int, number of the spraying pass, -1 before the first.
         open_flow: (M,) flow of the opening that runs or ran last; 1 before the first.
         since_on_s, since_off_s: (M,) time since the trigger last opened and closed, inf if never

@@ -57,11 +57,6 @@ class PathBuilder:
         """Stamp of the newest pose that was kept."""
         return self._screen.newest_ns
 
-    @property
-    def integrated_ns(self) -> int | None:
-        """Stamp up to which the stream was cut into sub-steps."""
-        return self._integrated_ns
-
     def add_trigger(self, stamp_ns: int, flow: float) -> None:
         """Change the flow (relative; 0 is gun off) at a time.
 
@@ -155,7 +150,7 @@ class PathBuilder:
         if self._state is None:
             self._state = strokes.new_state(0.0 if self._flow else 1.0)
         stroke, spray_pass, open_flow, since_on, since_off, from_turn = strokes.follow(
-            self._state, position, velocity, dwell, flow, after_gap
+            self._state, position, rotation[:, :, 2], velocity, dwell, flow, after_gap
         )
         unknown = np.full(len(stamp), np.inf)
         path = SprayPath(
@@ -189,7 +184,12 @@ class PathBuilder:
         ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
         # The last stroke's end shows with the first row of the next, which the look ahead needs.
         until_on, until_off, to_turn = strokes.look_ahead(
-            stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s
+            stroke,
+            path.velocity_m_per_s,
+            path.dwell_s,
+            path.flow,
+            path.since_on_s,
+            path.from_turn_m,
         )
         complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
         self._held = [path.select(slice(ready, None))]
