@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
 
 pytest.importorskip('rclpy')
 
@@ -18,12 +21,25 @@ from nodes.cell import (
     write_panel,
 )
 from nodes.processes import NodeProcess
+from paint_deposition.effects.air_drift import AirDrift
 from paint_deposition.errors import PaintError
+from paint_deposition.film.deposition import FilmIntegrator
 from paint_deposition.formats.bags import write_pose_bag
+from paint_deposition.formats.meshes import read_mesh
+from paint_deposition.formats.model_file import write_model
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.part.facing import toward_the_gun
 
 MOTION = two_passes()
+
+
+def centroid_m(node, film_um):
+    """(3,) where the paint is [m]."""
+    volume = film_um * node.surface.vertex_areas_m2
+    return volume @ node.surface.vertices_m / volume.sum()
 
 
 def test_the_film_is_that_of_the_offline_run(simulator, robot, painted):
@@ -82,6 +98,33 @@ def test_a_skin_turned_inside_out_is_painted_all_the_same(simulator, robot, pain
     assert wrong.film.up_to_date().film_um.sum() == pytest.approx(film.sum(), rel=1e-5)
     assert any('turned round' in note for note in wrong.surface.notes)
     assert np.array_equal(wrong.surface.normals, np.tile([0, -1, 0], (len(film), 1)))
+
+
+def test_the_gun_tells_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
+    """A plate of 12 mm that is painted on +x: booth air to the gun's right blows to +y."""
+    aside_m = 0.06
+    model = DepositionModel().with_effect(AirDrift(shift_across_m=aside_m))
+    write_model(tmp_path / 'air.yaml', model)
+    plate = tmp_path / 'plate.stl'
+    trimesh.creation.box((0.012, 0.8, 0.8)).export(plate)
+    quarter = Rotation.from_euler('z', 90.0, degrees=True)
+    motion = replace(
+        MOTION,
+        positions_m=quarter.apply(MOTION.positions_m),
+        quaternions_xyzw=(quarter * Rotation.from_quat(MOTION.quaternions_xyzw)).as_quat(),
+    )
+    still = simulator(mesh_file=str(plate))
+    node = simulator(mesh_file=str(plate), model_file=str(tmp_path / 'air.yaml'))
+    robot(still, node).send(motion)
+    moved = centroid_m(node, painted(node)) - centroid_m(still, painted(still))
+    assert moved[1] > 0.2 * aside_m
+    path, _ = spray_path(motion)
+    offline = toward_the_gun(read_mesh(plate, 1.0, 0.05), path.position_m, path.rotation[:, :, 2])
+    np.testing.assert_array_equal(node.surface.outward, [1.0, 0.0, 0.0])
+    np.testing.assert_array_equal(offline.outward, node.surface.outward)
+    integrator = FilmIntegrator(offline.points(), model, 'single', offline.occluder)
+    integrator.add(spray_path(motion, max_step_m=model.max_step_m)[0])
+    assert np.array_equal(painted(node), integrator.film_um)
 
 
 def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wait_until,
