@@ -130,6 +130,10 @@ def _alone(hypotheses: list[Hypothesis], factors: np.ndarray) -> dict[str, int]:
     return found
 
 
+def _is_single(hypothesis: Hypothesis) -> bool:
+    return len(hypothesis.effects) == 1 and not hypothesis.other
+
+
 def _mark(judged: Judgement, hypothesis: Hypothesis, effect_id: str) -> Signature:
     """The signature that stands for an effect of the hypothesis, in its shape."""
     return next(
