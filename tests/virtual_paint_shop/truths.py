@@ -111,7 +111,7 @@ def changes_flight(truth: Truth) -> bool:
 
 
 def library() -> dict[str, type[Truth]]:
-    """All truths by name: contract ids, 'unknown:...' and 'footprint:...'."""
+    """All truths by name: ids of the effects, 'unknown:...' and 'footprint:...'."""
     from . import footprints, truths_film, truths_gun, truths_landing, unknowns
 
     modules = (truths_gun, truths_landing, truths_film, unknowns, footprints)

@@ -4,13 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from paint_deposition.errors import PlanError
-from paint_deposition.formats.atomic import write_text
 from paint_deposition.formats.rapid_data import QUATERNION_TOLERANCE
 from paint_deposition.motion.planned_move import PlannedMove
 
@@ -76,19 +73,6 @@ def module_text(
             lines.append(f'    MoveL {target},{speed},{zone},{frames};')
         spraying = move.spraying
     return '\n'.join([*lines, f'    SetDO {gun_signal},0;', '  ENDPROC', 'ENDMODULE', ''])
-
-
-def write_module(path: Path | str, moves: Sequence[PlannedMove], **options: Any) -> Path:
-    """Write `module_text` (its options) to a new file."""
-    path = Path(path)
-    text = module_text(moves, **options)
-    if path.exists():
-        raise PlanError(f'{path} already exists; choose another name')
-    try:
-        write_text(path, text)
-    except OSError as error:
-        raise PlanError(f'cannot write {path}: {error.strerror}') from None
-    return path
 
 
 def _refuse_bad_names(*names: str) -> None:

@@ -11,7 +11,6 @@ from paint_deposition.inference.verdict import Unknown
 DEGREE = 4
 DRAWS = 1000
 CURVE_POINTS = 15
-TOOL_COVARIATES = ('tool_x_m', 'tool_y_m')
 
 
 def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Unknown:
