@@ -2,6 +2,7 @@
 
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ from paint_deposition.formats.bag_files import open_bag
 from paint_deposition.formats.bags import stamp_ns, write_pose_bag
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.bag_player import BagPlayer
+from paint_deposition.nodes.messages import to_ns
 
 
 @pytest.fixture
@@ -265,22 +267,87 @@ def test_real_time_takes_the_recorded_time(play, listen, wait_until, tmp_path):
     wait_until(player.finished.done, what='the end of the replay')
 
 
-def test_the_clock_is_the_bags(ros_context, play, listen, spin, wait_until, tmp_path):
+@pytest.fixture
+def clock_ticks(ros_context, spin):
+    """`clock_ticks()`: a list that fills with (bag time [ns], time of arrival [s]) of /clock."""
+
+    def clock_ticks(name='clock_watch') -> list[tuple[int, float]]:
+        node = Node(name, context=ros_context)
+        ticks = []
+        node.create_subscription(
+            Clock,
+            '/clock',
+            lambda message: ticks.append((to_ns(message.clock), time.monotonic())),
+            qos.CLOCK,
+        )
+        spin(node)
+        return ticks
+
+    return clock_ticks
+
+
+def test_the_clock_runs_on_through_a_gap(play, listen, clock_ticks, wait_until, tmp_path):
     written = straight_pass(60, triggers=False)
-    bag = write_pose_bag(tmp_path / 'pass', written)
-    clock = Node('clock_watch', context=ros_context)
-    times = []
-    clock.create_subscription(
-        Clock, '/clock', lambda message: times.append(message.clock), qos.CLOCK
-    )
-    spin(clock)
+    stamps_ns = written.stamps_ns.copy()
+    stamps_ns[30:] += 2 * 10**9
+    bag = write_pose_bag(tmp_path / 'pass', replace(written, stamps_ns=stamps_ns))
+    ticks = clock_ticks()
     listen()
-    player = play(bag, rate=1.0)
+    player = play(bag, rate=2.0)
     wait_until(player.finished.done, what='the end of the replay')
-    ticks = [time.sec * 10**9 + time.nanosec for time in times]
-    assert len(ticks) > 10
-    assert ticks == sorted(ticks)
-    assert set(ticks) <= set(written.stamps_ns.tolist())
+    bag_ns, arrived_s = np.array(ticks).T
+    assert (np.diff(bag_ns) >= 0).all()
+    assert bag_ns[0] == stamps_ns[0]
+    assert 0 <= bag_ns[-1] - stamps_ns[-1] < 10**8
+    in_gap = (bag_ns > stamps_ns[29]) & (bag_ns < stamps_ns[30])
+    assert in_gap.sum() > 20
+    slope, _ = np.polyfit(arrived_s[in_gap] - arrived_s[0], bag_ns[in_gap] - bag_ns[0], 1)
+    assert slope * 1e-9 == pytest.approx(2.0, rel=0.02)
+
+
+def test_the_clock_stands_before_the_start(play, listen, clock_ticks, wait_until, pass_bag):
+    """Also for who comes late; it begins to run with the first pose."""
+    start_ns = straight_pass(700).stamps_ns[0]
+    early = clock_ticks('early')
+    player = play(pass_bag, rate=1.0)
+    wait_until(lambda: len(early) > 5, what='the clock')
+    late = clock_ticks('late')
+    wait_until(lambda: len(late) > 5, what='the clock')
+    assert player.poses_published == 0
+    assert {bag_ns for bag_ns, _ in early + late} == {start_ns}
+    listen()
+    wait_until(lambda: late[-1][0] > start_ns + 10**8, what='the time of the replay')
+    assert player.poses_published > 0
+
+
+@pytest.mark.parametrize('rate', [1.0, 0.0])
+def test_the_clock_stands_while_paused(
+    ros_context, play, listen, clock_ticks, spin, call, wait_until, pass_bag, rate
+):
+    listen(reports=None if rate else False)
+    caller = Node('caller', context=ros_context)
+    spin(caller)
+    ticks = clock_ticks()
+    player = play(pass_bag, rate=rate, window=50)
+    wait_until(lambda: player.poses_published >= 20, what='poses')
+    assert call(caller, Trigger, 'bag_player/pause', Trigger.Request()).success
+    late = clock_ticks('late')
+    wait_until(lambda: len(late) > 5, what='the clock')
+    assert len({bag_ns for bag_ns, _ in late}) == 1
+    assert call(caller, Trigger, 'bag_player/resume', Trigger.Request()).success
+    if rate:
+        wait_until(lambda: ticks[-1][0] > late[0][0] + 10**8, what='the time of the replay')
+        assert [bag_ns for bag_ns, _ in ticks] == sorted(bag_ns for bag_ns, _ in ticks)
+
+
+def test_without_its_clock_a_player_publishes_none(
+    play, listen, clock_ticks, wait_until, pass_bag
+):
+    ticks = clock_ticks()
+    listen()
+    player = play(pass_bag, rate=0.0, publish_clock=False)
+    wait_until(player.finished.done, what='the end of the replay')
+    assert not ticks
 
 
 def test_pause_and_resume(ros_context, play, listen, spin, wait_until, still, pass_bag):

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import math
 import threading
-import time
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
+from rclpy.clock import Clock as SteadyClock
+from rclpy.clock import ClockType
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -27,10 +27,11 @@ from paint_deposition.nodes.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.messages import to_time
 from paint_deposition.nodes.player_parameters import PLAYER
 from paint_deposition.nodes.replay import ReplayMessage, replay_messages
+from paint_deposition.nodes.replay_clock import ReplayClock
 from paint_deposition.nodes.shutdown import PaintNode, run_node
 
 CLOCK_PERIOD_S = 0.01
-PAUSE_NOTICED_S = 0.05
+STOP_NOTICED_S = 0.05
 
 
 class BagPlayer(PaintNode):
@@ -40,7 +41,8 @@ class BagPlayer(PaintNode):
     a std_msgs/Bool trigger becomes an AtomizerState stamped with its log time. At rate 0 the
     player stays at most `window` poses ahead of the slowest node that reports PoseProgress on
     `atomizer/progress`; nodes that do not report get what their queues hold. When looping, the
-    stamps jump back to the start of the bag with every round.
+    stamps jump back to the start of the bag with every round. /clock runs on between the messages,
+    and says the same time over and over while the replay stands still.
     """
 
     PARAMETERS = PLAYER
@@ -61,11 +63,13 @@ class BagPlayer(PaintNode):
             if self.values['publish_clock']
             else None
         )
+        self._clock_order = threading.Lock()
+        self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
+        steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
+        if self._clock_publisher:
+            self.create_timer(CLOCK_PERIOD_S, self._publish_clock, clock=steady)
         self.create_service(Trigger, '~/pause', self._pause)
         self.create_service(Trigger, '~/resume', self._resume)
-        self._running = threading.Event()  # cleared while paused
-        if not self.values['start_paused']:
-            self._running.set()
         self._stopped = threading.Event()
         self._audience = Audience(self, self._pose_publisher, self.values['window'], self._stopped)
         self.poses_published = 0
@@ -88,7 +92,6 @@ class BagPlayer(PaintNode):
         thread = getattr(self, '_thread', None)
         if thread and thread.is_alive():
             self._stopped.set()
-            self._running.set()
             thread.join()
 
     def _choose_topics(self) -> tuple[BagTopic, BagTopic | None]:
@@ -113,19 +116,19 @@ class BagPlayer(PaintNode):
     # --- called by the executor
 
     def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._running.is_set()
+        response.success = self._time.running
         response.message = 'paused' if response.success else 'already paused'
-        self._running.clear()
+        self._time.pause()
         return response
 
     def _resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = not self._running.is_set()
+        response.success = not self._time.running
         response.message = 'resumed' if response.success else 'not paused'
-        self._running.set()
+        self._time.resume()
         return response
 
     def _status(self) -> Status:
-        doing = self._audience.doing if self._running.is_set() else 'paused'
+        doing = self._audience.doing if self._time.running else 'paused'
         return Status(
             WARN if doing.startswith('waiting') else OK,
             doing,
@@ -141,6 +144,7 @@ class BagPlayer(PaintNode):
 
     def _replay(self) -> None:
         try:
+            self._stand_at_the_start()
             self._audience.wait_for_subscribers(self.values['wait_for_subscribers'])
             while not self._stopped.is_set():
                 self._play_once()
@@ -152,35 +156,35 @@ class BagPlayer(PaintNode):
             return
         self.finish()
 
-    def _play_once(self) -> None:
-        self._start_ns: int | None = None
-        clock_s = -math.inf
+    def _stand_at_the_start(self) -> None:
         with open_bag(self.values['bag']) as bag:
             for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
+                self._time.stand_at(message.log_time_ns)
+                return
+
+    def _play_once(self) -> None:
+        begun = False
+        with open_bag(self.values['bag']) as bag:
+            for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
+                if not begun:
+                    begun = True
+                    self._time.stand_at(message.log_time_ns)
+                    self._time.start()
                 self._wait_for_turn(message.log_time_ns)
                 if self._stopped.is_set():
                     return
-                if time.monotonic() - clock_s >= CLOCK_PERIOD_S:
-                    clock_s = time.monotonic()
-                    self._publish_clock(message.log_time_ns)
+                self._time.reach(message.log_time_ns)
                 self._publish(message)
+        self._time.stop()
+        self._publish_clock()
 
     def _wait_for_turn(self, log_time_ns: int) -> None:
         """Wait while paused, and until a message's time has come or there is room for it."""
-        if self._start_ns is None:
-            self._wait_while_paused()
-            self._start_ns, self._start_s = log_time_ns, time.monotonic()
-        rate = self.values['rate']
         while not self._stopped.is_set():
-            self._start_s += self._wait_while_paused()
-            if rate == 0.0:
-                self._audience.wait_for_room()
-                return
-            due_s = self._start_s + (log_time_ns - self._start_ns) * 1e-9 / rate
-            left_s = due_s - time.monotonic()
-            if left_s <= 0.0:
-                return
-            self._stopped.wait(min(left_s, PAUSE_NOTICED_S))
+            if self._time.wait_for(log_time_ns, timeout_s=STOP_NOTICED_S):
+                break
+        if self.values['rate'] == 0.0:
+            self._audience.wait_for_room()
 
     def _publish(self, message: ReplayMessage) -> None:
         if message.is_pose:
@@ -191,16 +195,11 @@ class BagPlayer(PaintNode):
             self._state_publisher.publish(message.cdr)
             self.states_published += 1
 
-    def _publish_clock(self, time_ns: int) -> None:
-        if self._clock_publisher:
-            self._clock_publisher.publish(Clock(clock=to_time(time_ns)))
-
-    def _wait_while_paused(self) -> float:
-        if self._running.is_set():
-            return 0.0
-        paused_s = time.monotonic()
-        self._running.wait()
-        return time.monotonic() - paused_s
+    def _publish_clock(self) -> None:
+        with self._clock_order:
+            time_ns = self._time.time_ns
+            if self._clock_publisher and time_ns is not None:
+                self._clock_publisher.publish(Clock(clock=to_time(time_ns)))
 
 
 def main() -> int:

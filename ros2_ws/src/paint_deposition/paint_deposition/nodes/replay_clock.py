@@ -1,0 +1,104 @@
+"""The time in a bag while it is replayed: it runs on between the messages."""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+
+
+class ReplayClock:
+    """Bag time as a function of the steady clock; safe to use from several threads.
+
+    Args:
+        rate: bag seconds for one second; 0: time jumps from message to message.
+        running: False to start paused.
+    """
+
+    def __init__(self, rate: float, running: bool = True) -> None:
+        self._rate = rate
+        self._changed = threading.Condition()
+        self._time_ns: int | None = None
+        self._since_s: float | None = None  # when it was _time_ns; None while time stands still
+        self._started = False
+        self._running = running
+
+    @property
+    def time_ns(self) -> int | None:
+        """Time in the bag now [ns], None before it is known."""
+        with self._changed:
+            return self._now_ns()
+
+    @property
+    def running(self) -> bool:
+        """False while paused."""
+        return self._running
+
+    def stand_at(self, time_ns: int) -> None:
+        """Stand still at this time until `start`."""
+        with self._changed:
+            self._time_ns, self._since_s, self._started = time_ns, None, False
+
+    def start(self) -> None:
+        """Let time run from where it stands, as soon as it is not paused."""
+        with self._changed:
+            self._started = True
+            self._run_on()
+
+    def stop(self) -> None:
+        """Stand still from now on."""
+        with self._changed:
+            self._stand_still()
+            self._started = False
+
+    def pause(self) -> None:
+        """Stand still until `resume`."""
+        with self._changed:
+            self._stand_still()
+            self._running = False
+
+    def resume(self) -> None:
+        """Go on after `pause`."""
+        with self._changed:
+            self._running = True
+            self._run_on()
+            self._changed.notify_all()
+
+    def reach(self, time_ns: int) -> None:
+        """At rate 0: jump to the time of a message."""
+        with self._changed:
+            if self._rate == 0.0:
+                self._time_ns = time_ns
+
+    def wait_for(self, time_ns: int, timeout_s: float) -> bool:
+        """Wait at most so long for that time, at rate 0 only for the end of a pause.
+
+        Returns:
+            Whether it has come.
+        """
+        with self._changed:
+            left_s = self._left_s(time_ns)
+            if left_s > 0.0:
+                self._changed.wait(min(left_s, timeout_s))
+            return self._left_s(time_ns) <= 0.0
+
+    def _left_s(self, time_ns: int) -> float:
+        if self._rate == 0.0:
+            return 0.0 if self._running else math.inf
+        if self._since_s is None or self._time_ns is None:
+            return math.inf
+        passed_s = time.monotonic() - self._since_s
+        return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
+
+    def _now_ns(self) -> int | None:
+        if self._since_s is None or self._time_ns is None:
+            return self._time_ns
+        passed_s = time.monotonic() - self._since_s
+        return self._time_ns + round(passed_s * self._rate * 1e9)
+
+    def _stand_still(self) -> None:
+        self._time_ns, self._since_s = self._now_ns(), None
+
+    def _run_on(self) -> None:
+        if self._started and self._running and self._rate and self._since_s is None:
+            self._since_s = time.monotonic()
