@@ -16,7 +16,8 @@ from paint_deposition.film.deposition import FilmIntegrator
 from paint_deposition.formats.tables import read_readings
 from paint_deposition.inference.campaign import Experiment
 from paint_deposition.inference.noise import gauge_noise
-from paint_deposition.inference.residuals import Residuals, spreading
+from paint_deposition.inference.residual_field import reached, spreading
+from paint_deposition.inference.residuals import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.diagnostics import OK, Diagnostics, Status
@@ -61,9 +62,9 @@ class ModelComparison(PaintingNode):
         ),
         NodeParameter(
             'color_radius_m',
-            0.08,
-            'How far around a reading the skin has its colour [m]',
-            low=0.001,
+            0.0,
+            'How far around a reading the skin has its colour; 0: from their spacing [m]',
+            low=0.0,
             high=5.0,
         ),
     )
@@ -109,13 +110,12 @@ class ModelComparison(PaintingNode):
     def _spread_colours(self) -> None:
         count, points = len(self._experiment), self.points
         self._spreading = spreading(
-            self.surface.vertices_m,
-            self.surface.normals,
+            self.surface,
             points.positions_m[:count],
             points.normals[:count],
             self.values['color_radius_m'],
         )
-        self._coloured = np.diff(self._spreading.indptr) > 0
+        self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
         """Every reading against the film of all poses received."""
