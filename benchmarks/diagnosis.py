@@ -15,7 +15,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from scipy.stats import beta
 from tqdm import tqdm
 
 # One thread a process: several campaigns are judged at once, and would wait for each other.
@@ -27,6 +26,11 @@ sys.path.insert(0, str(ROOT))
 
 FOOTPRINTS = ('elliptic', 'skewed', 'triangular_ring', 'two_lobes')
 STRANGE = ('charge_swirl', 'masking_tape', 'poor_ground', 'pump_pulsation', 'thermal_stripe')
+PAIRS = (
+    'air_drift+edge_build',
+    'faraday_shielding+flow_drift',
+    'incidence_attraction+fog_gradient',
+)
 LAYOUTS = (('door',), ('door',), ('panel', 'door'), ('door', 'door_vertical'))
 PARCELS = 4_000_000
 
@@ -39,6 +43,7 @@ def jobs(clean: int, each: int, first_seed: int) -> list[tuple[int, str]]:
     truths = list(EFFECTS)
     truths += [f'footprint:{name}' for name in FOOTPRINTS]
     truths += [f'unknown:{name}' for name in STRANGE]
+    truths += PAIRS
     for number, truth in enumerate(truths):
         listed += [(first_seed + 10_000 + 100 * number + k, truth) for k in range(each)]
     return listed
@@ -197,91 +202,6 @@ def stepwise_bic(diagnosis) -> dict:
     return {'chosen': chosen}
 
 
-def interval(hits: int, total: int) -> str:
-    """A share with its 95 % Clopper-Pearson interval."""
-    if total == 0:
-        return 'none'
-    low = beta.ppf(0.025, hits, total - hits + 1) if hits else 0.0
-    high = beta.ppf(0.975, hits + 1, total - hits) if hits < total else 1.0
-    share = 100.0 * hits / total
-    return f'{share:5.1f} %  [{100 * low:.1f}, {100 * high:.1f}]  {hits}/{total}'
-
-
-def summary(records: list[dict]) -> str:
-    """The table."""
-    from paint_deposition.effects.catalogue import EFFECTS
-
-    sound = [r for r in records if 'error' not in r]
-    clean = [r for r in sound if not r['truth']]
-    hidden = [r for r in sound if r['truth'] in EFFECTS]
-    seen = [r for r in hidden if r['verdict'] != 'none_missing']
-    footprint = [r for r in sound if r['truth'].startswith('footprint:')]
-    seen_footprint = [r for r in footprint if r['verdict'] != 'none_missing']
-    strange = [r for r in sound if r['truth'].startswith('unknown:')]
-    seen_strange = [r for r in strange if r['verdict'] != 'none_missing']
-    without = [r['without'] for r in hidden if 'without' in r]
-    left = [w for w in without if w['verdict'] != 'none_missing']
-
-    def in_classes(r):
-        return any(r['truth'] in members for members, _ in r['classes'])
-
-    def wrong(r, truth):
-        return any(
-            truth not in members and probability > 0.8 and set(members) & set(r['accepted'])
-            for members, probability in r['classes']
-        )
-
-    def bic_right(r):
-        return bool(r['bic']['chosen']) and r['bic']['chosen'][0] == r['truth']
-
-    added = [r for r in hidden if r['accepted'] and r['truth'] in
-             {m for members, _ in r['classes'] for m in members}]  # fmt: skip
-    ratios = [r['heldout']['after'] for r in added]
-    before = [r['heldout']['before'] for r in added]
-    amounts = [a for r in hidden for a in r['amounts']]
-    covered = sum(a['low'] <= a['true'] <= a['high'] for a in amounts)
-    seconds = [r['seconds'] for r in sound]
-    alarm = sum(r['verdict'] != 'none_missing' for r in clean)
-    bic_alarm = sum(bool(r['bic']['chosen']) for r in clean)
-    bic_seen = [r for r in hidden if r['bic']['chosen']]
-    unsure = sum(w['verdict'] in ('unknown_effect', 'undecided') for w in left)
-    recognised = sum(r['unknown'] == 'footprint' for r in seen_footprint)
-    everything = [*seen, *seen_footprint, *seen_strange]
-    lines = [
-        f'{len(records)} campaigns, {len(records) - len(sound)} errors',
-        f'false alarms on clean data       {interval(alarm, len(clean))}',
-        f'  stepwise BIC                   {interval(bic_alarm, len(clean))}',
-        f'effects detected                 {interval(len(seen), len(hidden))}',
-        f'  stepwise BIC                   {interval(len(bic_seen), len(hidden))}',
-        f'right effect in a class reported {interval(sum(map(in_classes, seen)), len(seen))}',
-        f'  stepwise BIC, first named      '
-        f'{interval(sum(map(bic_right, bic_seen)), len(bic_seen))}',
-        f'wrong effect above 0.8, effects  '
-        f'{interval(sum(wrong(r, r["truth"]) for r in seen), len(seen))}',
-        f'wrong effect above 0.8, all      '
-        f'{interval(sum(wrong(r, r["truth"]) for r in everything), len(everything))}',
-        f'class removed: unknown/undecided {interval(unsure, len(left))}',
-        f'strange cause: unknown/undecided '
-        f'{interval(sum(not r["accepted"] for r in seen_strange), len(seen_strange))}',
-        f'footprint: not blamed on physics '
-        f'{interval(sum(not r["accepted"] for r in seen_footprint), len(seen_footprint))}',
-        f'  recognised as the footprint    {interval(recognised, len(seen_footprint))}',
-        f'95 % intervals cover the truth   {interval(covered, len(amounts))}',
-    ]
-    if ratios:
-        lines.append(
-            f'held-out RMSE over noise         {np.median(before):.2f} before, '
-            f'{np.median(ratios):.2f} after (90 % of cases below '
-            f'{np.quantile(ratios, 0.9):.2f})'
-        )
-    if seconds:
-        lines.append(
-            f'seconds a diagnosis              {np.median(seconds):.1f} median, '
-            f'{max(seconds):.1f} longest'
-        )
-    return '\n'.join(lines)
-
-
 @click.command()
 @click.option('--clean', default=100, show_default=True, help='Campaigns with nothing hidden.')
 @click.option('--each', default=6, show_default=True, help='Campaigns of each hidden cause.')
@@ -298,6 +218,8 @@ def main(
     results.parent.mkdir(parents=True, exist_ok=True)
     lines = results.read_text().splitlines() if results.exists() else []
     records = [json.loads(line) for line in lines]
+    from benchmarks.scores import table
+
     if not only_summary:
         known = {(r['seed'], r['truth']) for r in records}
         todo = [job for job in jobs(clean, each, first_seed) if job not in known]
@@ -312,7 +234,7 @@ def main(
                 records.append(record)
                 file.write(json.dumps(record, default=float) + '\n')
                 file.flush()
-    click.echo(summary(records))
+    click.echo(table(records))
 
 
 if __name__ == '__main__':
