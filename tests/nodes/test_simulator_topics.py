@@ -178,7 +178,7 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     status = viewer.status(POSES)
     assert status.level == b'\x02'
     assert "'base_link'" in status.message
-    assert "'part'" in status.message
+    assert "'part' and no transform between them is known; set part_pose" in status.message
     assert node.film.up_to_date().film_um.max() == 0.0
     wait_until(lambda: viewer.newest('thickness/stats').poses_rejected == len(MOTION))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Protocol
 
 import numpy as np
@@ -17,6 +18,7 @@ from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import relative_flow
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.frames import PartFrame
+from paint_deposition.nodes.held_poses import HeldPoses, NoTransform
 from paint_deposition.nodes.messages import to_ns
 from paint_deposition.nodes.qos_watch import QosWatch
 
@@ -43,6 +45,7 @@ class AtomizerInput:
         poses_received: since the node started.
         refused_frames: poses refused for their frame, by frame, since the last reset.
         without_frame: poses that name no frame, since the last reset.
+        refusal: why the last refused pose was refused, '' if none was since the last reset.
         refused_states: states that say no time or no possible flow, since the last reset.
         intervals: rhythm of the stamps since the last reset.
     """
@@ -61,6 +64,7 @@ class AtomizerInput:
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
         self._poses: list[tuple[float, ...]] = []
+        self._held = HeldPoses()
         self.reset()
         profile = qos.poses(depth)
         if reliability == 'reliable':
@@ -85,14 +89,22 @@ class AtomizerInput:
     def reset(self) -> None:
         """Count from zero; poses that were not handed on yet are dropped."""
         self.refused_frames: dict[str, int] = {}
+        self.refusal = ''
         self.refused_states = 0
         self.without_frame = 0
         self.intervals = Intervals()
+        self._held.clear()
         self._stamps.clear()
         self._poses.clear()
 
+    @property
+    def poses_held(self) -> int:
+        """Poses that wait for tf."""
+        return len(self._held)
+
     def hand_on(self) -> None:
-        """Give the receiver what has come."""
+        """Give the receiver what has come, but for poses that wait for tf."""
+        self._held.release(time.monotonic(), self._place, self._refuse)
         if not self._stamps:
             return
         stamps, poses = np.array(self._stamps, dtype=np.int64), np.array(self._poses)
@@ -108,29 +120,33 @@ class AtomizerInput:
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
         self._newest = message
-        frame_id = message.header.frame_id
-        stamp = to_ns(message.header.stamp)
-        if self._frame.is_own(frame_id):
-            p, q = message.pose.position, message.pose.orientation
-            self._stamps.append(stamp)
-            self._poses.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
-            self.without_frame += not frame_id
-        elif (transform := self._frame.transform_from(frame_id, stamp)) is not None:
-            self._stamps.append(stamp)
-            self._poses.append(transform.applied(message.pose))
-        else:
-            self._refuse(frame_id)
+        now_s = time.monotonic()
+        self._held.add(message, now_s)
+        self._held.release(now_s, self._place, self._refuse)
         if len(self._stamps) >= POSES_A_BATCH:
             self.hand_on()
         if self.poses_received % POSES_A_BATCH == 0:
             self._report_progress()
 
-    def _refuse(self, frame_id: str) -> None:
+    def _place(self, message: PoseStamped) -> None:
+        frame_id = message.header.frame_id
+        stamp = to_ns(message.header.stamp)
+        if self._frame.is_own(frame_id):
+            p, q = message.pose.position, message.pose.orientation
+            pose = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+            self.without_frame += not frame_id
+        else:
+            pose = self._frame.transform_from(frame_id, stamp).applied(message.pose)
+        self._stamps.append(stamp)
+        self._poses.append(pose)
+
+    def _refuse(self, message: PoseStamped, missing: NoTransform) -> None:
+        frame_id = message.header.frame_id
+        self.refusal = str(missing)
         if frame_id not in self.refused_frames:
             self._node.get_logger().error(
                 f"poses in frame '{frame_id}' are refused: the mesh is in frame "
-                f"'{self._frame.frame_id}' and no transform between them is known; set part_pose "
-                'and part_parent_frame, or frame_id'
+                f"'{self._frame.frame_id}' and {missing}"
             )
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 

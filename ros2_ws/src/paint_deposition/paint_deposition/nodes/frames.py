@@ -10,6 +10,10 @@ from geometry_msgs.msg import Pose, Transform
 from rclpy.node import Node
 from rclpy.time import Time
 
+from paint_deposition.nodes.held_poses import NoTransform
+
+GIVE_FRAMES = 'set part_pose and part_parent_frame, or frame_id'
+
 
 @dataclass(frozen=True)
 class Rigid:
@@ -85,21 +89,37 @@ class PartFrame:
         """Whether a pose in this frame can be taken as it is."""
         return frame_id in ('', self.frame_id) or frame_id.lstrip('/') == self.frame_id
 
-    def transform_from(self, frame_id: str, stamp_ns: int) -> Rigid | None:
-        """The transform from another frame, None where none is known."""
+    def transform_from(self, frame_id: str, stamp_ns: int) -> Rigid:
+        """The transform from another frame at that time.
+
+        Raises:
+            NoTransform: there is none, or none yet.
+        """
         if self._from_parent is not None and frame_id.lstrip('/') == self._parent:
             return self._from_parent
         if self._buffer is None:
-            return None
+            raise NoTransform(f'no transform between them is known; {GIVE_FRAMES}')
         import tf2_ros
 
         try:
             found = self._buffer.lookup_transform(
                 self.frame_id, frame_id.lstrip('/'), Time(nanoseconds=stamp_ns)
             )
-        except tf2_ros.TransformException:
-            return None
+        except tf2_ros.ExtrapolationException as error:
+            raise NoTransform(
+                f'tf does not cover the time of the poses ({_one_line(error)}); publish it by the same clock '
+                'as the poses',
+                may_come=True,
+            ) from None
+        except tf2_ros.TransformException as error:
+            raise NoTransform(
+                f'tf knows no transform between them ({_one_line(error)}); {GIVE_FRAMES}', may_come=True
+            ) from None
         return Rigid.of_message(found.transform)
+
+
+def _one_line(error: Exception) -> str:
+    return ' '.join(str(error).split())
 
 
 def _transform_buffer(node: Node):

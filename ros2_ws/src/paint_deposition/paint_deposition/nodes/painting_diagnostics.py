@@ -33,6 +33,7 @@ def poses_status(node: PaintingNode) -> Status:
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'poses without a frame': source.without_frame,
+        'poses waiting for tf': source.poses_held,
         'states refused': source.refused_states,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
@@ -42,7 +43,7 @@ def poses_status(node: PaintingNode) -> Status:
         return Status(
             ERROR,
             f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
-            f"'{node.frame.frame_id}'",
+            f"'{node.frame.frame_id}' and {source.refusal}",
             values,
         )
     wrong = [
