@@ -107,13 +107,14 @@ class PartFrame:
             )
         except tf2_ros.ExtrapolationException as error:
             raise NoTransform(
-                f'tf does not cover the time of the poses ({_one_line(error)}); publish it by the same clock '
-                'as the poses',
+                f'tf does not cover the time of the poses ({_one_line(error)}); publish it '
+                'by the same clock as the poses',
                 may_come=True,
             ) from None
         except tf2_ros.TransformException as error:
             raise NoTransform(
-                f'tf knows no transform between them ({_one_line(error)}); {GIVE_FRAMES}', may_come=True
+                f'tf knows no transform between them ({_one_line(error)}); {GIVE_FRAMES}',
+                may_come=True,
             ) from None
         return Rigid.of_message(found.transform)
 
