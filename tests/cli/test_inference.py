@@ -101,7 +101,7 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     done = paint('compare', door_alone, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / 'comparison.json').read_text())
-    assert set(content) == {'readings', 'noise', 'misfits', 'regions', 'dependences'}
+    assert set(content) == {'readings', 'noise', 'misfits', 'regions', 'dependences', 'notes'}
     assert content['noise']['source'] == 'repeats'
     door = content['misfits'][0]
     assert (door['experiment'], door['kind'], door['readings']) == ('door', 'experiment', 72)
@@ -115,6 +115,42 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     assert 'misfit: door: ' in done.stdout
     p_values = [dependence['p_value'] for dependence in content['dependences']]
     assert p_values == sorted(p_values)
+
+
+def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
+    """In every file and in print; the readings' own file says how it was."""
+    header, *rows = (door_alone.parent / 'door.csv').read_text().splitlines()
+    readings = table(door_alone.parent / 'door.csv')
+    labels = [reading['point'] for reading in readings]
+    slip = next(k for k, label in enumerate(labels) if labels.count(label) == 3)
+    text = readings[slip]['thickness_um']
+    rows[slip] = rows[slip].replace(f',{text}', f',{float(text) - 11.0:.2f}')
+    (tmp_path / 'slip.csv').write_text('\n'.join([header, *rows]) + '\n')
+    content = yaml.safe_load(door_alone.read_text())
+    for key in ('mesh', 'trajectory'):
+        content['experiments'][0][key] = str(door_alone.parent / content['experiments'][0][key])
+    content['experiments'][0]['measurements'] = 'slip.csv'
+    content.pop('model')
+    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(content))
+    for command in (['compare'], ['refit', '--add', 'none'], ['calibrate']):
+        output = tmp_path / command[0]
+        done = paint(*command, tmp_path / 'campaign.yaml', '-o', output)
+        assert done.returncode == 0, done.stderr
+        lines = (done.stdout + done.stderr).splitlines()
+        (told,) = (line for line in lines if 'left out of the fit' in line)
+        note = told.partition(': ')[2]
+        assert note.startswith(f"door: point '{labels[slip]}': {float(text) - 11.0:.4g} um beside")
+        if command == ['calibrate']:
+            written = json.loads((output / 'calibration.json').read_text())['warnings']
+            assert note in written
+            continue
+        name = 'comparison' if command == ['compare'] else 'diagnosis'
+        assert json.loads((output / f'{name}.json').read_text())['notes'] == [note]
+        assert f'point &#39;{labels[slip]}&#39;: ' in (output / 'report.html').read_text()
+        residuals = table(output / 'residuals.csv')
+        assert [row['point'] for row in residuals] == labels
+        assert [row['used'] == '1' for row in residuals] == [k != slip for k in range(len(rows))]
+        assert residuals[slip]['predicted_um'] == ''
 
 
 # --- refit

@@ -95,6 +95,8 @@ def _say_comparison(comparison: Comparison, output: Path) -> None:
         click.echo(f'misfit: {region.experiment}: {region.description}')
     if not comparison.regions:
         click.echo('no region of significant misfit')
+    for note in comparison.notes:
+        click.echo(f'note: {note}')
     click.echo(f'report: {output / "report.html"}')
 
 

@@ -21,6 +21,7 @@ def comparison_as_dict(comparison: Comparison) -> dict[str, Any]:
         'misfits': [asdict(misfit) for misfit in comparison.misfits],
         'regions': regions_as_list(comparison.regions),
         'dependences': [asdict(dependence) for dependence in comparison.dependences],
+        'notes': list(comparison.notes),
     }
 
 
@@ -92,15 +93,18 @@ def diagnosis_as_dict(
 
 
 def write_residuals(path: str | Path, study: Study, comparison: Comparison) -> None:
-    """Write a row a reading: where, measured, predicted, residual and its uncertainty."""
+    """Write a row a reading: where, measured, predicted, residual and its uncertainty.
+
+    Readings that were left out are there, too, without a prediction.
+    """
     lines = [
         ['experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
-         'residual_um', 'sigma_um']
+         'residual_um', 'sigma_um', 'used']
     ]  # fmt: skip
-    row = 0
+    fitted = zip(comparison.predicted_um, comparison.residual_um, comparison.sigma_um, strict=True)
     for experiment in study.campaign.experiments:
-        readings = experiment.readings
-        for k in range(len(readings)):
+        readings = experiment.taken
+        for k, used in enumerate(experiment.used):
             lines.append(
                 [
                     experiment.name,
@@ -108,12 +112,10 @@ def write_residuals(path: str | Path, study: Study, comparison: Comparison) -> N
                     str(readings.group[k]),
                     *(f'{value:.5f}' for value in readings.positions_m[k]),
                     f'{readings.thickness_um[k]:.3f}',
-                    f'{comparison.predicted_um[row]:.3f}',
-                    f'{comparison.residual_um[row]:.3f}',
-                    f'{comparison.sigma_um[row]:.3f}',
+                    *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
+                    str(int(used)),
                 ]
             )
-            row += 1
     write_table(path, lines)
 
 

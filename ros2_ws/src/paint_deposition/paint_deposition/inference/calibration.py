@@ -113,7 +113,7 @@ def calibrate(
     study = Study.of(campaign, model.effects)
     check_enough(len(study))
     first = 0
-    for experiment in campaign.experiments:
+    for experiment in study.campaign.experiments:
         sigma = study.noise.sigma_um[first : first + len(experiment.readings)]
         first += len(experiment.readings)
         check_readings(experiment.readings, sigma)
@@ -211,7 +211,8 @@ def _warnings(
     values: tuple[Estimate, ...],
     pairs: tuple[Correlation, ...],
 ) -> list[str]:
-    warnings = [] if fit.converged else ['the fit did not come to rest: its values are not final']
+    warnings = list(study.campaign.notes)
+    warnings += [] if fit.converged else ['the fit did not come to rest: its values are not final']
     warnings += [
         f'{value.name} is not determined by these readings: {value.reason}'
         for value in values

@@ -48,12 +48,13 @@ class Comparison:
     """The model beside the readings.
 
     Attributes:
-        predicted_um, residual_um, sigma_um: (N,) of every reading, experiments in order.
+        predicted_um, residual_um, sigma_um: (N,) of every reading used, experiments in order.
         misfits: of each experiment, its groups and its passes.
         dependences: strongest first.
         regions: where the misfit is significant, strongest first.
         noise_source: where the gauge's noise is known from.
         noise_um: standard deviation of a reading.
+        notes: remarks for the user.
     """
 
     predicted_um: np.ndarray
@@ -64,6 +65,7 @@ class Comparison:
     regions: tuple[Region, ...]
     noise_source: str
     noise_um: float
+    notes: tuple[str, ...]
 
 
 def compare(study: Study, model: DepositionModel) -> Comparison:
@@ -92,6 +94,7 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
         tuple(misfit_regions(study, off, study.sigma_um, model)),
         study.noise.source,
         study.noise.typical_um,
+        study.notes,
     )
 
 

@@ -225,7 +225,6 @@ def _conclude(
         unknown,
         first.not_testable,
         first.detectable,
-        _notes(study),
     )
 
 
@@ -241,13 +240,3 @@ def _explains_most(history: list[Step], judged: Judgement) -> bool:
     count = len(history[0].fit.predicted_um)
     gained = count * np.log(history[0].rmse_um / history[-1].rmse_um)
     return left < LEFT_OVER * gained
-
-
-def _notes(study: Study) -> tuple[str, ...]:
-    notes = []
-    if study.noise.source == 'assumed':
-        notes.append(
-            'The noise of the gauge was assumed (0.7 um and 1 %); take 6 or more repeats for '
-            'p-values that can be trusted.'
-        )
-    return tuple(notes)

@@ -100,7 +100,6 @@ class Diagnosis:
         unknown: where the unexplained shows, or None.
         not_testable: ids that these readings cannot see at typical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
-        notes: remarks for the user.
     """
 
     study: Study
@@ -113,7 +112,11 @@ class Diagnosis:
     unknown: Unknown | None = None
     not_testable: tuple[str, ...] = ()
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the user."""
+        return self.study.notes
 
     @property
     def noise_floor_um(self) -> float:
