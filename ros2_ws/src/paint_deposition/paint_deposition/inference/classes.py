@@ -24,6 +24,8 @@ MOST_REFITTED = 10
 # An effect beside an unknown cause is the answer if it gives this share of their evidence.
 SUFFICIENT = 0.75
 WORTH_LISTING = 0.02
+# An effect of a pair acts if it raises the pair's log evidence by this much.
+NEEDED = 1.0
 
 
 @dataclass(frozen=True)
@@ -84,12 +86,13 @@ def rank(study: Study, judged: Judgement) -> Ranking:
         ]
     )
     other = np.array([h.other for h in hypotheses])
+    active = [_active(h, factors[k], factors, alone) for k, h in enumerate(hypotheses)]
     classes = []
     left = list(alone)
     while left:
         members = alike(judged, left)
         left = [effect_id for effect_id in left if effect_id not in members]
-        holds = np.array([bool(set(members) & set(h.effects)) for h in hypotheses])
+        holds = np.array([bool(set(members) & acting) for acting in active])
         probability = float(weights[holds & answers].sum())
         if probability >= WORTH_LISTING:
             first = alone[members[0]]
@@ -128,6 +131,19 @@ def _alone(hypotheses: list[Hypothesis], factors: np.ndarray) -> dict[str, int]:
         if _is_single(hypotheses[k]):
             found.setdefault(hypotheses[k].effects[0], int(k))
     return found
+
+
+def _active(
+    hypothesis: Hypothesis, factor: float, factors: np.ndarray, alone: dict[str, int]
+) -> set[str]:
+    """Effects that the hypothesis needs: of a pair in which one does all, only that one."""
+    needed = {
+        effect_id
+        for effect_id in hypothesis.effects
+        for rest in set(hypothesis.effects) - {effect_id}
+        if factor > factors[alone[rest]] + NEEDED
+    }
+    return needed or set(hypothesis.effects)
 
 
 def _is_single(hypothesis: Hypothesis) -> bool:
