@@ -5,10 +5,12 @@ import signal
 import subprocess
 import sys
 
+import click
 import pytest
 
 from cli.command import COMMAND, assert_refused, environment, paint
 from paint_deposition.cli.main import COMMANDS
+from paint_deposition.cli.main import paint as group
 
 
 def in_python(program: str) -> subprocess.CompletedProcess:
@@ -82,3 +84,16 @@ def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
     assert output == ''
     assert errors.split() == ['paint:', 'interrupted']
     assert not (tmp_path / 'out').exists()
+
+
+def test_no_option_takes_a_number_that_is_none():
+    context = click.Context(group)
+    numbers = 0
+    for name in COMMANDS:
+        for option in group.get_command(context, name).params:
+            if isinstance(option.type, click.types.FloatParamType | click.FloatRange):
+                numbers += 1
+                for value in ('nan', 'inf', '-inf'):
+                    with pytest.raises(click.BadParameter):
+                        option.type.convert(value, option, context)
+    assert numbers > 20

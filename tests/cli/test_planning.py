@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from booth import SAMPLES
@@ -85,6 +86,8 @@ def test_recommendation_lands_here_without_a_folder(tmp_path):
         ((), 'neither speed_m_per_s nor target_um'),
         (('--speed', -1), 'speed_m_per_s is -1'),
         (('--speed', 'fast'), '--speed'),
+        (('--speed', 'nan'), 'nan is not finite'),
+        (('--speed', 0.2, '--travel-deg', 'inf'), 'inf is not finite'),
         (('--speed', 0.2, '--tolerance', 1e-6), 'the closest is'),
         (('--speed', 0.2, '--model', 'nowhere.yaml'), 'nowhere.yaml: no such file'),
     ],
@@ -129,6 +132,22 @@ def test_calibration_as_json(tmp_path):
     content = json.loads(done.stdout)
     assert content['converged'] is True
     assert content['readings'] == 90
+
+
+def test_notes_on_a_campaign_are_told_when_piped(tmp_path):
+    mesh = trimesh.load(STUDY / 'panel.stl', process=False)
+    mesh.faces = mesh.faces[:, ::-1]
+    mesh.export(tmp_path / 'panel.stl')
+    text = (STUDY / 'campaign.yaml').read_text()
+    for file in STUDY.iterdir():
+        if not (tmp_path / file.name).exists():
+            (tmp_path / file.name).symlink_to(file)
+    assert 'panel.stl' in text
+    done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    (note, *_) = done.stderr.splitlines()
+    assert note.startswith('note: ')
+    assert 'turned round' in note
 
 
 def test_readings_in_mixed_units_are_refused(tmp_path):
@@ -195,6 +214,9 @@ def test_plan_tells_in_words_and_replaces_an_older_one(tmp_path):
         (('--mesh', SAMPLES / 'door.stl'), 'neither speed_m_per_s nor target_um'),
         (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), 'index_m is -1'),
         (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--direction', 'up'), '--direction'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--down', 'nan', 0, 0), 'nan is not finite'),
     ],
 )
 def test_impossible_plans_are_refused(arguments, words, tmp_path):

@@ -95,6 +95,23 @@ def test_recover_as_json(paint, cut_run, tmp_path):
     assert figures['damaged_chunks'] == 0
 
 
+@pytest.mark.parametrize('value', ['nan', 'inf', '0'])
+def test_a_gap_that_is_no_time_is_refused(paint, tmp_path, value):
+    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
+    done = paint('inspect', folder, '--max-pose-gap-s', value)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert '--max-pose-gap-s' in line
+    assert value in line
+
+
+def test_a_gap_longer_than_clocks_count_is_none(paint, tmp_path):
+    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
+    done = paint('inspect', folder, '--max-pose-gap-s', '1e300')
+    assert done.returncode == 0, done.stderr
+    assert ' 0 gaps' in done.stdout
+
+
 @pytest.mark.parametrize('command', ['inspect', 'recover'])
 def test_nothing_there_is_one_line(paint, command):
     done = paint(command, 'nowhere')

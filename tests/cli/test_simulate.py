@@ -296,6 +296,10 @@ def test_a_truncated_bag_is_refused_with_the_remedy(panel, tmp_path):
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
         ('--tolerance-um', '3', ['--target-um']),
         ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
+        ('--down', ('nan', '0', '-1'), ['--down', 'nan is not finite']),
+        ('--max-pose-gap-s', 'nan', ['--max-pose-gap-s', 'nan is not finite']),
+        ('--max-pose-gap-s', 'inf', ['--max-pose-gap-s', 'inf is not finite']),
+        ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],
 )
 def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):

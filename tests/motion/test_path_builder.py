@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import scenes
+from paint_deposition.errors import RecordingError
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -225,3 +226,9 @@ def test_too_few_poses_paint_nothing(count):
     assert len(path) == 0
     assert path.rotation.shape == (0, 3, 3)
     assert counts.received == count
+
+
+@pytest.mark.parametrize('gap_s', [np.nan, np.inf, 0.0, -1.0])
+def test_a_gap_that_is_no_time_is_refused(gap_s):
+    with pytest.raises(RecordingError, match='give seconds above 0'):
+        PathBuilder(max_pose_gap_s=gap_s)

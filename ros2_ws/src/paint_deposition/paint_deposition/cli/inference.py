@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from tqdm import tqdm
 
-from paint_deposition.cli.campaigns import read_noted
+from paint_deposition.cli.campaigns import Steps, read_noted
+from paint_deposition.cli.options import CAMPAIGN, FILE, JSON, model_option, output_option
 
 if TYPE_CHECKING:
     from paint_deposition.effects.base import Effect
@@ -21,29 +20,20 @@ if TYPE_CHECKING:
     from paint_deposition.inference.verdict import Diagnosis
     from paint_deposition.model.deposition_model import DepositionModel
 
-CAMPAIGN = click.argument('campaign', type=click.Path(path_type=Path))
-OUTPUT = click.option(
-    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
-    help='Folder for the results; made if it is not there, results in it are replaced.',
-)  # fmt: skip
-MODEL = click.option(
-    '--model', 'model_file', type=click.Path(path_type=Path),
-    help="Model to start from; default: the campaign's, else a 50 mm bell.",
-)  # fmt: skip
-JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+OUTPUT = output_option(
+    'Folder for the results; made if it is not there, results in it are replaced.', required=True
+)
+MODEL = model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
 SEED = click.option('--seed', default=0, show_default=True, help='Of all random draws.')
 OWN_EFFECTS = click.option(
-    '--effect-file', 'effect_files', multiple=True, type=click.Path(path_type=Path),
+    '--effect-file', 'effect_files', multiple=True, type=FILE,
     help='Python file with an effect of your own to consider as well; may be repeated.',
 )  # fmt: skip
 
 
 @click.command('compare')
 @CAMPAIGN
-@click.option(
-    '--model', 'model_file', type=click.Path(path_type=Path),
-    help="Model to judge, as it is; default: the campaign's, else one fitted to it.",
-)  # fmt: skip
+@model_option("Model to judge, as it is; default: the campaign's, else one fitted to it.")
 @OUTPUT
 @JSON
 def compare_command(campaign: Path, model_file: Path | None, output: Path, as_json: bool) -> None:
@@ -60,7 +50,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
     from paint_deposition.model.deposition_model import DepositionModel
     from paint_deposition.pictures.report import write_report
 
-    with _Steps('compare') as tell:
+    with Steps('compare') as tell:
         data = read_noted(campaign, tell)
         start = _start(data, model_file)
         study = Study.of(data, start.model.effects if start else ())
@@ -124,7 +114,7 @@ def diagnose_command(
     from paint_deposition.inference.diagnosis import diagnose
 
     library = dict(EFFECTS) | {e.id: e for e in _own(effect_files)}
-    with _Steps('diagnose') as tell:
+    with Steps('diagnose') as tell:
         data = read_noted(campaign, tell)
         start = _start_or_default(data, model_file)
         diagnosis = diagnose(data, start.model, library, seed, tell)
@@ -159,32 +149,12 @@ def refit_command(
         (added,) = _own((Path(effect),))
     else:
         added = effect_class(effect)
-    with _Steps('refit') as tell:
+    with Steps('refit') as tell:
         data = read_noted(campaign, tell)
         start = _start_or_default(data, model_file)
         diagnosis = refit(data, start.model, added, EFFECTS, seed, tell)
         content = _write_diagnosis(output, diagnosis, {}, start, tell)
     _say(diagnosis, content, output, as_json)
-
-
-class _Steps:
-    """Progress of work in steps of unknown length; nothing when piped."""
-
-    def __init__(self, name: str) -> None:
-        self._bar = tqdm(
-            desc=name, bar_format='{desc}: {postfix} [{elapsed}]', disable=None, delay=1,
-            leave=False, file=sys.stderr,
-        )  # fmt: skip
-
-    def __enter__(self) -> Callable[[str], None]:
-        return self._tell
-
-    def __exit__(self, *error: object) -> None:
-        self._bar.close()
-
-    def _tell(self, line: str) -> None:
-        self._bar.set_postfix_str(line)
-        self._bar.update()
 
 
 def _start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:

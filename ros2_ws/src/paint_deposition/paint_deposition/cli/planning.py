@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterable
 from pathlib import Path
@@ -10,46 +9,51 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from paint_deposition.cli.campaigns import read_noted
-
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
-NOT_NEGATIVE = click.FloatRange(min=0.0)
-SHOW_PROGRESS_AFTER_S = 2.0
-MODEL = click.option(
-    '--model', 'model_file', type=click.Path(path_type=Path),
-    help='Deposition model, YAML; default: a 50 mm bell.',
-)  # fmt: skip
-JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
-SPEED = click.option('--speed', 'speed_m_per_s', type=float, help='Speed of the passes [m/s].')
-TARGET = click.option(
-    '--target-um', type=float, help='Mean film; the speed is chosen for it [um].'
+from paint_deposition.cli.campaigns import Steps, read_noted
+from paint_deposition.cli.options import (
+    CAMPAIGN,
+    FILE,
+    JSON,
+    NOT_NEGATIVE,
+    NUMBER,
+    POSITIVE,
+    SHOW_PROGRESS_AFTER_S,
+    direction_option,
+    max_edge_length_option,
+    mesh_scale_option,
+    model_option,
+    output_option,
 )
-INDEX_MIN = click.option('--index-min', 'index_min_m', type=float, help='Least index [m].')
-INDEX_MAX = click.option('--index-max', 'index_max_m', type=float, help='Greatest index [m].')
-TOLERANCE = click.option('--tolerance', type=float, help='Largest sigma_n accepted, 0.05 for 5 %.')
+
+MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
+SPEED = click.option('--speed', 'speed_m_per_s', type=NUMBER, help='Speed of the passes [m/s].')
+TARGET = click.option(
+    '--target-um', type=NUMBER, help='Mean film; the speed is chosen for it [um].'
+)
+INDEX_MIN = click.option('--index-min', 'index_min_m', type=NUMBER, help='Least index [m].')
+INDEX_MAX = click.option('--index-max', 'index_max_m', type=NUMBER, help='Greatest index [m].')
+TOLERANCE = click.option(
+    '--tolerance', type=NUMBER, help='Largest sigma_n accepted, 0.05 for 5 %.'
+)
 ONE_WAY = click.option(
     '--one-way', is_flag=True, help='Every pass in one direction; default: they alternate.'
 )
 STANDOFF = click.option(
-    '--standoff', 'standoff_m', type=float,
+    '--standoff', 'standoff_m', type=NUMBER,
     help='Distance of the TCP from the part [m]; default: the part lies on the model plane.',
 )  # fmt: skip
 TRAVEL = click.option(
-    '--travel-deg', default=0.0, show_default=True,
+    '--travel-deg', default=0.0, show_default=True, type=NUMBER,
     help="Direction of the first pass in the tool's x-y frame, from x to y.",
 )  # fmt: skip
 
 
 @click.command('calibrate')
-@click.argument('campaign', type=click.Path(path_type=Path))
-@click.option(
-    '--model', 'model_file', type=click.Path(path_type=Path),
-    help="Model to start from; default: the campaign's, else a 50 mm bell.",
-)  # fmt: skip
-@click.option(
-    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
-    help='Folder for model.yaml, calibration.json and pictures; older ones are replaced.',
-)  # fmt: skip
+@CAMPAIGN
+@model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
+@output_option(
+    'Folder for model.yaml, calibration.json and pictures; older ones are replaced.', required=True
+)
 @click.option('--seed', default=0, show_default=True, help='Of the starts of the fit.')
 @JSON
 def calibrate(
@@ -61,19 +65,12 @@ def calibrate(
     model to start from are fitted along, its projection is kept.
     """
     from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
+    from paint_deposition.formats.json_files import json_text
     from paint_deposition.formats.model_file import read_model_file
     from paint_deposition.inference import calibration as calibrating
     from paint_deposition.pictures.calibration import write_calibration_pictures
 
-    with tqdm(
-        desc='calibrate', bar_format='{desc}: {postfix} [{elapsed}]', disable=None,
-        delay=SHOW_PROGRESS_AFTER_S, leave=False,
-    ) as bar:  # fmt: skip
-
-        def tell(line: str) -> None:
-            bar.set_postfix_str(line)
-            bar.update()
-
+    with Steps('calibrate') as tell:
         data = read_noted(campaign, tell)
         chosen = model_file or data.model_file
         start = read_model_file(chosen) if chosen else None
@@ -82,7 +79,7 @@ def calibrate(
         files = write_calibration(output, result, start)
         files += write_calibration_pictures(output, result)
     if as_json:
-        click.echo(json.dumps(calibration_as_dict(result), indent=2))
+        click.echo(json_text(calibration_as_dict(result)))
         return
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
@@ -111,8 +108,10 @@ def calibrate(
 @INDEX_MIN
 @INDEX_MAX
 @TOLERANCE
-@click.option('--width', 'width_m', type=float, help='Width to paint across the passes [m].')
-@click.option('--length', 'length_m', type=float, help='Length of a pass [m]; default: the width.')
+@click.option('--width', 'width_m', type=NUMBER, help='Width to paint across the passes [m].')
+@click.option(
+    '--length', 'length_m', type=NUMBER, help='Length of a pass [m]; default: the width.'
+)
 @ONE_WAY
 @click.option(
     '--gun-turns', is_flag=True,
@@ -120,10 +119,7 @@ def calibrate(
 )  # fmt: skip
 @STANDOFF
 @TRAVEL
-@click.option(
-    '-o', '--output', default='.', type=click.Path(path_type=Path, file_okay=False),
-    help='Folder for recommendation.json and uniformity.png; default: here.',
-)  # fmt: skip
+@output_option('Folder for recommendation.json and uniformity.png; default: here.', default='.')
 @JSON
 def recommend(
     model_file: Path | None,
@@ -134,7 +130,7 @@ def recommend(
     **wanted: float | bool | None,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    from paint_deposition.formats.json_files import write_json
+    from paint_deposition.formats.json_files import json_text, write_json
     from paint_deposition.pictures.uniformity import write_uniformity
     from paint_deposition.planning import recommendation
     from paint_deposition.planning.index_request import Request
@@ -147,7 +143,7 @@ def recommend(
     write_json(files[0], answer.as_dict())
     write_uniformity(files[1], answer)
     if as_json:
-        click.echo(json.dumps(answer.as_dict(), indent=2))
+        click.echo(json_text(answer.as_dict()))
         return
     click.echo(answer.sentence)
     for minimum in answer.minima:
@@ -167,7 +163,7 @@ def recommend(
 
 
 @click.command('plan')
-@click.option('--mesh', required=True, type=click.Path(path_type=Path), help='STL, PLY or OBJ.')
+@click.option('--mesh', required=True, type=FILE, help='STL, PLY or OBJ.')
 @MODEL
 @SPEED
 @TARGET
@@ -175,7 +171,7 @@ def recommend(
     '--direction', default='horizontal', show_default=True,
     type=click.Choice(['horizontal', 'vertical']), help='How the passes run.',
 )  # fmt: skip
-@click.option('--index', 'index_m', type=float, help='Fixes the index [m]; default: most even.')
+@click.option('--index', 'index_m', type=NUMBER, help='Fixes the index [m]; default: most even.')
 @INDEX_MIN
 @INDEX_MAX
 @TOLERANCE
@@ -190,20 +186,15 @@ def recommend(
               type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
 @ONE_WAY
 @TRAVEL
-@click.option('--outward', nargs=3, type=float, metavar='X Y Z',
-              help='From the part to the gun; default: the mean normal of the mesh.')  # fmt: skip
-@click.option('--down', nargs=3, type=float, metavar='X Y Z',
-              help='Gravity in the mesh frame; default: -z, or -y for a lying part.')  # fmt: skip
-@click.option('--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-              help='Metres per unit of the mesh file.')  # fmt: skip
-@click.option('--max-edge-length-m', default=0.02, show_default=True, type=POSITIVE,
-              help='The mesh is refined to this.')  # fmt: skip
+@direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
+@direction_option('--down', 'Gravity in the mesh frame; default: -z, or -y for a lying part.')
+@mesh_scale_option()
+@max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
-@click.option(
-    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
-    help='Folder for the bag, passes.csv, passes.mod, plan.json and the film; older ones are '
-    'replaced.',
-)  # fmt: skip
+@output_option(
+    'Folder for the bag, passes.csv, passes.mod, plan.json and the film; older ones are replaced.',
+    required=True,
+)
 @JSON
 def plan(
     mesh: Path,

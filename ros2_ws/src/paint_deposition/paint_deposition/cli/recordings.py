@@ -2,46 +2,39 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import click
 from tqdm import tqdm
 
+from paint_deposition.cli.options import FILE, JSON, SHOW_PROGRESS_AFTER_S, max_pose_gap_option
 from paint_deposition.formats.bag_summary import BagSummary, summarise
+from paint_deposition.formats.json_files import json_text
 from paint_deposition.formats.mcap_recovery import Recovery, mcap_files, recover
-
-SHOW_PROGRESS_AFTER_S = 2.0
 
 
 @click.command('inspect')
-@click.argument('bag', type=click.Path(path_type=Path))
-@click.option(
-    '--max-pose-gap-s',
-    default=0.25,
-    show_default=True,
-    type=click.FloatRange(min=0.0, min_open=True),
-    help='Longest interval between poses that is no gap [s].',
-)
-@click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+@click.argument('bag', type=FILE)
+@max_pose_gap_option()
+@JSON
 def inspect_command(bag: Path, max_pose_gap_s: float, as_json: bool) -> None:
     """Show what BAG holds: topics, streams of poses and their gaps, triggers."""
     summary = summarise(bag, max_pose_gap_s)
     if as_json:
-        click.echo(json.dumps(summary.as_dict(), indent=2))
+        click.echo(json_text(summary.as_dict()))
     else:
         click.echo(_table(summary))
 
 
 @click.command('recover')
-@click.argument('run', type=click.Path(path_type=Path))
+@click.argument('run', type=FILE)
 @click.option(
     '-o',
     '--output',
-    type=click.Path(path_type=Path),
+    type=FILE,
     help='Folder to make; default: RUN with _recovered behind its name.',
 )
-@click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+@JSON
 def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.
 
@@ -49,7 +42,6 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     """
     output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
     size = sum(file.stat().st_size for file in mcap_files(run))
-    # The bar shows itself only for work that takes time, and never when piped.
     with tqdm(
         total=size,
         unit='B',
@@ -60,7 +52,7 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     ) as bar:
         recovery = recover(run, output, on_bytes=bar.update)
     if as_json:
-        click.echo(json.dumps(_figures(recovery), indent=2))
+        click.echo(json_text(_figures(recovery)))
         return
     for line in recovery.breaks:
         click.echo(line)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -13,6 +12,18 @@ from typing import TYPE_CHECKING, Any
 import click
 from tqdm import tqdm
 
+from paint_deposition.cli.options import (
+    FILE,
+    JSON,
+    NOT_NEGATIVE,
+    SHOW_PROGRESS_AFTER_S,
+    direction_option,
+    max_edge_length_option,
+    max_pose_gap_option,
+    mesh_scale_option,
+    model_option,
+    output_option,
+)
 from paint_deposition.errors import PaintError
 
 if TYPE_CHECKING:
@@ -26,10 +37,7 @@ if TYPE_CHECKING:
     from paint_deposition.motion.trajectory import PoseCounts
     from paint_deposition.part.surface import Surface
 
-POSITIVE = click.FloatRange(min=0.0, min_open=True)
-FILE = click.Path(path_type=Path)
 STAGES = ('loading', 'reading', 'refining the mesh', 'painting', 'writing', 'drawing')
-SHOW_PROGRESS_AFTER_S = 2.0
 
 
 @click.command('simulate')
@@ -38,13 +46,11 @@ SHOW_PROGRESS_AFTER_S = 2.0
     '--trajectory', required=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap.',
 )  # fmt: skip
-@click.option(
-    '--model', 'model_file', type=FILE, help='Deposition model, YAML; default: a 50 mm bell.'
+@model_option('Deposition model, YAML; default: a 50 mm bell.')
+@output_option(
+    'Folder for film.ply, film.csv, stats.json and film.png; older ones are replaced.',
+    required=True,
 )
-@click.option(
-    '-o', '--output', required=True, type=click.Path(path_type=Path, file_okay=False),
-    help='Folder for film.ply, film.csv, stats.json and film.png; older ones are replaced.',
-)  # fmt: skip
 @click.option(
     '--at', 'readings_file', type=FILE,
     help='Gauge readings, CSV: also write predicted.csv, their columns and predicted_um, what '
@@ -55,20 +61,16 @@ SHOW_PROGRESS_AFTER_S = 2.0
     '--state-topic',
     help='Trigger of the gun, AtomizerState or Bool; default: it sprays whenever poses flow.',
 )
-@click.option('--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-              help='Metres per unit of the mesh file; 0.001 for millimetres.')  # fmt: skip
-@click.option('--max-edge-length-m', default=0.01, show_default=True, type=POSITIVE,
-              help='Triangles are split until no edge is longer.')  # fmt: skip
-@click.option('--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
-              help='A longer time between poses is gun off.')  # fmt: skip
-@click.option(
-    '--down', nargs=3, type=float, metavar='X Y Z',
-    help='Gravity in the mesh frame; default: -z, or -y for a part that lies in x-y.',
-)  # fmt: skip
-@click.option('--target-um', default=0.0, type=click.FloatRange(min=0.0), help='Film wanted.')
-@click.option('--tolerance-um', default=0.0, type=click.FloatRange(min=0.0),
+@mesh_scale_option()
+@max_edge_length_option(0.01)
+@max_pose_gap_option()
+@direction_option(
+    '--down', 'Gravity in the mesh frame; default: -z, or -y for a part that lies in x-y.'
+)
+@click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
+@click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
-@click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+@JSON
 def simulate_command(
     mesh: Path,
     trajectory: Path,
@@ -90,14 +92,16 @@ def simulate_command(
     Nothing is written before everything is computed, and each file appears whole. film.csv and
     film.ply hold the film at the vertices of the refined mesh.
     """
-    gravity = _direction('--down', down)
     if tolerance_um and not target_um:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     with _progress() as (tell, advance):
         tell('loading')
+        import numpy as np
+
         from paint_deposition.film.statistics import film_statistics
         from paint_deposition.formats.bags import read_trajectory
         from paint_deposition.formats.film_files import write_film
+        from paint_deposition.formats.json_files import json_text
         from paint_deposition.formats.meshes import read_mesh
         from paint_deposition.formats.model_file import read_model
         from paint_deposition.formats.tables import read_readings, write_predictions
@@ -111,6 +115,7 @@ def simulate_command(
         path, counts = spray_path(recorded, max_pose_gap_s, model.max_step_m)
         _require_motion(trajectory, path, counts, max_pose_gap_s)
         tell('refining the mesh')
+        gravity = None if down is None else np.array(down)
         surface = read_mesh(mesh, mesh_scale, max_edge_length_m, gravity)
         surface = _toward_the_gun(surface, path)
         tell('painting')
@@ -146,20 +151,9 @@ def simulate_command(
     if statistics.coverage == 0.0:
         click.echo(f'warning: the part stays bare: {_why_bare(surface, path)}', err=True)
     if as_json:
-        click.echo(json.dumps(statistics.as_dict() | details, indent=2))
+        click.echo(json_text(statistics.as_dict() | details))
     else:
         _say(statistics, counts, files)
-
-
-def _direction(option: str, vector: tuple[float, float, float] | None) -> np.ndarray | None:
-    import numpy as np
-
-    if vector is None:
-        return None
-    direction = np.array(vector)
-    if not np.isfinite(direction).all() or not direction.any():
-        raise click.UsageError(f'{option} is {direction.tolist()}; give a direction, 0 0 -1 say')
-    return direction
 
 
 def _require_motion(

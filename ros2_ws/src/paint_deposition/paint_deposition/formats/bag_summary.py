@@ -9,6 +9,7 @@ import numpy as np
 
 from paint_deposition.formats.bag_files import BagTopic, open_bag
 from paint_deposition.formats.bags import BOOL_TYPE, POSE_TYPE, STATE_TYPE, read_trajectory
+from paint_deposition.motion.path_builder import gap_ns
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
 def _pose_stream(path: Path | str, topic: str, max_pose_gap_s: float) -> PoseStream:
     trajectory = read_trajectory(path, topic)
     steps_ns = np.diff(trajectory.stamps_ns)
-    gaps_ns = steps_ns[steps_ns > round(max_pose_gap_s * 1e9)]
+    gaps_ns = steps_ns[steps_ns > gap_ns(max_pose_gap_s)]
     duration_s = trajectory.duration_s
     return PoseStream(
         topic=topic,

@@ -45,7 +45,8 @@ def read_mesh(
     _require_positive('mesh_scale', scale, 'metres per unit of the file, 0.001 for millimetres')
     _require_positive('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance')
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
-        raise MeshError(f'down = {list(down)}; give the direction of gravity, [0, 0, -1] usually')
+        given = np.asarray(down, dtype=float).tolist()
+        raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
     vertices, faces = _load(path)
     vertices = vertices * scale
     _check_extent(path, vertices[faces.ravel()])

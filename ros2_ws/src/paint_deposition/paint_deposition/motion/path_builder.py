@@ -1,8 +1,11 @@
 """From a stream of poses to the spray path: the one integrator of live node and offline run."""
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
+from paint_deposition.errors import RecordingError
 from paint_deposition.motion import strokes
 from paint_deposition.motion.flow_schedule import FlowSchedule
 from paint_deposition.motion.motion_log import PoseBatch
@@ -13,6 +16,19 @@ from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
+# A century [ns]: no longer gap is told from it, and sums of stamps and gaps fit 64 bits.
+LONGEST_GAP_NS = 3_155_760_000_000_000_000
+
+
+def gap_ns(max_pose_gap_s: float) -> int:
+    """The longest interval between poses that is no gap [ns].
+
+    Raises:
+        RecordingError: it is no number above 0.
+    """
+    if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
+        raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
+    return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
 
 
 class PathBuilder:
@@ -27,6 +43,9 @@ class PathBuilder:
         max_step_m: longest travel of the spray in a sub-step [m].
         whole_strokes: hand out a stroke when it is complete, with what lies ahead of each
             sub-step known.
+
+    Raises:
+        RecordingError: ``max_pose_gap_s`` is no number above 0.
     """
 
     def __init__(
@@ -35,7 +54,7 @@ class PathBuilder:
         max_step_m: float = DEFAULT_MAX_STEP_M,
         whole_strokes: bool = False,
     ) -> None:
-        self.max_gap_ns = int(round(max_pose_gap_s * 1e9))
+        self.max_gap_ns = gap_ns(max_pose_gap_s)
         self.max_step_m = max_step_m
         self.whole_strokes = whole_strokes
         self._screen = PoseScreen(self.max_gap_ns)

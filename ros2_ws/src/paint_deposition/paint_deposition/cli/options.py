@@ -1,0 +1,87 @@
+"""What several commands take and show alike: numbers, options, when a bar appears."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+# A bar shows itself only for work that takes longer, and never when piped.
+SHOW_PROGRESS_AFTER_S = 2.0
+
+
+class Finite:
+    """Of a type of numbers those that are finite: `nan` and `inf` are numbers to Python."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        number = super().convert(value, param, ctx)  # type: ignore[misc]
+        if not math.isfinite(number):
+            raise click.BadParameter(f'{value} is not finite; give a number', ctx, param)
+        return number
+
+
+class FiniteNumber(Finite, click.types.FloatParamType):
+    """Any finite number."""
+
+
+class FiniteRange(Finite, click.FloatRange):
+    """A finite number within bounds."""
+
+
+NUMBER = FiniteNumber()
+POSITIVE = FiniteRange(min=0.0, min_open=True)
+NOT_NEGATIVE = FiniteRange(min=0.0)
+FILE = click.Path(path_type=Path)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+CAMPAIGN = click.argument('campaign', type=FILE)
+
+
+def model_option(text: str) -> Callable:
+    """The model that a command begins with."""
+    return click.option('--model', 'model_file', type=FILE, help=text)
+
+
+def output_option(text: str, **more: Any) -> Callable:
+    """The folder for a command's results."""
+    return click.option('-o', '--output', type=FOLDER, help=text, **more)
+
+
+def direction_option(name: str, text: str) -> Callable:
+    """A direction in space, three finite numbers that are not all zero, or None."""
+    return click.option(name, nargs=3, type=NUMBER, metavar='X Y Z', callback=_not_zero, help=text)
+
+
+def _not_zero(
+    ctx: click.Context, param: click.Parameter, vector: tuple[float, float, float] | None
+) -> tuple[float, float, float] | None:
+    if vector is not None and not any(vector):
+        raise click.BadParameter('0 0 0 is none; give a direction, 0 0 -1 say', ctx, param)
+    return vector
+
+
+def mesh_scale_option() -> Callable:
+    """Metres per unit of the mesh file."""
+    return click.option(
+        '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
+        help='Metres per unit of the mesh file; 0.001 for millimetres.',
+    )  # fmt: skip
+
+
+def max_edge_length_option(default_m: float) -> Callable:
+    """How fine the mesh is refined."""
+    return click.option(
+        '--max-edge-length-m', default=default_m, show_default=True, type=POSITIVE,
+        help='Triangles are split until no edge is longer.',
+    )  # fmt: skip
+
+
+def max_pose_gap_option() -> Callable:
+    """What counts as a gap between poses."""
+    return click.option(
+        '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
+        help='A longer time between poses is a gap: gun off.',
+    )  # fmt: skip
