@@ -105,6 +105,29 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     assert len(read_trajectory(tmp_path / 'run')) == 300
 
 
+def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(
+    ros_domain, ros_context, spin, wait_until, tmp_path
+):
+    films = tmp_path / 'films'
+    with NodeProcess(
+        tmp_path / 'simulator',
+        SIMULATOR,
+        mesh_file=write_panel(tmp_path / 'panel.stl'),
+        max_edge_length_m=0.004,
+        output_directory=films,
+    ) as simulator:
+        caller = Onlooker(ros_context, {})
+        spin(caller)
+        client = caller.create_client(SaveFilm, '/deposition_simulator/save_film')
+        wait_until(client.service_is_ready, timeout_s=40.0, what='the service')
+        client.call_async(SaveFilm.Request(name='film'))
+        wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')
+        simulator.interrupt_as_launch_does()
+        assert simulator.wait() == 0, simulator.err
+        assert 'Traceback' not in simulator.err
+    assert {path.name for path in films.iterdir()} == {'film.ply', 'film.csv', 'film.json'}
+
+
 def test_ctrl_c_while_a_model_is_compiled_ends_it_at_once(ros_domain, call, tmp_path):
     own = tmp_path / 'own.py'
     own.write_text(OWN_EFFECT.format(unique=time.time() * 1e-20))

@@ -69,6 +69,19 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
         assert stamp.sec * 1_000_000_000 + stamp.nanosec == MOTION.stamps_ns[-1]
 
 
+def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, executor,
+                                                         wait_until):  # fmt: skip
+    """One leaves and another comes between two publications: their number stays the same."""
+    simulator(publish_rate_hz=0.5)
+    topics = {'thickness/field': (ThicknessField, qos.RESULTS)}
+    first = onlooker(topics)
+    wait_until(lambda: first.heard['thickness/field'], what='the field')
+    executor.remove_node(first)
+    first.destroy_node()
+    second = onlooker(topics)
+    wait_until(lambda: second.heard['thickness/field'], what='the field')
+
+
 def test_bare_metal_is_grey_before_the_first_pose(simulator, onlooker, wait_until):
     simulator()
     viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})

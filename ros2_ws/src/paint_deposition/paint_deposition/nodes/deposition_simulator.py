@@ -68,7 +68,8 @@ class DepositionSimulator(PaintingNode):
         self._scale: ColourScale | None = None
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
-        self._listeners = 0
+        self._greeted = 0
+        self._saving: set[threading.Thread] = set()
         self._publish_s = 0.0
         self._diagnostics = Diagnostics(self, painting_tasks(self) | {'film': self._film_status})
         self.publish()
@@ -121,12 +122,12 @@ class DepositionSimulator(PaintingNode):
         began_s = time.monotonic()
         self.up_to_date()
         film = self.film.up_to_date()
-        listeners = sum(p.get_subscription_count() for p in self._outputs.values())
+        newcomers = self.watch.newcomers
         news = film is not self._shown
-        if news or listeners > self._listeners:
+        if news or newcomers > self._greeted:
             self._publish_film(film, with_latched=news)
             self._publish_s = time.monotonic() - began_s
-        self._shown, self._listeners = film, listeners
+        self._shown, self._greeted = film, newcomers
         self._publish_stats()
 
     def _publish_film(self, film: FilmIntegrator, with_latched: bool) -> None:
@@ -176,6 +177,10 @@ class DepositionSimulator(PaintingNode):
 
     # --- services
 
+    def close(self) -> None:
+        for thread in self._saving:
+            thread.join()
+
     def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         poses = self.film.counts.received
         self.reset()
@@ -202,7 +207,9 @@ class DepositionSimulator(PaintingNode):
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
         written.add_done_callback(lambda _: None)
-        threading.Thread(target=lambda: written.set_result(job()), daemon=True).start()
+        thread = threading.Thread(target=lambda: written.set_result(job()), name='saving')
+        self._saving = {thread, *(other for other in self._saving if other.is_alive())}
+        thread.start()
         outcome = await written
         if isinstance(outcome, Exception):
             response.message = str(outcome)

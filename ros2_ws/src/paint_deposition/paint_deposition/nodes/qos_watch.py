@@ -13,12 +13,14 @@ class QosWatch:
     Attributes:
         incompatible: by topic, what somebody there offers or asks for that does not fit.
         lost_messages: messages that the middleware says it lost.
+        newcomers: subscribers that the publishers have found so far, also those that left since.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
         self.incompatible: dict[str, str] = {}
         self.lost_messages = 0
+        self.newcomers = 0
 
     def subscription(self, topic: str) -> SubscriptionEventCallbacks:
         """Callbacks for a subscription."""
@@ -37,6 +39,7 @@ class QosWatch:
                 topic, f'a subscriber asks for more {self._policy(event)} than is offered'
             ),
             incompatible_type=lambda _: self._note(topic, 'a subscriber has another type'),
+            matched=self._count_newcomers,
         )
 
     @staticmethod
@@ -47,6 +50,9 @@ class QosWatch:
         if topic not in self.incompatible:
             self._node.get_logger().error(f'{topic}: {what}; they will not hear each other')
         self.incompatible[topic] = what
+
+    def _count_newcomers(self, event) -> None:
+        self.newcomers += event.total_count_change
 
     def _count_lost(self, event) -> None:
         self.lost_messages += event.total_count_change
