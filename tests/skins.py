@@ -1,6 +1,7 @@
 """Skins of known shape, triangulated as one likes."""
 
 from collections.abc import Callable
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial import Delaunay
@@ -58,3 +59,37 @@ def solid(
     return np.concatenate([vertices_m, inner]), np.concatenate(
         [faces, faces[:, ::-1] + count, rim]
     )
+
+
+def hemmed(
+    vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float, facets: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Close a sheet of ``triangulated`` as ``solid`` along y does, but with a round rim.
+
+    The round is a half circle as wide as the sheet is thick, cut into so many facets.
+    """
+    edges = Edges.of(faces).single
+    following = dict(
+        zip(faces.ravel()[edges], np.roll(faces, -1, axis=1).ravel()[edges], strict=True)
+    )
+    ring = [int(faces.ravel()[edges[0]])]
+    while len(ring) < len(following):
+        ring.append(int(following[ring[-1]]))
+    rim = vertices_m[ring]
+    aside = np.where(np.abs(rim) > np.abs(rim).max(axis=0) - 1e-9, np.sign(rim), 0.0)
+    aside[:, 1] = 0.0
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    count = len(vertices_m)
+    placed = [vertices_m, vertices_m + np.array([0.0, thickness_m, 0.0])]
+    rows = [np.array(ring)]
+    for angle in np.pi * np.arange(1, facets) / facets:
+        rows.append(2 * count + len(ring) * (len(rows) - 1) + np.arange(len(ring)))
+        back = np.array([0.0, 1.0 - np.cos(angle), 0.0])
+        placed.append(rim + 0.5 * thickness_m * (np.sin(angle) * aside + back))
+    rows.append(np.array(ring) + count)
+    triangles = [faces, faces[:, ::-1] + count]
+    for front, behind in pairwise(rows):
+        ahead, ahead_behind = np.roll(front, -1), np.roll(behind, -1)
+        triangles.append(np.stack([ahead, front, behind], axis=1))
+        triangles.append(np.stack([ahead, behind, ahead_behind], axis=1))
+    return np.concatenate(placed), np.concatenate(triangles)

@@ -11,7 +11,7 @@ from paint_deposition.model.projection import Projection
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from skins import solid, triangulated
+from skins import hemmed, solid, triangulated
 
 STANDOFF_M = 0.25
 SIDES = {'-y': 0.0, '+x': 90.0, '+y': 180.0, '-x': 270.0, 'askew': 205.0}
@@ -140,3 +140,36 @@ def test_a_fold_of_the_solid_is_still_curvature(lean_deg, fold):
     turn = np.trapezoid(across.curvature_per_m, z / np.cos(np.radians(lean_deg)))
     assert turn == pytest.approx(-2.0 * np.radians(lean_deg), rel=0.15)
     np.testing.assert_allclose(across.edge_distance_m, 0.2 - np.abs(z), atol=0.013)
+
+
+@pytest.mark.parametrize(
+    ('thickness_m', 'facets'), [(0.002, 6), (0.003, 2), (0.003, 4), (0.003, 12), (0.012, 8)]
+)
+def test_a_round_hem_is_an_edge_and_no_curvature(thickness_m, facets):
+    vertices, faces = triangulated(lambda x, z: 0.15 * x**2 + 0.1 * z**2, 0.015, jitter=0.2)
+    sheet = Surface.from_triangles(vertices, faces, 0.03)
+    shell = Surface.from_triangles(*hemmed(vertices, faces, thickness_m, facets), 0.03)
+    alone, there = on_both(sheet, shell)
+    np.testing.assert_allclose(there.normals, alone.normals, atol=1e-9)
+    np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)
+    assert_same_edge(there, alone)
+
+
+@pytest.mark.parametrize('turn_deg', [20.0, 40.0])
+@pytest.mark.parametrize('radius_m', [0.003, 0.01, 0.03])
+def test_a_rounded_line_across_the_door_is_no_hem(turn_deg, radius_m):
+    lean = np.radians(0.5 * turn_deg)
+    half_m = radius_m * np.sin(lean)
+    x = np.linspace(-0.2, 0.2, 5)
+    z = np.concatenate([np.linspace(-0.2, -half_m, 8), np.linspace(-half_m, half_m, 9)[1:-1],
+                        np.linspace(half_m, 0.2, 8)])  # fmt: skip
+    within = np.minimum(np.abs(z), half_m)
+    y = radius_m - np.sqrt(radius_m**2 - within**2) + (np.abs(z) - within) * np.tan(lean)
+    grid = np.arange(len(x) * len(z)).reshape(len(x), len(z))
+    a, b, c, d = grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:]
+    faces = np.concatenate([np.stack(t, 2).reshape(-1, 3) for t in ((a, b, c), (a, c, d))])
+    vertices = np.stack([np.repeat(x, len(z)), np.tile(y, len(x)), np.tile(z, len(x))], axis=1)
+    surface = Surface.from_triangles(vertices, faces, 0.02)
+    middle = surface.at([[0.0, 0.0, 0.0]])
+    assert middle.edge_distance_m[0] == pytest.approx(0.2, abs=1e-6)
+    assert middle.curvature_per_m[0] < -np.radians(turn_deg) / 0.06

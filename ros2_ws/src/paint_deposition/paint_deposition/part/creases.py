@@ -7,7 +7,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from paint_deposition.part.edge_distance import without_seams
-from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.hems import hem_folds
+from paint_deposition.part.refinement import face_areas_m2, face_normals
 
 # Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
 CREASE_RAD = np.radians(30.0)
@@ -61,15 +62,27 @@ def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.nda
     return np.where(convex, angle, -angle)
 
 
+def rim_folds(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
+    """(E,) bool: paired edges at which the skin ends by folding back, at once or in a hem."""
+    folds = folds_rad(vertices_m, faces, edges)
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    half_edge = edges.paired[:, 0]
+    ends = np.stack([vertices_m[start[half_edge]], vertices_m[end[half_edge]]], axis=1)
+    area = face_areas_m2(vertices_m, faces)[edges.paired // 3].min(axis=1)
+    width = 2.0 * area / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    return (folds >= RIM_FOLD_RAD) | hem_folds(ends, folds, width, RIM_FOLD_RAD)
+
+
 def split_at_creases(
-    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges
+    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, rim: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give each smooth patch its own vertices along creases.
+    """Give each smooth patch its own vertices along creases and (E,) ``rim_folds``.
 
     Returns:
         (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new vertices.
     """
-    smooth = edges.paired[np.abs(folds_rad(vertices_m, faces, edges)) <= CREASE_RAD]
+    sharp = np.abs(folds_rad(vertices_m, faces, edges)) > CREASE_RAD
+    smooth = edges.paired[~sharp & ~rim]
     one, other = smooth.T
     joined = np.concatenate(
         [np.stack([one, next_half_edge(other)]), np.stack([next_half_edge(one), other])], axis=1
@@ -82,13 +95,13 @@ def split_at_creases(
     return origin, label.reshape(-1, 3).astype(np.int64)
 
 
-def rim_segments_m(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
-    """(B, 2, 3) ends of the segments where the skin ends or folds back sharply [m]."""
-    folds = folds_rad(vertices_m, faces, edges)
+def rim_segments_m(
+    vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, rim: np.ndarray
+) -> np.ndarray:
+    """(B, 2, 3) ends of the segments where the skin ends or, at (E,) ``rim``, folds back [m]."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
 
     def segments(half_edges: np.ndarray) -> np.ndarray:
         return np.stack([vertices_m[start[half_edges]], vertices_m[end[half_edges]]], axis=1)
 
-    sharp = segments(edges.paired[folds >= RIM_FOLD_RAD, 0])
-    return np.concatenate([without_seams(segments(edges.single)), sharp])
+    return np.concatenate([without_seams(segments(edges.single)), segments(edges.paired[rim, 0])])

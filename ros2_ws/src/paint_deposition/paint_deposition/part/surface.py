@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.part import creases, curvature, edge_distance, slope
+from paint_deposition.part import creases, curvature, edge_distance, hems, slope
 from paint_deposition.part.locating import Location, SkinLocator
 from paint_deposition.part.normals import skin_normals
 from paint_deposition.part.orientation import gravity, outward_side
@@ -33,6 +33,7 @@ class Surface:
         notes: what had to be put right in the file, for the user to read.
         gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
             of a part whose skin has several, a closed body.
+        in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
     """
 
     vertices_m: np.ndarray
@@ -43,6 +44,7 @@ class Surface:
     rim_m: np.ndarray = field(default_factory=lambda: np.empty((0, 2, 3)))
     notes: tuple[str, ...] = ()
     gun_side: np.ndarray | None = None
+    in_hem: np.ndarray | None = None
 
     def __getstate__(self) -> dict[str, Any]:
         """What is kept of rays and searches stays behind: it can be made again."""
@@ -69,7 +71,9 @@ class Surface:
             MeshError: refinement would give too many triangles.
         """
         edges = creases.Edges.of(faces)
-        origin, patches = creases.split_at_creases(vertices_m, faces, edges)
+        rim = creases.rim_folds(vertices_m, faces, edges)
+        origin, patches = creases.split_at_creases(vertices_m, faces, edges, rim)
+        strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         vertices, normals, fine = refine(
             vertices_m[origin],
             skin_normals(vertices_m[origin], patches),
@@ -87,8 +91,9 @@ class Surface:
             normals,
             vertex_areas,
             down / np.linalg.norm(down),
-            creases.rim_segments_m(vertices_m, faces, edges),
+            creases.rim_segments_m(vertices_m, faces, edges, rim),
             notes,
+            in_hem=hems.carried_over(strip, fine, len(vertices)),
         )
 
     @property
@@ -195,13 +200,16 @@ class Surface:
     def _curvature_per_m(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         centre_normals = self.normals[self.faces].sum(axis=1)
         centre_normals /= np.linalg.norm(centre_normals, axis=1, keepdims=True)
-        areas = face_areas_m2(self.vertices_m, self.faces)
+        vertex_areas, areas = self.vertex_areas_m2, face_areas_m2(self.vertices_m, self.faces)
+        if self.in_hem is not None:
+            vertex_areas = vertex_areas * ~self.in_hem
+            areas = areas * ~self.in_hem[self.faces[:, 0]]
         return curvature.curvature_per_m(
             positions_m,
             normals,
             np.concatenate([self.vertices_m, self.vertices_m[self.faces].mean(axis=1)]),
             np.concatenate([self.normals, centre_normals]),
-            np.concatenate([self.vertex_areas_m2, areas]),
+            np.concatenate([vertex_areas, areas]),
             max(curvature.RADIUS_M, self.longest_edge_m),
         )
 
