@@ -13,6 +13,7 @@ from PIL import Image
 
 from paint_deposition.effects.air_drift import AirDrift
 from paint_deposition.inference.comparison import compare
+from paint_deposition.inference.diagnosis import ALPHA
 from paint_deposition.inference.next_experiment import Place, Spray
 from paint_deposition.inference.refit import refit
 from paint_deposition.inference.verdict import EffectClass, Interval
@@ -180,9 +181,10 @@ def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
     asked = replace(diagnosis.classes[0], probability=probability)
     write_report(
         tmp_path / 'report.html', diagnosis.study, models,
-        replace(diagnosis, verdict=verdict, classes=(asked,)),
+        replace(diagnosis, verdict=verdict, classes=(asked,), p_value=0.001),
     )  # fmt: skip
     text = page_of(tmp_path / 'report.html').text
+    assert 'run the diagnosis to find the cause' in text
     assert title in text
     assert 'Air drift was added with' in text
     assert 'no effect was added' not in text
@@ -206,7 +208,7 @@ def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnos
     ) in page_of(tmp_path / 'report.html').text
 
 
-def test_a_refit_tells_what_it_added_to_readings_that_lack_nothing(tmp_path):
+def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_path):
     campaign = small_campaign(tmp_path, truth=None, amplitude=None)
     done = refit(campaign, DepositionModel(), AirDrift)
     models = [(step.model, compare(done.study, step.model)) for step in done.history]
@@ -214,6 +216,7 @@ def test_a_refit_tells_what_it_added_to_readings_that_lack_nothing(tmp_path):
     assert [effect.id for effect in done.model.effects] == ['air_drift']
     text = page_of(tmp_path / 'report.html').text
     assert 'Added as asked' in text
+    assert ('run the diagnosis' in text) == (done.p_value < ALPHA)
     assert 'Air drift was added with' in text
     assert 'no effect was added' not in text
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from paint_deposition.inference.diagnosis import SURE
+from paint_deposition.inference.diagnosis import ALPHA, SURE
 from paint_deposition.pictures.report_data import ReportData
 from paint_deposition.pictures.report_tables import class_rows, effect_rows
 from paint_deposition.pictures.report_words import (
@@ -93,6 +93,8 @@ def _asked_for(data: ReportData):
         ('What it does', _costs(data)),
         ('What changes', _changes(data)),
     ]
+    if data.diagnosis.p_value < ALPHA:
+        facts.append(('What to do', 'Something is missing: run the diagnosis to find the cause.'))
     return 'open', 'Added as asked', title, facts
 
 
