@@ -5,12 +5,12 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
+from paint_deposition.colours.scales import BARE_RGB
 from paint_deposition.formats.residual_mesh import file_name, write_residual_meshes
 from paint_deposition.inference.comparison import compare
 from paint_deposition.inference.residual_field import point_residuals_um, radius_of_readings_m
 from paint_deposition.inference.study import Study
 from paint_deposition.model.deposition_model import DepositionModel
-from paint_deposition.pictures.colours import BARE_RGB
 from small_campaign import small_campaign
 
 

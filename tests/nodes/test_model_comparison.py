@@ -14,6 +14,7 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import Onlooker, offline_um, parameters, two_passes, write_panel
+from paint_deposition.colours.scales import BARE_RGB
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import PaintError
 from paint_deposition.film.deposition import FilmIntegrator
@@ -24,7 +25,6 @@ from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes import qos
 from paint_deposition.nodes.model_comparison import ModelComparison
-from paint_deposition.pictures.colours import BARE_RGB
 
 MOTION = two_passes()
 TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))

@@ -5,10 +5,10 @@ import pytest
 from matplotlib.image import imread
 
 from booth import door, painted, serpentine
+from paint_deposition.colours.scales import BARE_RGB
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.pictures.colours import BARE_RGB
 from paint_deposition.pictures.door import View, write_door_picture
 
 X, Y, Z = np.eye(3)

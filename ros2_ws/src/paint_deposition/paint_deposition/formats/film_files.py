@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.colours.scales import film_scale
 from paint_deposition.errors import PaintError
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.formats.atomic import replacing
 from paint_deposition.formats.json_files import write_json
 from paint_deposition.formats.meshes import write_mesh_ply
 from paint_deposition.part.surface import Surface
-from paint_deposition.pictures.colours import film_scale
 
 CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
 

@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
+from paint_deposition.colours.scales import residual_scale
 from paint_deposition.formats.atomic import replacing
 from paint_deposition.inference.comparison import Comparison
 from paint_deposition.inference.residual_field import point_residuals_um, spread_over_skin
 from paint_deposition.inference.study import Study
-from paint_deposition.pictures.colours import residual_scale
 
 
 def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparison) -> list[Path]:

@@ -18,6 +18,7 @@ from sensor_msgs.msg import PointCloud2
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
+from paint_deposition.colours.scales import ColourScale, film_scale
 from paint_deposition.errors import PaintError
 from paint_deposition.film.deposition import FilmIntegrator, Precision
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
@@ -33,7 +34,6 @@ from paint_deposition.nodes.simulator_parameters import SIMULATOR
 from paint_deposition.part.identity import mesh_id
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.pictures.colours import ColourScale, film_scale
 
 STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
 

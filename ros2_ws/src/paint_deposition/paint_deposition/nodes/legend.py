@@ -7,8 +7,8 @@ from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
+from paint_deposition.colours.scales import TABLE, ColourScale
 from paint_deposition.part.surface import Surface
-from paint_deposition.pictures.colours import TABLE, ColourScale
 
 STEPS = 64
 LABELS = 5

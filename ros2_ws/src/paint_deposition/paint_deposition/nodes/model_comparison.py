@@ -11,6 +11,7 @@ from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
+from paint_deposition.colours.scales import ColourScale, residual_scale
 from paint_deposition.errors import PaintError
 from paint_deposition.film.deposition import FilmIntegrator
 from paint_deposition.formats.tables import read_readings
@@ -30,7 +31,6 @@ from paint_deposition.nodes.parameters import NodeParameter
 from paint_deposition.nodes.shutdown import run_node
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.pictures.colours import ColourScale, residual_scale
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25

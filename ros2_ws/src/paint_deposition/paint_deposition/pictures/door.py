@@ -16,12 +16,12 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 
+from paint_deposition.colours.scales import BARE_RGB, TABLE, ColourScale, film_scale
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.pictures.chart import INK, MUTED, new_figure, save_png
-from paint_deposition.pictures.colours import BARE_RGB, TABLE, ColourScale, film_scale
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].
 PART_IN = (7.6, 7.6)

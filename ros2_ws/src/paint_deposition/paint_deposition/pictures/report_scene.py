@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.colours.scales import round_up
 from paint_deposition.inference.campaign import Experiment
 from paint_deposition.inference.residual_field import spread_over_skin
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.pictures.colours import round_up
 from paint_deposition.pictures.report_data import ReportData
 from paint_deposition.pictures.report_style import (
     ACCENT,

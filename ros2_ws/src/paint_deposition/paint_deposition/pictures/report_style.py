@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.pictures.colour_tables import COOLWARM, VIRIDIS
+from paint_deposition.colours.tables import COOLWARM, VIRIDIS
 
 INK = '#1f2933'
 MUTED = '#616e7c'

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.pictures.colour_tables import COOLWARM, VIRIDIS
+from paint_deposition.colours.tables import COOLWARM, VIRIDIS
 
 TABLE = 256
 # Rows of a palette behind the map's own colours.

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 
-from paint_deposition.pictures.colours import (
+from paint_deposition.colours.scales import (
     BARE_RGB,
     FILM_PALETTE,
     OVER_RGB,

@@ -1,0 +1,1 @@
+"""Film and residual as colours: in files, viewers and pictures alike."""
