@@ -19,8 +19,9 @@ from booth import (
     spot,
 )
 from paint_deposition.effects.base import Effect, PathContext, Ray
-from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, load_effect_file
+from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
 from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.effect_file import load_effect_file
 from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), load_effect_file(SAMPLES / 'my_effect.py')]

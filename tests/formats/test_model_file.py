@@ -9,8 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from booth import SAMPLES
-from paint_deposition.effects.catalogue import EFFECTS, load_effect_file
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
+from paint_deposition.formats.effect_file import load_effect_file
 from paint_deposition.formats.model_file import read_model, read_model_file, write_model
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern

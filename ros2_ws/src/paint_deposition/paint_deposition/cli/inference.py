@@ -173,7 +173,7 @@ def _start_or_default(campaign: Campaign, model_file: Path | None) -> ModelFile:
 
 
 def _own(files: tuple[Path, ...]) -> list[type[Effect]]:
-    from paint_deposition.effects.catalogue import load_effect_file
+    from paint_deposition.formats.effect_file import load_effect_file
 
     return [load_effect_file(file) for file in files]
 

@@ -1,14 +1,12 @@
-"""Every effect that the project knows, and how to take in one more."""
+"""Every effect that the project knows."""
 
 import difflib
 import importlib
 import pkgutil
-from pathlib import Path
 from types import MappingProxyType
 
 from paint_deposition import effects
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.own_effect import load_class
 from paint_deposition.errors import ModelError
 
 # In the order in which people look for causes.
@@ -48,19 +46,3 @@ def effect_class(effect_id: str) -> type[Effect]:
     near = difflib.get_close_matches(effect_id, EFFECTS, n=1, cutoff=0.4)
     remedy = f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(EFFECTS)}'
     raise ModelError(f'no effect is called {effect_id!r}; {remedy}')
-
-
-def load_effect_file(path: str | Path) -> type[Effect]:
-    """The class of a user's own effect: a Python file with one class derived from Effect.
-
-    The file is run: load only what you would run yourself.
-
-    Raises:
-        ModelError: the file cannot be run, its class is not sound, or its id is taken.
-    """
-    effect = load_class(Path(path))
-    if effect.id in EFFECTS:
-        raise ModelError(
-            f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
-        )
-    return effect

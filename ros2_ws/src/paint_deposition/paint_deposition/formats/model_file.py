@@ -9,9 +9,10 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import effect_class, load_effect_file
+from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.errors import ModelError
 from paint_deposition.formats.atomic import write_text
+from paint_deposition.formats.effect_file import load_effect_file
 from paint_deposition.formats.model_text import model_text
 from paint_deposition.formats.refusals import boolean_number, nearest, refusal
 from paint_deposition.formats.strict_yaml import load_yaml, yaml_problem

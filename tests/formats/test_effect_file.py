@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 from booth import MODEL, SAMPLES, painted, panel, path_of, serpentine, spot
-from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_effect_file
+from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.errors import ModelError
 from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.formats.effect_file import load_effect_file
 from reference import reference_film_um
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()

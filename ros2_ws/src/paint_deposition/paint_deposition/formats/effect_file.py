@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from paint_deposition.effects.base import Effect, PathContext, Ray
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
 from paint_deposition.film.laws import in_precision
 from paint_deposition.model.projection import Projection
@@ -29,12 +30,16 @@ TRIAL_RAY = Ray(*np.array([0.1, -0.05, 1.0, 0.825, 0.5], dtype=np.float32))
 _loaded: dict[tuple[Path, str], type[Effect]] = {}
 
 
-def load_class(path: Path) -> type[Effect]:
-    """Run a file and return its one effect class; the same class while the file is the same.
+def load_effect_file(path: str | Path) -> type[Effect]:
+    """The class of a user's own effect: a Python file with one class derived from Effect.
+
+    The same class while the file is the same. The file is run: load only what you would run
+    yourself.
 
     Raises:
-        ModelError: the file cannot be read or run, or does not hold one sound effect.
+        ModelError: the file cannot be read or run, its class is not sound, or its id is taken.
     """
+    path = Path(path)
     try:
         source = path.read_bytes()
     except OSError as error:
@@ -45,7 +50,12 @@ def load_class(path: Path) -> type[Effect]:
     if key not in _loaded:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
         _loaded[key].file = key[0]
-    return _loaded[key]
+    effect = _loaded[key]
+    if effect.id in EFFECTS:
+        raise ModelError(
+            f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
+        )
+    return effect
 
 
 def _run(path: Path, source: bytes, digest: str) -> ModuleType:
