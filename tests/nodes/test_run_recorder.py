@@ -333,6 +333,19 @@ def test_an_existing_run_is_not_overwritten(record, tmp_path):
 # --- as a process
 
 
+def test_a_run_that_is_taken_away_ends_the_recorder(ros_domain, wait_until, tmp_path):
+    run = tmp_path / 'run'
+    with NodeProcess(
+        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run'
+    ) as process:
+        wait_until(lambda: 'recording' in process.err, timeout_s=20.0, what='the recording')
+        shutil.rmtree(run)
+        wait_until(lambda: process.exit_code is not None, what='the end')
+        assert process.exit_code == 2
+        assert f'error: {run}/run_0.mcap: No such file or directory' in process.err
+        assert 'Traceback' not in process.err
+
+
 class RobotStream:
     """Publishes poses at 250 Hz from a timer, numbered by their stamps."""
 

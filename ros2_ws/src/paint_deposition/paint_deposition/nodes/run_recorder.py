@@ -164,9 +164,12 @@ class RunRecorder(PaintNode):
         try:
             step(*arguments)
         except RecordingError as error:
-            self._error = error
-            self.get_logger().error(str(error))
-            self.fail(error)
+            self._give_up(error)
+
+    def _give_up(self, error: RecordingError) -> None:
+        self._error = error
+        self.get_logger().error(str(error))
+        self.fail(error)
 
     def _report_progress(self) -> None:
         topic = self._topics.get(self._pose_topic)
@@ -206,7 +209,13 @@ class RunRecorder(PaintNode):
         return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self._run.folder}'
 
     def _status(self) -> Status:
-        free = shutil.disk_usage(self._run.folder).free
+        try:
+            size, free = self._run.bytes_written, shutil.disk_usage(self._run.folder).free
+        except OSError as error:
+            gone = f'{self._run.path}: {error.strerror}; nothing more can be recorded there'
+            if self._error is None:
+                self._give_up(RecordingError(gone))
+            return Status(ERROR, gone)
         counts = {name: topic.counts for name, topic in self._topics.items()}
         level, message = OK, 'recording'
         if self._error is not None:
@@ -219,7 +228,7 @@ class RunRecorder(PaintNode):
             level, message = WARN, 'messages were missed'
         values = {
             'run': self._run.folder,
-            'bytes': self._run.bytes_written,
+            'bytes': size,
             'disk free bytes': free,
             'longest pose gap s': max((c.longest_gap_ns for c in counts.values()), default=0)
             * 1e-9,
