@@ -26,7 +26,7 @@ COMMANDS = {
     'compare': ('inference', 'compare_command', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'diagnose_command', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'refit_command', 'Add an effect of your choice and fit anew.'),
-    'inspect': ('recordings', 'inspect_command', 'Show what a bag holds.'),
+    'inspect': ('recordings', 'inspect_command', 'Show what a bag or a RAPID module holds.'),
     'recover': ('recordings', 'recover_command', 'Make a whole bag of an unfinished run.'),
 }
 

@@ -63,6 +63,11 @@ def _not_zero(
     return vector
 
 
+GUN_SIGNAL = click.option(
+    '--gun-signal', help='Digital output that opens the gun, for a RAPID module that sets several.'
+)
+
+
 def mesh_scale_option() -> Callable:
     """Metres per unit of the mesh file."""
     return click.option(

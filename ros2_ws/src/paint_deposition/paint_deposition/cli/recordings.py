@@ -7,19 +7,40 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from paint_deposition.cli.options import FILE, JSON, SHOW_PROGRESS_AFTER_S, max_pose_gap_option
+from paint_deposition.cli.options import (
+    FILE,
+    GUN_SIGNAL,
+    JSON,
+    SHOW_PROGRESS_AFTER_S,
+    max_pose_gap_option,
+)
 from paint_deposition.formats.bag_summary import BagSummary, summarise
 from paint_deposition.formats.json_files import json_text
 from paint_deposition.formats.mcap_recovery import Recovery, mcap_files, recover
+from paint_deposition.formats.motion_files import refuse_gun_signal
+from paint_deposition.formats.rapid import read_program
+from paint_deposition.formats.rapid_motion import is_rapid, program_as_dict, program_as_text
 
 
 @click.command('inspect')
-@click.argument('bag', type=FILE)
+@click.argument('recording', type=FILE)
 @max_pose_gap_option()
+@GUN_SIGNAL
 @JSON
-def inspect_command(bag: Path, max_pose_gap_s: float, as_json: bool) -> None:
-    """Show what BAG holds: topics, streams of poses and their gaps, triggers."""
-    summary = summarise(bag, max_pose_gap_s)
+def inspect_command(
+    recording: Path, max_pose_gap_s: float, gun_signal: str | None, as_json: bool
+) -> None:
+    """Show what RECORDING holds.
+
+    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
+    targets, moves, speeds, where the gun is switched, and what could not be followed.
+    """
+    if is_rapid(recording):
+        program = read_program(recording, gun_signal=gun_signal)
+        click.echo(json_text(program_as_dict(program)) if as_json else program_as_text(program))
+        return
+    refuse_gun_signal(recording, gun_signal)
+    summary = summarise(recording, max_pose_gap_s)
     if as_json:
         click.echo(json_text(summary.as_dict()))
     else:

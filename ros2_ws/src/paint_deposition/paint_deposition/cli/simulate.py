@@ -14,6 +14,7 @@ from tqdm import tqdm
 
 from paint_deposition.cli.options import (
     FILE,
+    GUN_SIGNAL,
     JSON,
     NOT_NEGATIVE,
     SHOW_PROGRESS_AFTER_S,
@@ -44,7 +45,8 @@ STAGES = ('loading', 'reading', 'refining the mesh', 'painting', 'writing', 'dra
 @click.option('--mesh', required=True, type=FILE, help='The part: STL, PLY or OBJ.')
 @click.option(
     '--trajectory', required=True, type=FILE,
-    help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap.',
+    help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
+    'or a RAPID module, .mod or .prg, taken as programmed.',
 )  # fmt: skip
 @model_option('Deposition model, YAML; default: a 50 mm bell.')
 @output_option(
@@ -61,6 +63,7 @@ STAGES = ('loading', 'reading', 'refining the mesh', 'painting', 'writing', 'dra
     '--state-topic',
     help='Trigger of the gun, AtomizerState or Bool; default: it sprays whenever poses flow.',
 )
+@GUN_SIGNAL
 @mesh_scale_option()
 @max_edge_length_option(0.01)
 @max_pose_gap_option()
@@ -79,6 +82,7 @@ def simulate_command(
     readings_file: Path | None,
     pose_topic: str | None,
     state_topic: str | None,
+    gun_signal: str | None,
     mesh_scale: float,
     max_edge_length_m: float,
     max_pose_gap_s: float,
@@ -99,11 +103,11 @@ def simulate_command(
         import numpy as np
 
         from paint_deposition.film.statistics import film_statistics
-        from paint_deposition.formats.bags import read_trajectory
         from paint_deposition.formats.film_files import write_film
         from paint_deposition.formats.json_files import json_text
         from paint_deposition.formats.meshes import read_mesh
         from paint_deposition.formats.model_file import read_model
+        from paint_deposition.formats.motion_files import read_motion
         from paint_deposition.formats.tables import read_readings, write_predictions
         from paint_deposition.model.deposition_model import DepositionModel
         from paint_deposition.motion.path_builder import spray_path
@@ -111,7 +115,7 @@ def simulate_command(
         tell('reading')
         model = read_model(model_file) if model_file else DepositionModel()
         readings = read_readings(readings_file) if readings_file else None
-        recorded = read_trajectory(trajectory, pose_topic, state_topic)
+        recorded = read_motion(trajectory, pose_topic, state_topic, gun_signal)
         path, counts = spray_path(recorded, max_pose_gap_s, model.max_step_m)
         _require_motion(trajectory, path, counts, max_pose_gap_s)
         tell('refining the mesh')

@@ -61,9 +61,13 @@ class RapidMove:
 
 @dataclass
 class RapidProgram:
-    """Moves in the order they run, and what was left out or assumed, a line each."""
+    """Moves in the order they run, and what was left out or assumed, a line each.
+
+    ``gun_signal`` is the digital output that opens the gun, '' where none is set.
+    """
 
     module: str
+    gun_signal: str = ''
     moves: list[RapidMove] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -98,6 +102,7 @@ class _Run:
         self._data = RapidData(module, source)
         self._program = RapidProgram(module.name)
         self._signal = self._gun_signal(gun_signal)
+        self._program.gun_signal = self._signal or ''
         self._gun_on = False
         self._brush: float | None = None
         self._triggers: dict[str, GunSwitch] = {}
