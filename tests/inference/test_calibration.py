@@ -16,13 +16,13 @@ from inference.panels import (
     readings_at,
 )
 from paint_deposition.errors import ReadingsError
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
 from paint_deposition.formats.model_file import ModelFile, read_model_file
 from paint_deposition.inference.calibration import calibrate, predict, started_from
 from paint_deposition.inference.campaign import Campaign, Experiment
 from paint_deposition.inference.collapse_fit import fit_collapse
 from paint_deposition.inference.panel import Panel
-from paint_deposition.model.collapse import sampled_collapse
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path

@@ -11,7 +11,7 @@ from inference.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import PlanError
 from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.model.collapse import sampled_collapse
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.uniformity import Raster
@@ -205,6 +205,10 @@ def test_effects_on_the_finished_film_are_named_as_left_out():
         ({'index_min_m': 0.9}, 'is empty'),
         ({'index_min_m': 2.5, 'index_max_m': 3.0}, 'bare stripes'),
         ({'width_m': math.nan}, 'width_m is nan'),
+        ({'width_m': 1200.0}, 'width_m is 1200; give metres, 0 to 100'),
+        ({'length_m': 1200.0}, 'length_m is 1200; give metres, 0 to 100'),
+        ({'index_max_m': 800.0}, 'index_max_m is 800; give metres, 0.001 to 10'),
+        ({'index_min_m': 1e-5}, 'index_min_m is 1e-05; give metres, 0.001 to 10'),
     ],
 )
 def test_impossible_requests_say_why(what, words):

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.inference.campaign import Experiment
-from paint_deposition.model.collapse import collapse_um
 from paint_deposition.model.deposition_model import DepositionModel
 
 # A skin whose normals stay this close together is flat, and passes this parallel are parallel.

@@ -1,21 +1,19 @@
 """The 1D collapse: the film that one long straight pass leaves, across the direction of travel.
 
-Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians; ``collapse_um`` is
-the film that the 2D model, eqs. (1) and (2), leaves on a plane that the gun faces squarely.
+Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians. What the 2D model,
+eqs. (1) and (2), leaves on a plane that the gun faces squarely is in ``film/pass_film.py``.
 """
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.interpolate import CubicSpline
 
-from paint_deposition.errors import PlanError
 from paint_deposition.model.deposition_model import DepositionModel
-from paint_deposition.model.pass_film import pass_film_um
 from paint_deposition.model.pattern import PlanarPattern
 
 # Film below this share of the peak is left out of sums over passes.
@@ -23,10 +21,6 @@ NEGLIGIBLE = 1e-9
 # Nodes of the line integral in the narrower standard deviation: trapezoids of a Gaussian with
 # three of them are exact to 1e-15.
 NODES_PER_SIGMA = 4.0
-SAMPLES_PER_SIGMA = 16.0
-FEWEST_SAMPLES, MOST_SAMPLES = 257, 4097
-# Where the asymmetry f turns over, at the centre, samples close in by halves this many times.
-HALVINGS = 16
 HALF_WIDTH_POINTS = 4001
 
 
@@ -189,51 +183,6 @@ def nominal_standoff_m(model: DepositionModel) -> float:
     return model.projection.model_plane_m - model.projection.emission_offset_m
 
 
-def collapse_um(
-    model: DepositionModel,
-    x_m: np.ndarray,
-    speed_m_per_s: float,
-    standoff_m: float | None = None,
-    travel_rad: float = 0.0,
-    backwards: bool = False,
-    turned: bool = False,
-) -> np.ndarray:
-    """Film of one long pass over a plane that the gun faces squarely, good to 1e-6 of its peak.
-
-    The x axis is fixed in space: tool z times forward travel, to its right as the gun sees it.
-    A gun that keeps its orientation lays the same profile both ways; one that is turned with the
-    travel lays the mirrored one.
-
-    Args:
-        model: effects on the path and along the rays count; the plane is a standing panel,
-            travel is level and x points up. Effects on the finished film are left out.
-        x_m: (N,) distances from the gun's line [m].
-        speed_m_per_s: of the gun along its line [m/s].
-        standoff_m: TCP to plane [m]; default: where the plane is the model plane.
-        travel_rad: direction of forward travel in the tool's x-y frame, from x to y [rad].
-        backwards: the pass runs the other way.
-        turned: the gun is turned by half a turn about its axis.
-
-    Returns:
-        (N,) film [um].
-
-    Raises:
-        PlanError: speed or standoff is not above zero.
-    """
-    standoff = nominal_standoff_m(model) if standoff_m is None else standoff_m
-    for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
-        if not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f'{name} is {value:g}; give a number above 0')
-    x = np.asarray(x_m, dtype=float)
-    if model.effects:
-        way = -1.0 if backwards else 1.0
-        roll = travel_rad + (math.pi if turned else 0.0)
-        return pass_film_um(model, x, way * speed_m_per_s, standoff, roll)
-    shrinking = model.projection.model_plane_m / (standoff + model.projection.emission_offset_m)
-    across = -shrinking * x if turned else shrinking * x
-    return shrinking / speed_m_per_s * line_integral_um_m_per_s(model.planar, across, travel_rad)
-
-
 def line_integral_um_m_per_s(
     planar: PlanarPattern, across_m: np.ndarray, travel_rad: float = 0.0
 ) -> np.ndarray:
@@ -279,19 +228,3 @@ def _ring_over_radius(p: PlanarPattern, across: np.ndarray, far: float) -> np.nd
 def _even_sum(values: np.ndarray, step: float) -> np.ndarray:
     """Trapezoids over the whole line for an even function sampled from 0 on, last axis."""
     return step * (2.0 * values.sum(axis=-1) - values[..., 0])
-
-
-def sampled_collapse(
-    model: DepositionModel, speed_m_per_s: float, **options: Any
-) -> SampledCollapse:
-    """``collapse_um`` sampled finely enough for sums over passes; options as there."""
-    standoff = options.get('standoff_m') or nominal_standoff_m(model)
-    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
-    widening = max((standoff + offset) / omega, 1e-6)
-    reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
-    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
-    count = math.ceil(2.0 * reach / finest * SAMPLES_PER_SIGMA)
-    x = np.linspace(-reach, reach, min(max(count, FEWEST_SAMPLES), MOST_SAMPLES) | 1)
-    close = (x[1] - x[0]) * 0.5 ** np.arange(1, HALVINGS)
-    x = np.sort(np.concatenate([x, close, -close]))
-    return SampledCollapse(x, collapse_um(model, x, speed_m_per_s, **options), finest)

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.calibration import Calibration, PanelFit
 from paint_deposition.inference.panel import Panel
 from paint_deposition.inference.study import Study
-from paint_deposition.model.collapse import sampled_collapse
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.pictures.chart import MODEL, MUTED, new_figure, quiet, save_png
 from paint_deposition.pictures.uniformity import Profile, write_collapse, write_profiles

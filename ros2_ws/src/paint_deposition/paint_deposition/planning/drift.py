@@ -3,9 +3,9 @@
 from dataclasses import replace
 
 from paint_deposition.model.deposition_model import DepositionModel
-from paint_deposition.model.pass_setup import PassSetup
 from paint_deposition.model.uniformity import Raster
 from paint_deposition.planning.index_search import farthest_within
+from paint_deposition.planning.pass_setup import PassSetup
 
 # Drift is followed as far as these shares of the right value.
 LEAST, MOST = 0.4, 1.8

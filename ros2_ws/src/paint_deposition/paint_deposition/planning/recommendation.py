@@ -9,7 +9,6 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.errors import PlanError
 from paint_deposition.model.collapse import Collapse, half_width_m, nominal_standoff_m
 from paint_deposition.model.deposition_model import DepositionModel
-from paint_deposition.model.pass_setup import PassSetup
 from paint_deposition.model.uniformity import Raster
 from paint_deposition.planning.drift import index_drift_m, standoff_drift_m
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
@@ -19,6 +18,7 @@ from paint_deposition.planning.pass_count import (
     passes_to_cover,
     variation_over_width,
 )
+from paint_deposition.planning.pass_setup import PassSetup
 
 # Film below this share of the mean, between passes, is a bare stripe.
 BARE = 0.01

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.model.collapse import sampled_collapse
+from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.uniformity import Raster
 

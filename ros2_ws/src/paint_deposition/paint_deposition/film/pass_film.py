@@ -1,0 +1,157 @@
+"""The film that one long straight pass leaves on a plane, across the direction of travel."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import PlanError
+from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.model.collapse import (
+    NEGLIGIBLE,
+    SampledCollapse,
+    line_integral_um_m_per_s,
+    nominal_standoff_m,
+)
+from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+
+# A standing panel, the gun on its +y side: forward travel is level, x of a profile points up.
+TRAVEL = np.array([1.0, 0.0, 0.0])
+ACROSS = np.array([0.0, 0.0, 1.0])
+OUTWARD = np.array([0.0, 1.0, 0.0])
+# Sub-steps grow from this length at the line's middle, where eq. (1) is not smooth [m].
+FINEST_STEP_M = 2e-5
+STEPS_PER_SIGMA = 5.0
+SAMPLES_PER_SIGMA = 16.0
+FEWEST_SAMPLES, MOST_SAMPLES = 257, 4097
+# Where the asymmetry f turns over, at the centre, samples close in by halves this many times.
+HALVINGS = 16
+
+
+def collapse_um(
+    model: DepositionModel,
+    x_m: np.ndarray,
+    speed_m_per_s: float,
+    standoff_m: float | None = None,
+    travel_rad: float = 0.0,
+    backwards: bool = False,
+    turned: bool = False,
+) -> np.ndarray:
+    """Film of one long pass over a plane that the gun faces squarely, good to 1e-6 of its peak.
+
+    The x axis is fixed in space: tool z times forward travel, to its right as the gun sees it.
+    A gun that keeps its orientation lays the same profile both ways; one that is turned with the
+    travel lays the mirrored one.
+
+    Args:
+        model: effects on the path and along the rays count; the plane is a standing panel,
+            travel is level and x points up. Effects on the finished film are left out.
+        x_m: (N,) distances from the gun's line [m].
+        speed_m_per_s: of the gun along its line [m/s].
+        standoff_m: TCP to plane [m]; default: where the plane is the model plane.
+        travel_rad: direction of forward travel in the tool's x-y frame, from x to y [rad].
+        backwards: the pass runs the other way.
+        turned: the gun is turned by half a turn about its axis.
+
+    Returns:
+        (N,) film [um].
+
+    Raises:
+        PlanError: speed or standoff is not above zero.
+    """
+    standoff = nominal_standoff_m(model) if standoff_m is None else standoff_m
+    for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f'{name} is {value:g}; give a number above 0')
+    x = np.asarray(x_m, dtype=float)
+    if model.effects:
+        way = -1.0 if backwards else 1.0
+        roll = travel_rad + (math.pi if turned else 0.0)
+        return pass_film_um(model, x, way * speed_m_per_s, standoff, roll)
+    shrinking = model.projection.model_plane_m / (standoff + model.projection.emission_offset_m)
+    across = -shrinking * x if turned else shrinking * x
+    return shrinking / speed_m_per_s * line_integral_um_m_per_s(model.planar, across, travel_rad)
+
+
+def sampled_collapse(
+    model: DepositionModel, speed_m_per_s: float, **options: Any
+) -> SampledCollapse:
+    """``collapse_um`` sampled finely enough for sums over passes; options as there."""
+    standoff = options.get('standoff_m') or nominal_standoff_m(model)
+    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
+    widening = max((standoff + offset) / omega, 1e-6)
+    reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    count = math.ceil(2.0 * reach / finest * SAMPLES_PER_SIGMA)
+    x = np.linspace(-reach, reach, min(max(count, FEWEST_SAMPLES), MOST_SAMPLES) | 1)
+    close = (x[1] - x[0]) * 0.5 ** np.arange(1, HALVINGS)
+    x = np.sort(np.concatenate([x, close, -close]))
+    return SampledCollapse(x, collapse_um(model, x, speed_m_per_s, **options), finest)
+
+
+def pass_film_um(
+    model: DepositionModel,
+    x_m: np.ndarray,
+    velocity_m_per_s: float,
+    standoff_m: float,
+    roll_rad: float,
+) -> np.ndarray:
+    """Film [um] across the pass, through the same integrator as every other film.
+
+    Args:
+        model: the deposition model; its effects on the finished film are left out.
+        x_m: (N,) distances from the gun's line [m].
+        velocity_m_per_s: of the gun along the line, negative backwards [m/s].
+        standoff_m: TCP to plane [m].
+        roll_rad: direction of forward travel in the tool's x-y frame [rad].
+    """
+    x = np.atleast_1d(x_m)
+    points = SurfacePoints(x[:, None] * ACROSS, np.tile(OUTWARD, (len(x), 1)))
+    integrator = FilmIntegrator(points, model, precision='double')
+    integrator.add(_straight_pass(model, velocity_m_per_s, standoff_m, roll_rad))
+    return integrator.raw_um.reshape(np.shape(x_m))
+
+
+def _straight_pass(
+    model: DepositionModel, velocity_m_per_s: float, standoff_m: float, roll_rad: float
+) -> SprayPath:
+    along, length = _graded_steps(model, standoff_m)
+    count = len(along)
+    speed = abs(velocity_m_per_s)
+    way = math.copysign(1.0, velocity_m_per_s)
+    cos, sin = math.cos(roll_rad), math.sin(roll_rad)
+    tool = np.stack([cos * TRAVEL - sin * ACROSS, sin * TRAVEL + cos * ACROSS, -OUTWARD], axis=1)
+    time_s = along / speed
+    never = np.full(count, np.inf)
+    return SprayPath(
+        stamp_ns=np.round(time_s * 1e9).astype(np.int64),
+        dwell_s=length / speed,
+        flow=np.ones(count),
+        position_m=standoff_m * OUTWARD + way * along[:, None] * TRAVEL,
+        rotation=np.tile(tool, (count, 1, 1)),
+        velocity_m_per_s=np.tile(velocity_m_per_s * TRAVEL, (count, 1)),
+        pattern_shift_m=np.zeros((count, 2)),
+        stroke=np.zeros(count, dtype=np.int64),
+        spray_pass=np.zeros(count, dtype=np.int64),
+        open_flow=np.ones(count),
+        since_on_s=never,
+        since_off_s=never,
+        until_on_s=never,
+        until_off_s=never,
+        from_turn_m=never,
+        to_turn_m=never,
+    )
+
+
+def _graded_steps(model: DepositionModel, standoff_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u)."""
+    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
+    widening = (standoff_m + offset) / omega
+    far = 1.5 * model.reach_m * widening
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    u_far = math.asinh(far / FINEST_STEP_M)
+    half = math.ceil(u_far * STEPS_PER_SIGMA * far / finest)
+    u, step = np.linspace(-u_far, u_far, 2 * half, retstep=True)
+    return FINEST_STEP_M * np.sinh(u), FINEST_STEP_M * np.cosh(u) * step

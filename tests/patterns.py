@@ -1,0 +1,11 @@
+"""Patterns that try out one thing each."""
+
+from paint_deposition.model.pattern import PlanarPattern
+
+RING = PlanarPattern(K2=0.15, K3=0.3, phi_rad=0.7, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15)
+PATTERNS = {
+    'ring': RING,
+    'default': PlanarPattern(),
+    'volcano without a hole': PlanarPattern(r_m=0.0, K3=0.9, sigma1_m=0.1),
+    'thin ring': PlanarPattern(r_m=0.3, sigma1_m=0.015, K2=0.4, sigma2_m=0.03),
+}
