@@ -10,6 +10,14 @@ USUAL_RANGE_M = (0.2, 0.8)
 USUAL_HALF_WIDTHS_M = (0.25, 0.75)
 RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
 FASTEST_M_PER_S = 3.0
+# Beyond, a length is in other units; the search would be too coarse or the passes too many.
+INDEX_LIMITS_M = (0.001, 10.0)
+LIMITS_M = {
+    'index_min_m': INDEX_LIMITS_M,
+    'index_max_m': INDEX_LIMITS_M,
+    'width_m': (0.0, 100.0),
+    'length_m': (0.0, 100.0),
+}
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,10 @@ class Request:
                 continue
             if not (math.isfinite(value) and value > 0.0):
                 raise PlanError(f'{name} is {value:g}; give a number above 0, or leave it out')
+        for name, (low, high) in LIMITS_M.items():
+            value = getattr(self, name)
+            if value is not None and not low <= value <= high:
+                raise PlanError(f'{name} is {value:g}; give metres, {low:g} to {high:g}')
         if not math.isfinite(self.travel_rad):
             raise PlanError(f'travel_rad is {self.travel_rad}; give an angle')
         if self.speed_m_per_s is None and self.target_um is None:
