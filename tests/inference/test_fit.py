@@ -162,9 +162,10 @@ def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
     study = Study.of(Campaign(parts))
     sigma = study.sigma_um[:18]
     level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
-    none = np.zeros(18)
-    assert study.levels[:18] == pytest.approx(np.column_stack([level, none, zero, none]))
-    assert study.levels[18:, [0, 2]] == pytest.approx(0.0)
+    here = np.column_stack([level, -level, zero, -zero]) / 2.0
+    assert study.levels[:18] == pytest.approx(here)
+    film = study.measured_um * study.sigma_um
+    assert (film @ study.levels[:, :2]).sum() == pytest.approx(0.0)
     patches, bands = study.patches(), study.bands(TRUTH)
     for blocks in (patches, bands):
         assert set(blocks[:18]).isdisjoint(blocks[18:])

@@ -137,12 +137,13 @@ class Study:
     def levels(self) -> np.ndarray | None:
         """(P, 2 E) each part's own level, and its gauge's own zero, over the noise.
 
-        None with one part, where K1 and the effects on the gauge stand for them.
+        Only as far as parts differ from each other: what they have in common is for K1 and the
+        effects to explain. None with one part.
         """
         parts = len(self.campaign.experiments)
         if parts == 1:
             return None
-        own = self.experiment_of[:, np.newaxis] == np.arange(parts)
+        own = (self.experiment_of[:, np.newaxis] == np.arange(parts)) - 1.0 / parts
         sizes_um = LEVEL_SHARE * self.measured_um, np.full(len(self), SESSION_UM)
         return np.hstack([own * (size / self.sigma_um)[:, np.newaxis] for size in sizes_um])
 
