@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion import strokes
 from paint_deposition.motion.flow_schedule import FlowSchedule
+from paint_deposition.motion.look_ahead import look_ahead
 from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.screening import PoseScreen
@@ -202,7 +203,7 @@ class PathBuilder:
         stroke = path.stroke
         ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
         # The last stroke's end shows with the first row of the next, which the look ahead needs.
-        until_on, until_off, to_turn = strokes.look_ahead(
+        until_on, until_off, to_turn = look_ahead(
             stroke,
             path.velocity_m_per_s,
             path.dwell_s,
