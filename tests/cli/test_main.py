@@ -76,6 +76,8 @@ def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
         [*COMMAND, 'simulate', '--mesh', 'door.stl', '--trajectory', 'bag', '--at', str(pipe),
          '-o', str(tmp_path / 'out')],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=environment(),
+        # A shell starts what runs in its background deaf to interrupts, and so are its children.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     with pipe.open('w'):  # opens once the command reads
         process.send_signal(signal.SIGINT)
