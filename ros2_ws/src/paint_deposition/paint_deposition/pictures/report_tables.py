@@ -4,12 +4,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from scipy.stats import t as student
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.inference.estimates import estimates
 from paint_deposition.inference.unknowns import PATTERN_NAMES
 from paint_deposition.pictures.report_data import ReportData
-from paint_deposition.pictures.report_style import TWO_SIDED_95
 from paint_deposition.pictures.report_words import (
     SYMBOLS,
     effect_class_of,
@@ -21,8 +20,6 @@ from paint_deposition.pictures.report_words import (
     percent_words,
     step_words,
 )
-
-DRAWS = 400
 
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -96,25 +93,9 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
 
 
 def _pattern_intervals(data: ReportData) -> dict[str, tuple[float, float]]:
-    """Quantiles over draws from the fit's covariance, inside the bounds."""
     if data.diagnosis is None:
         return {}
-    fit = data.diagnosis.history[-1].fit
-    freedom = min(data.study.noise.degrees_of_freedom, 1e6)
-    wider = float(student.ppf(0.975, freedom)) / TWO_SIDED_95
-    covariance = wider**2 * fit.covariance
-    draws = np.random.default_rng(0).multivariate_normal(fit.vector, covariance, DRAWS)
-    low, high = fit.unknowns.bounds
-    patterns = [fit.unknowns.decode(v).planar for v in np.clip(draws, low, high)]
-    found = {}
-    for name in PATTERN_NAMES:
-        values = np.array([getattr(p, name) for p in patterns])
-        if name == 'phi_rad':
-            centre = getattr(fit.model.planar, name)
-            values = centre + np.remainder(values - centre + np.pi, 2.0 * np.pi) - np.pi
-        first, last = np.quantile(values, [0.025, 0.975])
-        found[name] = float(first), float(last)
-    return found
+    return {e.name: (e.low, e.high) for e in estimates(data.diagnosis.history[-1].fit)}
 
 
 def effect_rows(data: ReportData) -> list[dict[str, Any]]:
