@@ -144,7 +144,8 @@ def simulate_command(
             'notes': [*surface.notes, *recorded.notes],
         }
         tell('writing')
-        files = write_film(output, surface, film_um, statistics, details=details, overwrite=True)
+        film = write_film(output, surface, film_um, statistics, details=details, overwrite=True)
+        files = [output / file.name for file in film]
         if readings_file is not None:
             files.append(output / 'predicted.csv')
             write_predictions(files[-1], readings_file, predicted_um)

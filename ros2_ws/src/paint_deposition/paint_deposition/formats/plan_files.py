@@ -58,6 +58,7 @@ def write_plan(
             f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'
         ) from None
     film = write_film(folder, surface, plan.film_um, plan.statistics, overwrite=True)
+    film = [folder / file.name for file in film]
     return [folder / 'plan.json', *written, *film]
 
 
