@@ -6,13 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.formats.bags import read_trajectory
 from paint_deposition.formats.meshes import read_mesh
 from paint_deposition.formats.refusals import nearest
-from paint_deposition.formats.strict_yaml import load_yaml, yaml_problem
+from paint_deposition.formats.strict_yaml import read_yaml
 from paint_deposition.formats.tables import read_readings
 from paint_deposition.inference.campaign import Campaign, Experiment
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
@@ -84,14 +83,7 @@ def _read_experiment(
 
 
 def _load(path: Path) -> dict[str, Any]:
-    try:
-        content = load_yaml(path.read_text(encoding='utf-8'))
-    except FileNotFoundError:
-        raise ReadingsError(f'{path}: no such file; give a campaign YAML') from None
-    except OSError as error:
-        raise ReadingsError(f'{path}: cannot be read ({error.strerror})') from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ReadingsError(f'{path}: cannot be read as YAML ({yaml_problem(error)})') from None
+    content = read_yaml(path, 'campaign', ReadingsError)
     if not isinstance(content, dict):
         raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
     return content

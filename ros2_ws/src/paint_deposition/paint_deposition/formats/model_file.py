@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-import yaml
 from pydantic import BaseModel, ValidationError
 
 from paint_deposition.effects.base import Effect
@@ -15,7 +14,7 @@ from paint_deposition.formats.atomic import write_text
 from paint_deposition.formats.effect_file import load_effect_file
 from paint_deposition.formats.model_text import model_text
 from paint_deposition.formats.refusals import boolean_number, nearest, refusal
-from paint_deposition.formats.strict_yaml import load_yaml, yaml_problem
+from paint_deposition.formats.strict_yaml import read_yaml
 from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
@@ -63,14 +62,7 @@ def read_model_file(path: str | Path) -> ModelFile:
         ModelError: naming the file, the key, its value and the remedy.
     """
     path = Path(path)
-    try:
-        content = load_yaml(path.read_text(encoding='utf-8'))
-    except FileNotFoundError:
-        raise ModelError(f'{path}: no such file; give a model YAML') from None
-    except OSError as error:
-        raise ModelError(f'{path}: cannot be read ({error.strerror})') from None
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ModelError(f'{path}: cannot be read as YAML ({yaml_problem(error)})') from None
+    content = read_yaml(path, 'model', ModelError)
     if not isinstance(content, dict):
         raise ModelError(f'{path}: holds no model; expected the keys planar and projection')
     try:

@@ -1,8 +1,11 @@
 """YAML in which a key may not be given twice."""
 
+from pathlib import Path
 from typing import Any
 
 import yaml
+
+from paint_deposition.errors import PaintError
 
 
 class _StrictLoader(yaml.SafeLoader):
@@ -28,16 +31,29 @@ def _mapping(loader: _StrictLoader, node: yaml.MappingNode) -> dict[Any, Any]:
 _StrictLoader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _mapping)
 
 
-def load_yaml(text: str) -> Any:
-    """Parse one document.
+def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
+    """The one document of a file.
+
+    Args:
+        path: of the file.
+        kind: what it should be, for the remedy.
+        refusal: error to raise.
 
     Raises:
-        yaml.YAMLError: it is not YAML, or gives a key twice.
+        PaintError: of the class given; the file is not there, cannot be read, is no YAML, or gives
+            a key twice.
     """
-    return yaml.load(text, _StrictLoader)
+    try:
+        return yaml.load(path.read_text(encoding='utf-8'), _StrictLoader)
+    except FileNotFoundError:
+        raise refusal(f'{path}: no such file; give a {kind} YAML') from None
+    except OSError as error:
+        raise refusal(f'{path}: cannot be read ({error.strerror})') from None
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise refusal(f'{path}: cannot be read as YAML ({_problem(error)})') from None
 
 
-def yaml_problem(error: Exception) -> str:
+def _problem(error: Exception) -> str:
     """Where and what is wrong, in one line."""
     mark = getattr(error, 'problem_mark', None)
     if mark is None:

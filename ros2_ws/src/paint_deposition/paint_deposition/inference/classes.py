@@ -127,7 +127,7 @@ def _refit(study: Study, judged: Judgement) -> tuple[np.ndarray, dict[int, Fit]]
 def _alone(hypotheses: list[Hypothesis], factors: np.ndarray) -> dict[str, int]:
     """Number of the best hypothesis of each effect alone, best effect first."""
     found: dict[str, int] = {}
-    for k in np.argsort(-factors):
+    for k in np.argsort(-factors, kind='stable'):
         if _is_single(hypotheses[k]):
             found.setdefault(hypotheses[k].effects[0], int(k))
     return found
@@ -199,18 +199,14 @@ def _log_evidence(fit: Fit, freedom: float) -> float:
 
 def alike(judged: Judgement, ordered: list[str]) -> tuple[str, ...]:
     """The first effect and those that could have left the same mark on these readings."""
-    best: dict[str, tuple[Hypothesis, float]] = {}
-    for h, factor in zip(judged.weighing.hypotheses, judged.weighing.log_factors, strict=True):
-        if _is_single(h):
-            known = best.get(h.effects[0])
-            if known is None or factor > known[1]:
-                best[h.effects[0]] = (h, factor)
-    first = best[ordered[0]][0]
+    hypotheses = judged.weighing.hypotheses
+    best = _alone(hypotheses, judged.weighing.log_factors)
+    first = hypotheses[best[ordered[0]]]
     mark = first.columns @ Judge(first).amplitudes(judged.base.deviation)
     length = np.linalg.norm(mark)
     members = [ordered[0]]
     for effect_id in ordered[1:]:
-        other = best[effect_id][0]
+        other = hypotheses[best[effect_id]]
         limits = _mark(judged, other, effect_id)
         low, high = np.maximum(limits.low, -PLAUSIBLE), np.minimum(limits.high, PLAUSIBLE)
         solved = lsq_linear(other.columns, mark, bounds=(low, high)).x

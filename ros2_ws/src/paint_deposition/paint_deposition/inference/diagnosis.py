@@ -85,7 +85,7 @@ def diagnose(
         if judged.weighing.p_value < ALPHA:
             progress('refitting with the most probable effects')
             ranking = rank(study, judged)
-        best = _to_add(study, fit, ranking) if len(accepted) < MOST_EFFECTS else None
+        best = _to_add(study, history[-1].fit, ranking) if len(accepted) < MOST_EFFECTS else None
         if best is None:
             break
         history.append(Step.of(study, best.best, study.plain(best.fit)))
@@ -96,7 +96,7 @@ def diagnose(
         fit = best.fit
         progress(f'added {best.best}; weighing what is left')
         judged = judge(study, fit, neutral, nuisance, seed)
-    return _conclude(study, fit, first, judged, ranking, accepted, history, seed)
+    return _conclude(study, first, judged, ranking, accepted, history, seed)
 
 
 def trouble_with(study: Study, fit: Fit) -> str:
@@ -128,12 +128,12 @@ def trouble_with(study: Study, fit: Fit) -> str:
     return ''
 
 
-def _to_add(study: Study, fit: Fit, ranking: Ranking | None) -> Candidate | None:
+def _to_add(study: Study, before: Fit, ranking: Ranking | None) -> Candidate | None:
     """The best class if it is probable enough and helps to predict, else None."""
     if ranking is None or not ranking.classes:
         return None
     best = ranking.classes[0]
-    sure = best.probability > SURE and _predicts_better(study, fit, best.fit)
+    sure = best.probability > SURE and _predicts_better(study, before, study.plain(best.fit))
     return best if sure else None
 
 
@@ -141,8 +141,7 @@ def _predicts_better(study: Study, before: Fit, after: Fit) -> bool:
     """Whether readings left out in patches and in passes are predicted better on average."""
     blockings = [study.patches(), study.bands(before.model)]
     gains = [
-        hold_out(study.plain(after), blocks).log_score
-        - hold_out(study.plain(before), blocks).log_score
+        hold_out(after, blocks).log_score - hold_out(before, blocks).log_score
         for blocks in blockings
         if len(np.unique(blocks)) > 2
     ]
@@ -171,7 +170,6 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 def _conclude(
     study: Study,
-    fit: Fit,
     first: Judgement,
     judged: Judgement,
     ranking: Ranking | None,
@@ -200,7 +198,7 @@ def _conclude(
         verdict, reason = 'effect_missing', f'The readings show {names}.'
     elif ranking.unknown + ranking.footprint > ranking.named or not others:
         footprint = ranking.footprint > ranking.unknown
-        unknown = locate_unexplained(study, study.plain(fit), footprint, seed)
+        unknown = locate_unexplained(study, history[-1].fit, footprint, seed)
         verdict, reason = (
             'unknown_effect',
             (
