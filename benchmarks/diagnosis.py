@@ -75,10 +75,10 @@ def run_one(job: tuple[int, str]) -> dict:
 
 
 def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
+    from paint_deposition.diagnosis.procedure import diagnose
     from paint_deposition.effects.catalogue import EFFECTS
-    from paint_deposition.formats.campaign_file import read_campaign
-    from paint_deposition.inference.diagnosis import diagnose
-    from paint_deposition.model.deposition_model import DepositionModel
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.campaign_file import read_campaign
 
     campaign = read_campaign(folder / 'campaign.yaml')
     started = time.perf_counter()
@@ -129,9 +129,9 @@ def _class_of(truth: str, diagnosis) -> set[str]:
 
 def _held_out(folder: Path, campaign, diagnosis) -> dict[str, float]:
     """RMSE on readings the diagnosis never saw, over the noise of the gauge there."""
-    from paint_deposition.formats.tables import read_readings
-    from paint_deposition.inference.campaign import Campaign, Experiment
-    from paint_deposition.inference.study import Study
+    from paint_deposition.files.readings_files import read_readings
+    from paint_deposition.fitting.study import Study
+    from paint_deposition.readings.campaign import Campaign, Experiment
 
     unseen = []
     for experiment in campaign.experiments:
@@ -170,8 +170,8 @@ def _amounts(folder: Path, truth: str, campaign, diagnosis) -> list[dict]:
 
 def stepwise_bic(diagnosis) -> dict:
     """Forward selection by BIC over the same signatures: the usual way, for comparison."""
+    from paint_deposition.diagnosis.sensitivities import neutral_shapes, signature
     from paint_deposition.effects.catalogue import EFFECTS
-    from paint_deposition.inference.signatures import neutral_shapes, signature
 
     study, fit = diagnosis.study, diagnosis.history[0].fit
     marks = [

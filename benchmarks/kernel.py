@@ -21,10 +21,10 @@ import numba
 import numpy as np
 from numba import njit, prange
 
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.bags import read_trajectory
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.projection import flux_um_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -211,8 +211,8 @@ START = """
 import time
 begin = time.perf_counter()
 import numpy as np
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import PathBuilder
 from paint_deposition.part.points import SurfacePoints
 loaded = time.perf_counter()

@@ -21,7 +21,7 @@ from rosbags.highlevel import AnyReader
 from std_srvs.srv import Trigger
 
 from nodes import Cell
-from paint_deposition.formats.bags import read_trajectory
+from paint_deposition.files.recordings.bags import read_trajectory
 
 PACKAGE = 'paint_deposition'
 PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE

@@ -7,9 +7,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path

@@ -27,6 +27,16 @@ def repository() -> Path:
 
 
 @pytest.fixture(scope='session')
+def sample(repository: Path) -> object:
+    """The sample campaign: a panel and a door, painted by the virtual paint shop and measured."""
+    from paint_deposition.files.campaign_file import read_campaign
+
+    return read_campaign(
+        repository / 'ros2_ws/src/paint_deposition/samples/measured_door/campaign.yaml'
+    )
+
+
+@pytest.fixture(scope='session')
 def shared_data() -> Path:
     """Folder of real recordings and measurements kept beside the repository."""
     if not SHARED_DATA.is_dir():

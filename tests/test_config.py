@@ -7,11 +7,11 @@ import re
 
 import pytest
 import yaml
+from paint_deposition.files.gauge_readings import REQUIRED, read_readings
 
-from paint_deposition.formats.campaign_file import EXPERIMENT_KEYS, TOP_KEYS, read_campaign
-from paint_deposition.formats.model_file import read_model
-from paint_deposition.formats.tables import REQUIRED, read_readings
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.campaign_file import EXPERIMENT_KEYS, TOP_KEYS, read_campaign
+from paint_deposition.files.model_file import read_model
 
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
 # What a display of RViz shows.
@@ -38,10 +38,10 @@ def samples(repository):
 def publishers(ros_context, executor, samples):
     """The publishers of all nodes that a viewer looks at, by topic."""
     from nodes.cell import parameters
-    from paint_deposition.nodes.bag_player import BagPlayer
-    from paint_deposition.nodes.deposition_simulator import DepositionSimulator
-    from paint_deposition.nodes.index_planner import IndexPlanner
-    from paint_deposition.nodes.model_comparison import ModelComparison
+    from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+    from paint_deposition.nodes.planning.index_planner import IndexPlanner
+    from paint_deposition.nodes.replay.bag_player import BagPlayer
 
     panel = samples / 'panel_study'
     part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}

@@ -35,7 +35,7 @@ def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
 
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    module = importlib.import_module(f'{PACKAGE}.nodes.{node}')
+    module = importlib.import_module(console_scripts()[node].module)
     (table,) = (
         thing.PARAMETERS
         for thing in vars(module).values()

@@ -9,7 +9,7 @@ import yaml
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.formats.model_file import read_model_file
+from paint_deposition.files.model_file import read_model_file
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
 HIDDEN = 'incidence_attraction'

@@ -9,10 +9,10 @@ from PIL import Image
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.formats.bags import read_trajectory
-from paint_deposition.formats.model_file import read_model, write_model
-from paint_deposition.formats.rapid import read_program
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend

@@ -7,8 +7,8 @@ import sys
 
 import pytest
 
-from formats.recordings import straight_pass
-from paint_deposition.formats.bags import read_trajectory, write_pose_bag
+from files.recorded import straight_pass
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 
 
 @pytest.fixture

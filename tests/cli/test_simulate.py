@@ -9,10 +9,10 @@ import trimesh
 
 from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import assert_refused, paint
-from formats.recordings import Messages, pose_entries, write_bag
-from paint_deposition.formats.bags import read_trajectory, write_pose_bag
-from paint_deposition.formats.model_file import write_model
-from paint_deposition.model.deposition_model import DepositionModel
+from files.recorded import Messages, pose_entries, write_bag
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory

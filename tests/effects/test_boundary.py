@@ -6,9 +6,9 @@ from scipy.integrate import solve_ivp
 
 from booth import MODEL, painted, panel, path_of, serpentine
 from paint_deposition.effects.base import PathContext
-from paint_deposition.effects.corner_slowdown import CornerSlowdown
-from paint_deposition.effects.edge_build import EdgeBuild
-from paint_deposition.effects.trigger_lag import TriggerLag
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 

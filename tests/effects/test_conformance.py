@@ -20,8 +20,8 @@ from booth import (
 )
 from paint_deposition.effects.base import Effect, PathContext, Ray
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.effect_file import load_effect_file
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.film.integrator import FilmIntegrator
 from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), load_effect_file(SAMPLES / 'my_effect.py')]

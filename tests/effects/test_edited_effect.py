@@ -43,9 +43,9 @@ import sys
 
 import numpy as np
 
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.effect_file import load_effect_file
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints

@@ -8,12 +8,12 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from booth import LOOKING_ALONG_Y, MODEL, STANDOFF_M, painted, panel, path_of, serpentine, spot
-from paint_deposition.effects.air_drift import AirDrift
-from paint_deposition.effects.part_misalignment import PartMisalignment
-from paint_deposition.effects.sag import Sag
-from paint_deposition.effects.tcp_offset import TcpOffset
-from paint_deposition.effects.tcp_tilt import TcpTilt
-from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.part_misalignment import PartMisalignment
+from paint_deposition.effects.library.sag import Sag
+from paint_deposition.effects.library.tcp_offset import TcpOffset
+from paint_deposition.effects.library.tcp_tilt import TcpTilt
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 
 from booth import MODEL, painted, panel, panel_with_screen, path_of, serpentine, spot
-from paint_deposition.effects.convex_attraction import ConvexAttraction
-from paint_deposition.effects.faraday_shielding import FaradayShielding
-from paint_deposition.effects.flow_drift import MIDDLE_PASS, FlowDrift
-from paint_deposition.effects.fog_gradient import FogGradient
-from paint_deposition.effects.gauge_curvature_bias import GaugeCurvatureBias
-from paint_deposition.effects.gauge_gain import GaugeGain
-from paint_deposition.effects.gauge_zero import GaugeZero
-from paint_deposition.effects.incidence_attraction import IncidenceAttraction
-from paint_deposition.effects.occlusion import Occlusion
-from paint_deposition.effects.overspray_fog import OversprayFog
+from paint_deposition.effects.library.convex_attraction import ConvexAttraction
+from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+from paint_deposition.effects.library.flow_drift import MIDDLE_PASS, FlowDrift
+from paint_deposition.effects.library.fog_gradient import FogGradient
+from paint_deposition.effects.library.gauge_curvature_bias import GaugeCurvatureBias
+from paint_deposition.effects.library.gauge_gain import GaugeGain
+from paint_deposition.effects.library.gauge_zero import GaugeZero
+from paint_deposition.effects.library.incidence_attraction import IncidenceAttraction
+from paint_deposition.effects.library.occlusion import Occlusion
+from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.part.points import SurfacePoints
 
 RADIUS_M = 0.25

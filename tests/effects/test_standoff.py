@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from booth import MODEL, painted, panel, spot
-from paint_deposition.effects.pattern_spread import PatternSpread
-from paint_deposition.effects.standoff_efficiency import StandoffEfficiency
-from paint_deposition.effects.tcp_standoff import TcpStandoff
-from paint_deposition.model.deposition_model import CUT_FLUX
+from paint_deposition.effects.deposition_model import CUT_FLUX
+from paint_deposition.effects.library.pattern_spread import PatternSpread
+from paint_deposition.effects.library.standoff_efficiency import StandoffEfficiency
+from paint_deposition.effects.library.tcp_standoff import TcpStandoff
 
 OMEGA_M = MODEL.projection.model_plane_m
 OFFSET_M = MODEL.projection.emission_offset_m

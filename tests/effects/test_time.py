@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from booth import painted, panel, path_of, serpentine
-from paint_deposition.effects.gun_wake import GunWake
-from paint_deposition.effects.pose_lag import PoseLag
+from paint_deposition.effects.library.gun_wake import GunWake
+from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.motion.path_builder import spray_path
 
 

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
 from scenes import START_NS, lying_plane, stamps_ns, straight_pass, weaving

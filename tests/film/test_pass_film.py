@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import collapse_um, pass_film_um, sampled_collapse
-from paint_deposition.model.collapse import half_width_m, nominal_standoff_m
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.collapse import half_width_m
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import flux_um_per_s
 from patterns import PATTERNS, RING
@@ -63,7 +63,7 @@ def test_standoff_widens_and_thins_the_pass():
     near = collapse_um(model, ACROSS_M, SPEED_M_PER_S, 0.25)
     far = collapse_um(model, 2.0 * ACROSS_M, SPEED_M_PER_S, 0.55)
     np.testing.assert_allclose(far, 0.5 * near, rtol=1e-12)
-    assert nominal_standoff_m(model) == pytest.approx(0.25)
+    assert model.projection.nominal_standoff_m == pytest.approx(0.25)
 
 
 def test_film_goes_as_one_over_speed():

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import NEAREST_M, Projection, flux_um_per_s
 from scenes import rotation_matrix

@@ -10,7 +10,7 @@ import pytest
 def simulator(ros_context, spin, tmp_path):
     """`simulator(**parameters)`: a simulator of the panel that runs."""
     from nodes.cell import parameters, write_panel
-    from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
     def simulator(**values) -> DepositionSimulator:
         chosen = {

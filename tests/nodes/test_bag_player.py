@@ -18,7 +18,7 @@ from rclpy.serialization import deserialize_message
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
-from formats.recordings import (
+from files.recorded import (
     START_NS,
     STATE_TYPES,
     Messages,
@@ -28,11 +28,11 @@ from formats.recordings import (
 )
 from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.formats.bag_files import open_bag
-from paint_deposition.formats.bags import stamp_ns, write_pose_bag
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.bag_player import BagPlayer
-from paint_deposition.nodes.messages import to_ns
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.bags import stamp_ns, write_pose_bag
+from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.messages import to_ns
 
 
 @pytest.fixture
@@ -414,7 +414,7 @@ def test_the_process_ends_with_what_it_did(ros_domain, listen, wait_until, pass_
     listener = listen()
     with NodeProcess(
         tmp_path / 'player',
-        'paint_deposition.nodes.bag_player',
+        'paint_deposition.nodes.replay.bag_player',
         bag=pass_bag,
         state_topic='/atomizer/state',
         rate='0.0',
@@ -427,7 +427,7 @@ def test_the_process_ends_with_what_it_did(ros_domain, listen, wait_until, pass_
 
 def test_an_interrupt_ends_a_waiting_player(ros_domain, wait_until, pass_bag, tmp_path):
     with NodeProcess(
-        tmp_path / 'player', 'paint_deposition.nodes.bag_player', bag=pass_bag
+        tmp_path / 'player', 'paint_deposition.nodes.replay.bag_player', bag=pass_bag
     ) as process:
         wait_until(lambda: 'waiting for 1 subscribers' in process.err, timeout_s=20.0)
         process.interrupt_as_launch_does()
@@ -444,7 +444,7 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
     path.write_bytes(content)
     listen()
     with NodeProcess(
-        tmp_path / 'player', 'paint_deposition.nodes.bag_player', bag=bag, rate='0.0'
+        tmp_path / 'player', 'paint_deposition.nodes.replay.bag_player', bag=bag, rate='0.0'
     ) as process:
         wait_until(lambda: process.exit_code is not None, timeout_s=20.0, what='the end')
         assert process.exit_code == 2

@@ -21,16 +21,16 @@ from nodes.cell import (
     write_panel,
 )
 from nodes.processes import NodeProcess
-from paint_deposition.effects.air_drift import AirDrift
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import PaintError
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.bags import write_pose_bag
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.formats.model_file import write_model
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.runtime import qos
 from paint_deposition.part.facing import toward_the_gun
 
 MOTION = two_passes()
@@ -135,7 +135,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
     motion = two_passes(poses=1500, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
-    player = 'paint_deposition.nodes.bag_player'
+    player = 'paint_deposition.nodes.replay.bag_player'
     with NodeProcess(tmp_path / 'player', player, bag=bag) as replay:
         wait_until(lambda: node.input.poses_received, timeout_s=20.0, what='the first pose')
         began_s = time.monotonic()

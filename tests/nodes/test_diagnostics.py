@@ -7,8 +7,8 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.diagnostics import OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
 
 
 def test_every_task_reports_each_period(ros_context, spin, wait_until):

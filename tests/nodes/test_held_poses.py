@@ -6,8 +6,8 @@ pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseStamped
 
-from paint_deposition.nodes.held_poses import HELD_FOR_S, HELD_POSES, HeldPoses, NoTransform
-from paint_deposition.nodes.messages import to_ns, to_time
+from paint_deposition.nodes.painting.tf_queue import HELD_FOR_S, HELD_POSES, HeldPoses, NoTransform
+from paint_deposition.nodes.runtime.messages import to_ns, to_time
 
 
 class Part:

@@ -17,12 +17,12 @@ from rclpy.node import Node
 
 from nodes.cell import DIAGNOSTICS, PANEL_M, Onlooker, parameters, values_of, write_panel
 from nodes.processes import NodeProcess
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.formats.model_file import write_model
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.files.model_file import write_model
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.runtime import qos
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
 
@@ -168,7 +168,7 @@ def test_bad_parameters_stop_the_node(ros_context, values):
 
 
 def test_bad_model_ends_the_process_with_one_line_and_exit_code_2(ros_domain, tmp_path):
-    module = 'paint_deposition.nodes.index_planner'
+    module = 'paint_deposition.nodes.planning.index_planner'
     with NodeProcess(tmp_path / 'planner', module, model_file='nowhere.yaml') as process:
         assert process.wait() == 2
         assert process.err.count('\n') == 1

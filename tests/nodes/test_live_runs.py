@@ -16,17 +16,17 @@ from std_srvs.srv import Trigger
 
 from nodes.cell import OWN_EFFECT, Onlooker, parameters, two_passes, write_panel
 from nodes.processes import NodeProcess
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.bags import read_trajectory, write_pose_bag
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes import qos
+from paint_deposition.nodes.runtime import qos
 
-SIMULATOR = 'paint_deposition.nodes.deposition_simulator'
-COMPARISON = 'paint_deposition.nodes.model_comparison'
-PLAYER = 'paint_deposition.nodes.bag_player'
-RECORDER = 'paint_deposition.nodes.run_recorder'
+SIMULATOR = 'paint_deposition.nodes.painting.deposition_simulator'
+COMPARISON = 'paint_deposition.nodes.comparison.model_comparison'
+PLAYER = 'paint_deposition.nodes.replay.bag_player'
+RECORDER = 'paint_deposition.nodes.recording.run_recorder'
 EDGE_M = 0.03
 
 

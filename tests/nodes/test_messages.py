@@ -8,8 +8,8 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from paint_deposition.colours.scales import FILM_PALETTE
-from paint_deposition.nodes.messages import ColouredMesh, FilmCloud, FilmField, to_time
+from paint_deposition.film.colour_scales import FILM_PALETTE
+from paint_deposition.nodes.runtime.messages import ColouredMesh, FilmCloud, FilmField, to_time
 
 STAMP_NS = 1_758_000_123_456_789_012
 

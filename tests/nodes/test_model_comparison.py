@@ -9,22 +9,22 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from paint_deposition.files.gauge_readings import write_table
 from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import Onlooker, offline_um, parameters, two_passes, write_panel
-from paint_deposition.colours.scales import BARE_RGB
 from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.formats.model_file import write_model
-from paint_deposition.formats.tables import write_table
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import write_model
+from paint_deposition.film.colour_scales import BARE_RGB
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.model_comparison import ModelComparison
+from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.runtime import qos
 
 MOTION = two_passes()
 TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))

@@ -21,19 +21,19 @@ from rosbags.rosbag2 import Reader
 from std_msgs.msg import Bool, String
 from std_srvs.srv import Trigger
 
-from formats.recordings import START_NS, straight_pass
+from files.recorded import START_NS, straight_pass
 from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.formats.bag_files import open_bag
-from paint_deposition.formats.bags import read_trajectory, stamp_ns, write_pose_bag
-from paint_deposition.formats.mcap_recovery import recover
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.bag_player import BagPlayer
-from paint_deposition.nodes.index_planner import IndexPlanner
-from paint_deposition.nodes.messages import to_time
-from paint_deposition.nodes.run_recorder import RunRecorder
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.bags import read_trajectory, stamp_ns, write_pose_bag
+from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.messages import to_time
 
-MODULE = 'paint_deposition.nodes.run_recorder'
+MODULE = 'paint_deposition.nodes.recording.run_recorder'
 
 
 def pose(stamp_ns: int, x_m: float = 0.0, frame_id: str = 'door') -> PoseStamped:

@@ -10,8 +10,8 @@ NODE = """
 import sys, time
 from pathlib import Path
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.parameters import NodeParameter
-from paint_deposition.nodes.shutdown import PaintNode, run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter
+from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
 
 
 class Worker(PaintNode):

@@ -17,8 +17,8 @@ from nodes.cell import (
     two_passes,
 )
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.formats.model_file import read_model, write_model
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.model_file import read_model, write_model
 
 MOTION = two_passes()
 

@@ -20,8 +20,8 @@ from nodes.cell import (
     parameters,
     two_passes,
 )
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.runtime import qos
 
 MOTION = two_passes()
 

@@ -23,9 +23,9 @@ from nodes.cell import (
     values_of,
     write_panel,
 )
-from paint_deposition.colours.scales import BARE_RGB, FILM_PALETTE
-from paint_deposition.nodes import qos
-from paint_deposition.nodes.deposition_simulator import DepositionSimulator
+from paint_deposition.film.colour_scales import BARE_RGB, FILM_PALETTE
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.runtime import qos
 
 MOTION = two_passes()
 POSES = 'deposition_simulator: poses'

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.bags import read_trajectory
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints

@@ -5,17 +5,17 @@ import json
 import numpy as np
 import pytest
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.deposition import FilmIntegrator
-from paint_deposition.formats.bags import read_trajectory
-from paint_deposition.formats.meshes import read_mesh
-from paint_deposition.formats.plan_files import write_plan
-from paint_deposition.formats.rapid import read_program
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.plan import PlanRequest, plan
-from part.test_skin_map import sheet
+from paint_deposition.results.plan import write_plan
+from planning.test_surface_map import sheet
 
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)

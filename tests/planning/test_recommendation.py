@@ -7,12 +7,12 @@ import time
 import numpy as np
 import pytest
 
-from inference.panels import column, passes
+from fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.uniformity import Raster
 from paint_deposition.motion.path_builder import spray_path

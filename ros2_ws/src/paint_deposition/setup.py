@@ -6,13 +6,13 @@ from pathlib import Path
 from setuptools import find_packages, setup
 
 PACKAGE = 'paint_deposition'
-NODES = (
-    'deposition_simulator',
-    'index_planner',
-    'bag_player',
-    'run_recorder',
-    'model_comparison',
-)
+NODES = {
+    'deposition_simulator': 'painting',
+    'index_planner': 'planning',
+    'bag_player': 'replay',
+    'run_recorder': 'recording',
+    'model_comparison': 'comparison',
+}
 SHARED_FOLDERS = ('launch', 'config', 'samples')
 
 
@@ -46,7 +46,7 @@ setup(
     entry_points={
         'console_scripts': [
             f'paint = {PACKAGE}.cli.main:main',
-            *(f'{node} = {PACKAGE}.nodes.{node}:main' for node in NODES),
+            *(f'{node} = {PACKAGE}.nodes.{room}.{node}:main' for node, room in NODES.items()),
         ],
     },
 )

@@ -17,7 +17,7 @@ import numpy as np
 from make_door import door_depth, ramp
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.formats.bags import write_pose_bag
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
 
 STANDOFF_M = 0.25

@@ -4,7 +4,7 @@ In model.yaml: ``effects: [{file: my_effect.py, loss_per_m_per_s: 0.2}]``.
 """
 
 from paint_deposition.effects.base import Effect, Ray, parameter
-from paint_deposition.film.fast_math import exp
+from paint_deposition.kernel.fast_math import exp
 
 
 class WakeLoss(Effect):

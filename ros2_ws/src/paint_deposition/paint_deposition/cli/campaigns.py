@@ -13,12 +13,12 @@ from tqdm import tqdm
 from paint_deposition.cli.options import SHOW_PROGRESS_AFTER_S
 
 if TYPE_CHECKING:
-    from paint_deposition.inference.campaign import Campaign
+    from paint_deposition.readings.campaign import Campaign
 
 
 def read_noted(path: Path, tell: Callable[[str], None]) -> Campaign:
     """Read a campaign; `tell` gets each line of progress, stderr each note on an experiment."""
-    from paint_deposition.formats.campaign_file import read_campaign
+    from paint_deposition.files.campaign_file import read_campaign
 
     def show(line: str) -> None:
         tell(line)

@@ -12,13 +12,13 @@ from paint_deposition.cli.campaigns import Steps, read_noted
 from paint_deposition.cli.options import CAMPAIGN, FILE, JSON, model_option, output_option
 
 if TYPE_CHECKING:
+    from paint_deposition.comparison.comparison import Comparison
+    from paint_deposition.diagnosis.verdict import Diagnosis
     from paint_deposition.effects.base import Effect
-    from paint_deposition.formats.model_file import ModelFile
-    from paint_deposition.inference.campaign import Campaign
-    from paint_deposition.inference.comparison import Comparison
-    from paint_deposition.inference.study import Study
-    from paint_deposition.inference.verdict import Diagnosis
-    from paint_deposition.model.deposition_model import DepositionModel
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.model_file import ModelFile
+    from paint_deposition.fitting.study import Study
+    from paint_deposition.readings.campaign import Campaign
 
 OUTPUT = output_option(
     'Folder for the results; made if it is not there, results in it are replaced.', required=True
@@ -42,13 +42,13 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
     report.html.
     """
-    from paint_deposition.formats.inference_files import comparison_as_dict, write_residuals
-    from paint_deposition.formats.json_files import json_text, write_json
-    from paint_deposition.inference.comparison import compare
-    from paint_deposition.inference.study import Study
-    from paint_deposition.inference.unknowns import Unknowns
-    from paint_deposition.model.deposition_model import DepositionModel
-    from paint_deposition.pictures.report import write_report
+    from paint_deposition.comparison.comparison import compare
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.json_files import json_text, write_json
+    from paint_deposition.fitting.parameters import Unknowns
+    from paint_deposition.fitting.study import Study
+    from paint_deposition.report.page.report import write_report
+    from paint_deposition.results.inference import comparison_as_dict, write_residuals
 
     with Steps('compare') as tell:
         data = read_noted(campaign, tell)
@@ -110,8 +110,8 @@ def diagnose_command(
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
     residuals.csv, the residual as coloured meshes and report.html.
     """
+    from paint_deposition.diagnosis.procedure import diagnose
     from paint_deposition.effects.catalogue import EFFECTS
-    from paint_deposition.inference.diagnosis import diagnose
 
     library = dict(EFFECTS) | {e.id: e for e in _own(effect_files)}
     with Steps('diagnose') as tell:
@@ -140,8 +140,8 @@ def refit_command(
     Writes model.yaml with its history, residuals.csv, the residual as coloured meshes,
     comparison.png and report.html. To go on from there, give that model.yaml as --model.
     """
+    from paint_deposition.diagnosis.refit import refit
     from paint_deposition.effects.catalogue import EFFECTS, effect_class
-    from paint_deposition.inference.refit import refit
 
     if effect == 'none':
         added = None
@@ -159,21 +159,21 @@ def refit_command(
 
 def _start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:
     """The model named with --model, else the campaign's, if it names one."""
-    from paint_deposition.formats.model_file import read_model_file
+    from paint_deposition.files.model_file import read_model_file
 
     chosen = model_file or campaign.model_file
     return read_model_file(chosen) if chosen else None
 
 
 def _start_or_default(campaign: Campaign, model_file: Path | None) -> ModelFile:
-    from paint_deposition.formats.model_file import ModelFile
-    from paint_deposition.model.deposition_model import DepositionModel
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.model_file import ModelFile
 
     return _start(campaign, model_file) or ModelFile(DepositionModel())
 
 
 def _own(files: tuple[Path, ...]) -> list[type[Effect]]:
-    from paint_deposition.formats.effect_file import load_effect_file
+    from paint_deposition.effects.user_effects import load_effect_file
 
     return [load_effect_file(file) for file in files]
 
@@ -181,8 +181,8 @@ def _own(files: tuple[Path, ...]) -> list[type[Effect]]:
 def _write_pictures(
     output: Path, study: Study, models: list[tuple[DepositionModel, Comparison]]
 ) -> None:
-    from paint_deposition.formats.residual_mesh import write_residual_meshes
-    from paint_deposition.pictures.comparison import write_comparison_picture
+    from paint_deposition.report.pictures.profiles import write_comparison_picture
+    from paint_deposition.results.residual_mesh import write_residual_meshes
 
     write_residual_meshes(output, study, models[-1][1])
     write_comparison_picture(output / 'comparison.png', study, models)
@@ -195,12 +195,12 @@ def _write_diagnosis(
     start: ModelFile,
     tell: Callable[[str], None],
 ) -> dict[str, Any]:
-    from paint_deposition.formats.fitted_model import write_fitted
-    from paint_deposition.formats.inference_files import diagnosis_as_dict, write_residuals
-    from paint_deposition.formats.json_files import write_json
-    from paint_deposition.inference.comparison import compare
-    from paint_deposition.inference.next_experiment import propose_for
-    from paint_deposition.pictures.report import write_report
+    from paint_deposition.comparison.comparison import compare
+    from paint_deposition.diagnosis.next_experiment import propose_for
+    from paint_deposition.files.json_files import write_json
+    from paint_deposition.report.page.report import write_report
+    from paint_deposition.results.fitted_model import write_fitted
+    from paint_deposition.results.inference import diagnosis_as_dict, write_residuals
 
     tell('comparing before and after')
     study = diagnosis.study
@@ -220,7 +220,7 @@ def _write_diagnosis(
 
 
 def _say(diagnosis: Diagnosis, content: dict[str, Any], output: Path, as_json: bool) -> None:
-    from paint_deposition.formats.json_files import json_text
+    from paint_deposition.files.json_files import json_text
 
     if as_json:
         click.echo(json_text(content))

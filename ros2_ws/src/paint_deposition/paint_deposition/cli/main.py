@@ -60,7 +60,7 @@ class Commands(click.Group):
 
 def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from paint_deposition.formats.provenance import git_version, package_version
+        from paint_deposition.files.provenance import git_version, package_version
 
         known = [version for version in (package_version(), git_version()) if version]
         click.echo(f'paint {" ".join(known) or "of unknown version"}')

@@ -64,11 +64,11 @@ def calibrate(
     Any number of panels and parts; a flat panel painted by a few passes is best. Effects of the
     model to start from are fitted along, its projection is kept.
     """
-    from paint_deposition.formats.calibration_files import calibration_as_dict, write_calibration
-    from paint_deposition.formats.json_files import json_text
-    from paint_deposition.formats.model_file import read_model_file
+    from paint_deposition.files.json_files import json_text
+    from paint_deposition.files.model_file import read_model_file
     from paint_deposition.inference import calibration as calibrating
-    from paint_deposition.pictures.calibration import write_calibration_pictures
+    from paint_deposition.report.pictures.calibration import write_calibration_pictures
+    from paint_deposition.results.calibration import calibration_as_dict, write_calibration
 
     with Steps('calibrate') as tell:
         data = read_noted(campaign, tell)
@@ -130,10 +130,10 @@ def recommend(
     **wanted: float | bool | None,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    from paint_deposition.formats.json_files import json_text, write_json
-    from paint_deposition.pictures.uniformity import write_uniformity
+    from paint_deposition.files.json_files import json_text, write_json
     from paint_deposition.planning import recommendation
     from paint_deposition.planning.index_request import Request
+    from paint_deposition.report.pictures.uniformity import write_uniformity
 
     answer = recommendation.recommend(
         _model(model_file),
@@ -211,11 +211,11 @@ def plan(
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     import numpy as np
 
-    from paint_deposition.formats.meshes import read_mesh
-    from paint_deposition.formats.plan_files import write_plan
+    from paint_deposition.files.meshes import read_mesh
     from paint_deposition.motion.path_builder import spray_path
-    from paint_deposition.pictures.door import write_door_picture
     from paint_deposition.planning import plan as planning
+    from paint_deposition.report.pictures.film import write_door_picture
+    from paint_deposition.results.plan import write_plan
 
     model = _model(model_file)
     request = planning.PlanRequest(travel_rad=math.radians(travel_deg), **wanted)
@@ -260,8 +260,8 @@ def plan(
 
 
 def _model(model_file: Path | None):
-    from paint_deposition.formats.model_file import read_model
-    from paint_deposition.model.deposition_model import DepositionModel
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.model_file import read_model
 
     return read_model(model_file) if model_file else DepositionModel()
 

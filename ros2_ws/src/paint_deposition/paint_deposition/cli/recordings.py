@@ -14,12 +14,12 @@ from paint_deposition.cli.options import (
     SHOW_PROGRESS_AFTER_S,
     max_pose_gap_option,
 )
-from paint_deposition.formats.bag_summary import BagSummary, summarise
-from paint_deposition.formats.json_files import json_text
-from paint_deposition.formats.mcap_recovery import Recovery, mcap_files, recover
-from paint_deposition.formats.motion_files import refuse_gun_signal
-from paint_deposition.formats.rapid import read_program
-from paint_deposition.formats.rapid_motion import is_rapid, program_as_dict, program_as_text
+from paint_deposition.files.json_files import json_text
+from paint_deposition.files.motion_files import refuse_gun_signal
+from paint_deposition.files.rapid.motion import is_rapid, program_as_dict, program_as_text
+from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
+from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files, recover
 
 
 @click.command('inspect')

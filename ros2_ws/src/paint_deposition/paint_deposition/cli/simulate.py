@@ -30,13 +30,13 @@ from paint_deposition.errors import PaintError
 if TYPE_CHECKING:
     import numpy as np
 
-    from paint_deposition.film.deposition import FilmIntegrator
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.film.integrator import FilmIntegrator
     from paint_deposition.film.statistics import FilmStatistics
-    from paint_deposition.inference.readings import Readings
-    from paint_deposition.model.deposition_model import DepositionModel
     from paint_deposition.motion.path import SprayPath
     from paint_deposition.motion.trajectory import PoseCounts
     from paint_deposition.part.surface import Surface
+    from paint_deposition.readings.readings import Readings
 
 STAGES = ('loading', 'reading', 'refining the mesh', 'painting', 'writing', 'drawing')
 
@@ -102,15 +102,15 @@ def simulate_command(
         tell('loading')
         import numpy as np
 
+        from paint_deposition.effects.deposition_model import DepositionModel
+        from paint_deposition.files.json_files import json_text
+        from paint_deposition.files.meshes import read_mesh
+        from paint_deposition.files.model_file import read_model
+        from paint_deposition.files.motion_files import read_motion
+        from paint_deposition.files.gauge_readings import read_readings, write_predictions
         from paint_deposition.film.statistics import film_statistics
-        from paint_deposition.formats.film_files import write_film
-        from paint_deposition.formats.json_files import json_text
-        from paint_deposition.formats.meshes import read_mesh
-        from paint_deposition.formats.model_file import read_model
-        from paint_deposition.formats.motion_files import read_motion
-        from paint_deposition.formats.tables import read_readings, write_predictions
-        from paint_deposition.model.deposition_model import DepositionModel
         from paint_deposition.motion.path_builder import spray_path
+        from paint_deposition.results.film import write_film
 
         tell('reading')
         model = read_model(model_file) if model_file else DepositionModel()
@@ -189,7 +189,7 @@ def _toward_the_gun(surface: Surface, path: SprayPath) -> Surface:
 def _painted(
     surface: Surface, path: SprayPath, model: DepositionModel, advance: Callable[[float], None]
 ) -> FilmIntegrator:
-    from paint_deposition.film.deposition import FilmIntegrator
+    from paint_deposition.film.integrator import FilmIntegrator
 
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     integrator.add(path, lambda done: advance(done / len(path)))
@@ -202,8 +202,8 @@ def _predicted_um(
     """(N,) what the gauge should show at each reading [um], in double precision."""
     import numpy as np
 
-    from paint_deposition.inference.campaign import Campaign, Experiment
-    from paint_deposition.inference.forward import Forward
+    from paint_deposition.fitting.forward import Forward
+    from paint_deposition.readings.campaign import Campaign, Experiment
 
     each = replace(readings, point=np.arange(len(readings)).astype(str))
     experiment = Experiment.of(name, surface, path, each)
@@ -218,7 +218,7 @@ def _draw(
     details: dict[str, Any],
     path: SprayPath,
 ) -> Path:
-    from paint_deposition.pictures.door import write_door_picture
+    from paint_deposition.report.pictures.film import write_door_picture
 
     model = Path(details['model_file']).name or 'default model'
     subtitle = f'{Path(details["trajectory"]).name}, {model}'

@@ -1,1 +1,1 @@
-"""Physics beyond the plain pattern, one file an effect."""
+"""Physics beyond eqs. (1) and (2), and the deposition model that they are composed into."""

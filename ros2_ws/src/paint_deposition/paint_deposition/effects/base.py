@@ -3,34 +3,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, ClassVar, NamedTuple, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
+from paint_deposition.kernel.ray import Ray as Ray
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
-
-
-class Ray(NamedTuple):
-    """One straight ray from the emission point to a surface point, inside the kernel.
-
-    Attributes:
-        x_m, y_m: where it pierces the model plane, tool axes [m].
-        standoff_ratio: distance along the bell's axis over Omega [1].
-        cos_incidence: cosine of the angle to the surface normal, above 0 [1].
-        speed_m_per_s: speed of the atomizer [m/s].
-    """
-
-    x_m: float
-    y_m: float
-    standoff_ratio: float
-    cos_incidence: float
-    speed_m_per_s: float
 
 
 @dataclass(frozen=True)
@@ -114,7 +98,7 @@ class Effect(BaseModel):
     * ``on_path``: the motion is not what was recorded, or the flow not what was commanded.
     * ``flux_factor``: a static function (ray, *parameters) -> factor on the flux along one ray,
       compiled into the kernel; parameters in the order declared. Plain arithmetic, ``min`` and
-      ``max``, and ``film.fast_math``: a branch or a function of ``math`` costs the loop its
+      ``max``, and ``kernel.fast_math``: a branch or a function of ``math`` costs the loop its
       speed.
     * ``pattern_scale``: the same, returning the factor s by which the pattern shrinks seen from
       the emission point: q becomes s q and the flux s^2, so that no volume is lost.

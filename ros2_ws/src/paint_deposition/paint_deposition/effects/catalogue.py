@@ -5,7 +5,7 @@ import importlib
 import pkgutil
 from types import MappingProxyType
 
-from paint_deposition import effects
+from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
 
@@ -16,17 +16,16 @@ FAMILY_ORDER = (
 )  # fmt: skip
 
 
-def _effects_of_this_package() -> dict[str, type[Effect]]:
-    for module in pkgutil.iter_modules(effects.__path__, f'{effects.__name__}.'):
-        if module.name != __name__:
-            importlib.import_module(module.name)
-    own = [c for c in Effect.__subclasses__() if c.__module__.startswith(effects.__name__)]
+def _effects_of_the_library() -> dict[str, type[Effect]]:
+    for module in pkgutil.iter_modules(library.__path__, f'{library.__name__}.'):
+        importlib.import_module(module.name)
+    own = [c for c in Effect.__subclasses__() if c.__module__.startswith(library.__name__)]
     own.sort(key=lambda effect: (FAMILY_ORDER.index(effect.family), effect.id))
     return {effect.id: effect for effect in own}
 
 
 # Effect classes by id, and ids by family.
-EFFECTS = MappingProxyType(_effects_of_this_package())
+EFFECTS = MappingProxyType(_effects_of_the_library())
 FAMILIES = MappingProxyType(
     {
         family: tuple(name for name, effect in EFFECTS.items() if effect.family == family)

@@ -1,1 +1,1 @@
-"""The integral of flux over the way: the film at every point, and its statistics."""
+"""The film: the one integral over the tool path, live and offline, and its statistics."""

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from paint_deposition.film import kernel
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.kernel import accumulation as kernel
 from paint_deposition.motion.path import SprayPath
 
 # Stands for a gain of nothing, which has no logarithm [um/s].

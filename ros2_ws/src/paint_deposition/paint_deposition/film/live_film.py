@@ -5,8 +5,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from paint_deposition.film.deposition import FilmIntegrator, Occluder, Precision
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator, Occluder, Precision
 from paint_deposition.motion.motion_log import (
     DEFAULT_LIMIT_POSES,
     MotionLog,

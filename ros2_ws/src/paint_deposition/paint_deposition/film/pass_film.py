@@ -5,15 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.collapse import (
     NEGLIGIBLE,
     SampledCollapse,
-    line_integral_um_m_per_s,
-    nominal_standoff_m,
 )
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.line_integral import line_integral_um_m_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -61,7 +60,7 @@ def collapse_um(
     Raises:
         PlanError: speed or standoff is not above zero.
     """
-    standoff = nominal_standoff_m(model) if standoff_m is None else standoff_m
+    standoff = model.projection.nominal_standoff_m if standoff_m is None else standoff_m
     for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')
@@ -79,7 +78,7 @@ def sampled_collapse(
     model: DepositionModel, speed_m_per_s: float, **options: Any
 ) -> SampledCollapse:
     """``collapse_um`` sampled finely enough for sums over passes; options as there."""
-    standoff = options.get('standoff_m') or nominal_standoff_m(model)
+    standoff = options.get('standoff_m') or model.projection.nominal_standoff_m
     omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
     widening = max((standoff + offset) / omega, 1e-6)
     reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening

@@ -1,1 +1,1 @@
-"""What leaves the bell and how it lands: pattern, projection, and a pass collapsed to a line."""
+"""Equations (1) to (5): pattern, projection, profile of a pass, evenness of parallel passes."""

@@ -23,6 +23,11 @@ class Projection(BaseModel):
     occlusion: bool = Field(False, description='trace line of sight from the emission point')
 
     @property
+    def nominal_standoff_m(self) -> float:
+        """Distance of the TCP from the part at which the part lies on the model plane [m]."""
+        return self.model_plane_m - self.emission_offset_m
+
+    @property
     def nearest_m(self) -> float:
         """Distance from the emission point along the bell's axis up to which no paint lands [m].
 

@@ -1,1 +1,1 @@
-"""The atomizer's way: recorded poses, planned passes and the sub-steps both become."""
+"""Tool paths: recorded poses, and the sub-steps that the film is integrated over."""

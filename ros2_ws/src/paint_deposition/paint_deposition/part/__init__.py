@@ -1,1 +1,1 @@
-"""The part to paint: its refined surface and what a point of it sees."""
+"""The part to paint: its refined surface, and what a point on it is like."""

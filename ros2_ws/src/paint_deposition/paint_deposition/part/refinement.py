@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from paint_deposition.errors import MeshError
-from paint_deposition.part.needles import CutEdges, cut_edges, cut_needles, find_needles
+from paint_deposition.part.slivers import CutEdges, cut_edges, cut_needles, find_needles
 
 WELD_M = 1e-6
 MAX_TRIANGLES = 4_000_000

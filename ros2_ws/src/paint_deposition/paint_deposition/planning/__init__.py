@@ -1,0 +1,1 @@
+"""Index, speed and passes for an even film."""

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.uniformity import Raster
 from paint_deposition.planning.index_search import farthest_within
 from paint_deposition.planning.pass_setup import PassSetup

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.model.uniformity import Raster
 
 # Passes that differ by less than this share of their peak are taken for the same.

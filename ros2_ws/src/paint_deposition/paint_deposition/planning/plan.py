@@ -7,25 +7,25 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.deposition import FilmIntegrator
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.model.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.raster import (
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.pass_count import passes_to_cover
+from paint_deposition.planning.pass_films import LineFilms
+from paint_deposition.planning.pass_motion import trajectory_of
+from paint_deposition.planning.pass_placement import Placing, centred, place_passes
+from paint_deposition.planning.passes import (
     PlannedPass,
     RasterStyle,
     plan_passes,
-    trajectory_of,
 )
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.skin_map import SkinMap, part_axes
-from paint_deposition.part.surface import Surface
-from paint_deposition.planning.index_request import Request
-from paint_deposition.planning.line_films import LineFilms
-from paint_deposition.planning.pass_count import passes_to_cover
-from paint_deposition.planning.raster_search import Placing, centred, place_passes
 from paint_deposition.planning.recommendation import Recommendation, recommend
+from paint_deposition.planning.surface_map import SkinMap, part_axes
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)

@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.collapse import Collapse, half_width_m, nominal_standoff_m
-from paint_deposition.model.deposition_model import DepositionModel
+from paint_deposition.model.collapse import Collapse, half_width_m
 from paint_deposition.model.uniformity import Raster
 from paint_deposition.planning.drift import index_drift_m, standoff_drift_m
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
@@ -135,7 +135,7 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
     Raises:
         PlanError: there is no such index or speed; says why and what comes closest.
     """
-    standoff = request.standoff_m or nominal_standoff_m(model)
+    standoff = request.standoff_m or model.projection.nominal_standoff_m
     if not standoff > 0.0:
         raise PlanError(
             f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'

@@ -1,1 +1,0 @@
-"""Film and residual as colours: in files, viewers and pictures alike."""

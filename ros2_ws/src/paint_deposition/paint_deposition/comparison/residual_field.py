@@ -1,0 +1,87 @@
+"""Residuals of single readings spread over the skin around them, for pictures."""
+
+import numpy as np
+from scipy.sparse import csr_matrix, diags
+from scipy.spatial import cKDTree
+
+from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.fitting.study import Study
+from paint_deposition.part.surface import Surface
+
+SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 0.025, 0.09
+RADIUS_OVER_SPACING = 1.8
+# Skin whose normal differs by more than 60 degrees is another side of the part.
+SAME_SIDE_COSINE = 0.5
+
+
+def spreading(
+    surface: Surface,
+    positions_m: np.ndarray,
+    normals: np.ndarray,
+    radius_m: float | None = None,
+) -> csr_matrix:
+    """Matrix (V, P) that spreads values at points over the skin around them.
+
+    Each vertex takes a mean of the points within the radius on its side of the part, weighted by
+    a smooth kernel: single readings are noisy, and what matters is where neighbours agree. The
+    row of a vertex without any is empty.
+
+    Args:
+        surface: the part.
+        positions_m, normals: (P, 3) points on its skin.
+        radius_m: default: ``radius_of_readings_m``.
+    """
+    radius_m = radius_m or radius_of_readings_m(positions_m)
+    near = cKDTree(surface.vertices_m).sparse_distance_matrix(
+        cKDTree(positions_m), radius_m, output_type='ndarray'
+    )
+    facing = np.einsum('ij,ij->i', surface.normals[near['i']], normals[near['j']])
+    near = near[(facing > SAME_SIDE_COSINE) & (near['v'] < radius_m)]
+    weight = (1.0 - (near['v'] / radius_m) ** 2) ** 3
+    shape = (len(surface.vertices_m), len(positions_m))
+    matrix = csr_matrix((weight, (near['i'], near['j'])), shape=shape)
+    total = np.asarray(matrix.sum(axis=1)).ravel()
+    return csr_matrix(diags(1.0 / np.where(total > 0.0, total, 1.0)) @ matrix)
+
+
+def reached(matrix: csr_matrix) -> np.ndarray:
+    """(V,) whether the skin there takes anything from any point."""
+    return np.diff(matrix.indptr) > 0
+
+
+def spread_over_skin(
+    surface: Surface, positions_m: np.ndarray, normals: np.ndarray, residual_um: np.ndarray
+) -> np.ndarray:
+    """Residual at each vertex (V,) [um], NaN where no reading is near.
+
+    Args:
+        surface: the part.
+        positions_m, normals: (P, 3) readings on its skin.
+        residual_um: (P,) measured minus predicted.
+    """
+    matrix = spreading(surface, positions_m, normals)
+    return np.where(reached(matrix), matrix @ residual_um, np.nan)
+
+
+def radius_of_readings_m(positions_m: np.ndarray) -> float:
+    """How far a reading speaks for the skin around it [m].
+
+    Somewhat more than the usual distance between neighbouring readings.
+    """
+    if len(positions_m) < 2:
+        return LARGEST_RADIUS_M
+    nearest = cKDTree(positions_m).query(positions_m, k=2)[0][:, 1]
+    usual = RADIUS_OVER_SPACING * float(np.median(nearest))
+    return min(max(usual, SMALLEST_RADIUS_M), LARGEST_RADIUS_M)
+
+
+def point_residuals_um(study: Study, comparison: Comparison) -> list[np.ndarray]:
+    """Residuals averaged over repeats: for each experiment (P,) at its points [um]."""
+    parts, start = [], 0
+    for experiment in study.campaign.experiments:
+        stop = start + len(experiment.readings)
+        means = experiment.means
+        residual = comparison.residual_um[start:stop]
+        parts.append(np.bincount(means.owner, residual) / means.repeats)
+        start = stop
+    return parts

@@ -1,0 +1,1 @@
+"""Which effect a model misses: sensitivities, evidence, verdict, next experiment."""

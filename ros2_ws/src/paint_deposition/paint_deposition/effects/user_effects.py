@@ -1,0 +1,191 @@
+"""A user's own effect: one Python file with one class, checked before it is used."""
+
+import hashlib
+import inspect
+import re
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from paint_deposition.effects.base import Effect, PathContext, Ray
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.errors import ModelError
+from paint_deposition.kernel.laws import in_precision
+from paint_deposition.model.projection import Projection
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+
+LAWS = ('flux_factor', 'pattern_scale')
+PLACES = (*LAWS, 'on_path', 'on_film', 'on_gauge', 'shadow')
+# A ray on which laws are tried out: at the model plane, 0.6 rad off the normal.
+TRIAL_RAY = Ray(*np.array([0.1, -0.05, 1.0, 0.825, 0.5], dtype=np.float32))
+
+_loaded: dict[tuple[Path, str], type[Effect]] = {}
+
+
+def load_effect_file(path: str | Path) -> type[Effect]:
+    """The class of a user's own effect: a Python file with one class derived from Effect.
+
+    The same class while the file is the same. The file is run: load only what you would run
+    yourself.
+
+    Raises:
+        ModelError: the file cannot be read or run, its class is not sound, or its id is taken.
+    """
+    path = Path(path)
+    try:
+        source = path.read_bytes()
+    except OSError as error:
+        raise ModelError(
+            f'{path}: cannot be read ({error.strerror}); give the file of an effect'
+        ) from None
+    key = (path.resolve(), hashlib.sha256(source).hexdigest())
+    if key not in _loaded:
+        _loaded[key] = _checked(_run(path, source, key[1]), path)
+        _loaded[key].file = key[0]
+    effect = _loaded[key]
+    if effect.id in EFFECTS:
+        raise ModelError(
+            f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
+        )
+    return effect
+
+
+def _run(path: Path, source: bytes, digest: str) -> ModuleType:
+    # Not through the import system: that would keep stale byte code beside the user's file.
+    module = ModuleType(f'paint_effect_{digest[:16]}')
+    module.__file__ = str(path)
+    sys.modules[module.__name__] = module
+    try:
+        exec(compile(source, str(path), 'exec'), module.__dict__)
+    except Exception as error:
+        del sys.modules[module.__name__]
+        line = _line_in(error, path)
+        raise ModelError(
+            f'{path}{line}: {type(error).__name__}: {_one_line(error)}; correct the file'
+        ) from None
+    return module
+
+
+def _line_in(error: Exception, path: Path) -> str:
+    if isinstance(error, SyntaxError):
+        return f', line {error.lineno}'
+    traceback, number = error.__traceback__, None
+    while traceback is not None:
+        if traceback.tb_frame.f_code.co_filename == str(path):
+            number = traceback.tb_lineno
+        traceback = traceback.tb_next
+    return f', line {number}' if number else ''
+
+
+def _one_line(error: Exception) -> str:
+    """The telling line of a message; compilers begin theirs with how far they came."""
+    text = re.sub(r'\x1b\[[0-9;]*m', '', str(error))
+    lines = [line.strip() for line in text.splitlines() if line.strip()]
+    telling = [line for line in lines if not line.startswith('Failed in ')]
+    return (telling or lines or [type(error).__name__])[0]
+
+
+def _checked(module: ModuleType, path: Path) -> type[Effect]:
+    classes = [
+        value
+        for value in vars(module).values()
+        if inspect.isclass(value)
+        and issubclass(value, Effect)
+        and value.__module__ == module.__name__
+    ]
+    if not classes:
+        raise ModelError(f'{path}: has no effect; define one class that derives from Effect')
+    if len(classes) > 1:
+        names = ', '.join(c.__name__ for c in classes)
+        raise ModelError(f'{path}: has several effects ({names}); keep one a file')
+    effect = classes[0]
+    problem = _problem_with(effect)
+    if problem:
+        raise ModelError(f'{path}: {effect.__name__} {problem}')
+    return effect
+
+
+def _problem_with(effect: type[Effect]) -> str | None:
+    """What is wrong and how to put it right, or None."""
+    for name in ('id', 'family'):
+        value = getattr(effect, name, None)
+        if not isinstance(value, str) or not value:
+            return f"has no {name}; add a line {name} = '...'"
+    if not re.fullmatch('[a-z][a-z0-9_]*', effect.id):
+        return f'has the id {effect.id!r}; use small letters, digits and _'
+    for name, field in effect.model_fields.items():
+        if not isinstance(field.json_schema_extra, dict) or 'role' not in field.json_schema_extra:
+            return f'declares {name} without parameter(...); give its unit and bounds there'
+    if not effect.amplitudes():
+        return 'has no amplitude; declare one with parameter(0.0, low=..., high=..., typical=...)'
+    for name, described in effect.parameters().items():
+        values = [described['low'], described['neutral'], described['high']]
+        if sorted(values) != values or not values[0] <= described['typical'] <= values[2]:
+            return f'has a neutral or typical {name} outside its bounds; widen them'
+    if effect.typical().is_neutral:
+        return 'is absent at its typical size; make typical differ from neutral'
+    if all(getattr(effect, place) is getattr(Effect, place) for place in PLACES):
+        return f'does nothing; define one of {", ".join(PLACES)}'
+    laws = (_problem_with_law(effect, name) for name in LAWS)
+    return next(filter(None, laws), None) or _problem_with_places(effect.typical())
+
+
+def _problem_with_law(effect: type[Effect], name: str) -> str | None:
+    law = getattr(effect, name)
+    if law is None:
+        return None
+    if not isinstance(inspect.getattr_static(effect, name), staticmethod):
+        return f'defines {name} with self; put @staticmethod before it'
+    wanted = ['ray', *effect.model_fields]
+    if list(inspect.signature(law).parameters)[1:] != wanted[1:]:
+        return f'must define {name}({", ".join(wanted)}): the ray, then all its parameters'
+    values = np.array(effect.typical().values(), dtype=np.float32)
+    try:
+        result = njit(error_model='numpy')(in_precision(law, np.float32))(TRIAL_RAY, *values)
+    except Exception as error:
+        return (
+            f'has a {name} that does not compile ({_one_line(error)}); keep to arithmetic, min, '
+            'max and film.fast_math'
+        )
+    if not isinstance(result, float) or not np.isfinite(result) or result < 0.0:
+        return f'has a {name} that gives {result!r} on an ordinary ray; a factor is 0 or more'
+    return None
+
+
+def _problem_with_places(effect: Effect) -> str | None:
+    """Try the effect on a short path and a few points."""
+    square = np.array([[x, 0.0, z] for x in (0.0, 0.1) for z in (0.0, 0.1)])
+    points = SurfacePoints(square, np.tile([0.0, -1.0, 0.0], (4, 1)))
+    context = PathContext(Projection(), points.down, points.outward, points.centre_m)
+    path = _trial_path()
+    trials: dict[str, Callable[[], Any]] = {
+        'on_path': lambda: effect.on_path(path, context),
+        'on_film': lambda: effect.on_film(np.full(4, 20.0), points),
+        'on_gauge': lambda: effect.on_gauge(np.full(4, 20.0), points),
+    }
+    for place, trial in trials.items():
+        try:
+            result = trial()
+        except Exception as error:
+            return f'has an {place} that fails ({type(error).__name__}: {_one_line(error)})'
+        if place == 'on_path':
+            if not isinstance(result, SprayPath) or len(result) != len(path):
+                return 'has an on_path that does not return a path; return path.with_(...)'
+        elif np.shape(result) != (4,) or not np.isfinite(result).all():
+            return f'has an {place} that does not return a finite film; return one value a point'
+    return None
+
+
+def _trial_path() -> SprayPath:
+    stamps_ns = np.arange(4) * 20_000_000
+    positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
+    toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
+    return spray_path(Trajectory(stamps_ns, positions_m, toward_y))[0]

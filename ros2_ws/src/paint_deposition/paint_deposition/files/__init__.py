@@ -1,0 +1,1 @@
+"""Files that are read: recordings, robot programs, meshes, models, readings, campaigns."""

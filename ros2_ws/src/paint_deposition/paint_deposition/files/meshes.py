@@ -1,0 +1,209 @@
+"""Part meshes in (STL, PLY, OBJ) and painted meshes out (PLY)."""
+
+from io import BytesIO
+from pathlib import Path
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from paint_deposition.errors import MeshError
+from paint_deposition.files.atomic import replacing
+from paint_deposition.part.creases import Edges
+from paint_deposition.part.refinement import face_areas_m2, weld
+from paint_deposition.part.surface import Surface
+
+SUFFIXES = ('.stl', '.ply', '.obj')
+LARGEST_M = 50.0
+SMALLEST_M = 0.005
+# Triangles lower than this have no direction that could be trusted.
+LEAST_HEIGHT_M = 1e-7
+
+
+def read_mesh(
+    path: str | Path,
+    scale: float = 1.0,
+    max_edge_length_m: float = 0.02,
+    down: np.ndarray | None = None,
+) -> Surface:
+    """Read a part and refine it.
+
+    The winding says which side is outward, toward the gun. An open skin is taken as it is; a
+    closed body that is inside out is turned round, and triangles wound against their neighbours
+    are turned to the majority, both with a note in ``Surface.notes``.
+
+    Args:
+        path: STL, PLY or OBJ.
+        scale: metres per unit of the file, 0.001 for millimetres.
+        max_edge_length_m: longest edge after refinement [m].
+        down: gravity in the mesh frame; default: -z if the part stands, -y if it lies in x-y.
+
+    Raises:
+        MeshError: no file, not a mesh, or nothing that could be painted; says what to do.
+    """
+    path = Path(path)
+    _require_positive('mesh_scale', scale, 'metres per unit of the file, 0.001 for millimetres')
+    _require_positive('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance')
+    if down is not None and not (np.isfinite(down).all() and np.any(down)):
+        given = np.asarray(down, dtype=float).tolist()
+        raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
+    vertices, faces = _load(path)
+    vertices = vertices * scale
+    _check_extent(path, vertices[faces.ravel()])
+    vertices, faces = weld(vertices, faces)
+    notes = []
+    faces = _without_degenerate(path, vertices, faces, notes)
+    faces = _oriented(vertices, faces, notes)
+    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
+
+
+def write_mesh_ply(
+    path: str | Path, surface: Surface, film_um: np.ndarray, colours: np.ndarray
+) -> None:
+    """Write the refined mesh with ``thickness_um`` at each vertex, replacing the file at once.
+
+    Args:
+        path: where to.
+        film_um: (V,) film [um].
+        colours: (V, 3) or (V, 4) uint8, shown by viewers.
+    """
+    from trimesh import Trimesh
+
+    painted = Trimesh(
+        surface.vertices_m,
+        surface.faces,
+        vertex_normals=surface.normals,
+        vertex_colors=colours,
+        vertex_attributes={'thickness_um': np.asarray(film_um, dtype=np.float32)},
+        process=False,
+        validate=False,
+    )
+    with replacing(path) as temporary:
+        temporary.write_bytes(painted.export(file_type='ply', vertex_normal=True))
+
+
+def _require_positive(name: str, value: float, meaning: str) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
+
+
+def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    if path.suffix.lower() not in SUFFIXES:
+        raise MeshError(
+            f'{path}: a mesh of type "{path.suffix}" cannot be read; '
+            f'export it as one of {", ".join(SUFFIXES)}'
+        )
+    if not path.is_file():
+        raise MeshError(f'{path}: no such mesh file; check the path')
+    import trimesh
+
+    kind = path.suffix.lower()[1:]
+    content = _as_utf8(path, kind)
+    try:
+        mesh = trimesh.load_mesh(
+            BytesIO(content), file_type=kind, process=False, validate=False, skip_materials=True
+        )
+        vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+    except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
+        raise MeshError(
+            f'{path}: not readable as a mesh ({_first_line(error)}); export it again'
+        ) from error
+    if not len(faces):
+        raise MeshError(f'{path}: holds no triangles; export the skin as a triangle mesh')
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(
+            f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
+            'export it again'
+        )
+    wrong = np.sum(~np.isfinite(vertices).all(axis=1))
+    if wrong:
+        raise MeshError(
+            f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
+        )
+    return vertices, faces
+
+
+def _as_utf8(path: Path, kind: str) -> bytes:
+    """The file's bytes, those of a text with letters of any encoding made readable."""
+    content = path.read_bytes()
+    if kind == 'ply':
+        return content
+    if kind == 'stl':
+        triangles = int.from_bytes(content[80:84], 'little')
+        if len(content) == 84 + 50 * triangles:
+            return content
+        if content and b'facet' not in content:
+            raise MeshError(
+                f'{path}: not readable as a mesh, neither a text STL nor, with its '
+                f'{len(content)} bytes, a complete binary one; export it again'
+            )
+    return content.decode('utf-8', errors='replace').encode()
+
+
+def _first_line(error: Exception) -> str:
+    lines = str(error).strip().splitlines()
+    return lines[0][:120] if lines else type(error).__name__
+
+
+def _check_extent(path: Path, corners_m: np.ndarray) -> None:
+    extent = float(np.ptp(corners_m, axis=0).max())
+    if extent > LARGEST_M:
+        raise MeshError(
+            f'{path}: the part would be {extent:.4g} m large, it looks like millimetres; '
+            "use --mesh-scale 0.001, or mesh_scale: 0.001 in a campaign or as the node's parameter"
+        )
+    if extent < SMALLEST_M:
+        raise MeshError(
+            f'{path}: the part would be only {extent * 1e3:.3g} mm large, it looks scaled down; '
+            "use a larger --mesh-scale, or mesh_scale in a campaign or as the node's parameter"
+        )
+
+
+def _without_degenerate(
+    path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
+) -> np.ndarray:
+    corners = vertices_m[faces]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    good = 2.0 * face_areas_m2(vertices_m, faces) > LEAST_HEIGHT_M * longest
+    if not good.any():
+        raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
+    if not good.all():
+        notes.append(f'{np.sum(~good)} of {len(faces)} triangles without area were left out')
+    return faces[good]
+
+
+def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:
+    edges = Edges.of(faces)
+    if len(edges.clashing):
+        turned = _turned_to_majority(vertices_m, faces, edges)
+        count = np.sum((turned != faces).any(axis=1))
+        notes.append(f'{count} triangles wound against their neighbours were turned round')
+        faces, edges = turned, Edges.of(turned)
+    closed = not len(edges.single) and not len(edges.clashing)
+    if closed and _volume_m3(vertices_m, faces) < 0.0:
+        notes.append('the closed body was inside out and was turned round')
+        faces = faces[:, ::-1]
+    return np.ascontiguousarray(faces)
+
+
+def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
+    """Wind each connected skin alike, as most of its area was."""
+    from trimesh import Trimesh
+    from trimesh.repair import fix_winding
+
+    mesh = Trimesh(vertices_m, faces, process=False, validate=False)
+    fix_winding(mesh)
+    turned = (np.asarray(mesh.faces) != faces).any(axis=1)
+    pairs = np.concatenate([edges.paired, edges.clashing]).T // 3
+    links = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(len(faces), len(faces)))
+    _, skin = connected_components(links, directed=False)
+    areas = face_areas_m2(vertices_m, faces)
+    turned_share = np.bincount(skin, areas * turned) / np.bincount(skin, areas)
+    turned ^= (turned_share > 0.5)[skin]
+    return np.where(turned[:, None], faces[:, ::-1], faces)
+
+
+def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+    return float(np.einsum('ij,ij->', a, np.cross(b, c)) / 6.0)

@@ -1,0 +1,161 @@
+"""Model files: the deposition model with its effects, as YAML that a person edits."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ValidationError
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.errors import ModelError
+from paint_deposition.files.atomic import write_text
+from paint_deposition.files.model_text import model_text
+from paint_deposition.files.refusals import boolean_number, nearest, refusal
+from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
+
+SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
+WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
+KEYS = ('name', *SECTIONS, 'effects', 'uncertainty', 'history')
+
+Made = TypeVar('Made', bound=BaseModel)
+
+
+@dataclass(frozen=True)
+class ModelFile:
+    """A model and what is known about it.
+
+    Attributes:
+        model: the deposition model.
+        name: what the user calls it, '' for nothing.
+        uncertainty: standard deviations of parameters, in the sections of the model.
+        history: what was added to it and why, oldest first.
+    """
+
+    model: DepositionModel
+    name: str = ''
+    uncertainty: Mapping[str, Any] = field(default_factory=dict)
+    history: Sequence[Mapping[str, Any]] = ()
+
+
+def read_model(path: str | Path) -> DepositionModel:
+    """The deposition model of a file.
+
+    Raises:
+        ModelError: naming the file, the key, its value and the remedy.
+    """
+    return read_model_file(path).model
+
+
+def read_model_file(path: str | Path) -> ModelFile:
+    """The deposition model of a file with its name, uncertainty and history.
+
+    What the file leaves out has its default. Effects given as ``file`` are looked for beside the
+    model file, and their code is run.
+
+    Raises:
+        ModelError: naming the file, the key, its value and the remedy.
+    """
+    path = Path(path)
+    content = read_yaml(path, 'model', ModelError)
+    if not isinstance(content, dict):
+        raise ModelError(f'{path}: holds no model; expected the keys planar and projection')
+    try:
+        return _model_file(content, path.parent)
+    except ModelError as error:
+        raise ModelError(f'{path}: {error}') from None
+
+
+def write_model(
+    path: str | Path,
+    model: DepositionModel,
+    header_comment: str | None = None,
+    history: Sequence[Mapping[str, Any]] | None = None,
+    uncertainty: Mapping[str, Any] | None = None,
+    name: str = '',
+) -> None:
+    """Write a model with what each number means; an older file is replaced at once.
+
+    Args:
+        path: YAML; files of users' own effects are named relative to it.
+        model: reading the file gives exactly this model.
+        header_comment: lines to put at the top.
+        history, uncertainty, name: as in ``ModelFile``.
+    """
+    path = Path(path)
+    extras = {'uncertainty': uncertainty or {}, 'history': list(history or ())}
+    write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
+
+
+def _model_file(content: dict[str, Any], folder: Path) -> ModelFile:
+    for key in content:
+        if key not in KEYS:
+            raise ModelError(f'unknown key {key!r}; {nearest(key, KEYS)}')
+    sections = {key: _section(key, content.get(key)) for key in SECTIONS}
+    effects = _effects(content.get('effects'), folder)
+    return ModelFile(
+        DepositionModel(**sections, effects=effects),
+        _of_type('name', content.get('name'), str, ''),
+        _of_type('uncertainty', content.get('uncertainty'), dict, {}),
+        _history(content.get('history')),
+    )
+
+
+def _history(entries: Any) -> list[dict[str, Any]]:
+    return [
+        _of_type(f'history, entry {number}', entry, dict, {})
+        for number, entry in enumerate(_of_type('history', entries, list, []), start=1)
+    ]
+
+
+def _section(key: str, values: Any) -> BaseModel:
+    return _made(SECTIONS[key], key, _of_type(key, values, dict, {}))
+
+
+def _effects(entries: Any, folder: Path) -> tuple[Effect, ...]:
+    effects: list[Effect] = []
+    for number, entry in enumerate(_of_type('effects', entries, list, []), start=1):
+        effect = _effect(f'effects, entry {number}', entry, folder)
+        if effect.id in [other.id for other in effects]:
+            raise ModelError(f'effects: {effect.id!r} is there twice; keep one')
+        effects.append(effect)
+    return tuple(effects)
+
+
+def _effect(where: str, entry: Any, folder: Path) -> Effect:
+    entry = _of_type(where, entry, dict, {})
+    chosen = [key for key in ('id', 'file') if key in entry]
+    if len(chosen) != 1:
+        raise ModelError(f'{where}: has {" and ".join(chosen) or "no id"}; give one of id, file')
+    source = entry[chosen[0]]
+    if not isinstance(source, str):
+        raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
+    cls = effect_class(source) if chosen == ['id'] else load_effect_file(folder / source)
+    return _made(cls, source, {key: entry[key] for key in entry if key not in chosen})
+
+
+def _made(cls: type[Made], where: str, values: dict[Any, Any]) -> Made:
+    for key in values:
+        if not isinstance(key, str):
+            raise ModelError(f'{where}: unknown key {key!r}; expected names of parameters')
+    problem = boolean_number(cls, where, values)
+    if problem:
+        raise ModelError(problem)
+    try:
+        return cls(**values)
+    except ValidationError as error:
+        raise ModelError(refusal(cls, where, error)) from None
+
+
+def _of_type(key: str, value: Any, kind: type, default: Any) -> Any:
+    """The value, or the default where the file says nothing."""
+    if value is None:
+        return default
+    if not isinstance(value, kind):
+        raise ModelError(f'{key} is {value!r}; expected {WORDS[kind]}')
+    return value

@@ -1,0 +1,1 @@
+"""ABB RAPID modules: read as moves of the TCP, and written from planned passes."""

@@ -1,0 +1,171 @@
+"""The data of a RAPID module while it runs: values by name, frames, speeds and zones."""
+
+from __future__ import annotations
+
+import copy
+import operator
+import re
+from collections.abc import Callable
+from typing import Any, NoReturn
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.rapid.syntax import Module
+from paint_deposition.files.rapid.values import Call, Reference
+
+# Quaternions are written with four digits; further off is damage, not rounding.
+QUATERNION_TOLERANCE = 0.01
+# Of the records whose parts programs name: robtarget, pose, tooldata, wobjdata, speeddata.
+COMPONENTS = {
+    'trans': 0, 'rot': 1, 'robconf': 2, 'extax': 3, 'x': 0, 'y': 1, 'z': 2,
+    'q1': 0, 'q2': 1, 'q3': 2, 'q4': 3, 'v_tcp': 0, 'v_ori': 1,
+    'robhold': 0, 'tframe': 1, 'tload': 2, 'ufprog': 1, 'ufmec': 2, 'uframe': 3, 'oframe': 4,
+}  # fmt: skip
+ARITHMETIC: dict[str, Callable] = {
+    '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
+}  # fmt: skip
+# Robots differ; 5 m/s is the least that ABB states for `vmax`.
+VMAX_M_PER_S = 5.0
+
+
+class RapidData:
+    """Values of a module's data; assignments change them, as in the controller."""
+
+    def __init__(self, module: Module, source: str) -> None:
+        self._source = source
+        self._types = {name: datum.type for name, datum in module.data.items()}
+        self._values: dict[str, object] = {}
+        for name, datum in module.data.items():
+            if datum.value is not None:
+                self._values[name] = self.value(datum.value, datum.line)
+
+    def fail(self, line: int, reason: str) -> NoReturn:
+        raise RecordingError(f'{self._source} line {line}: {reason}')
+
+    def value(self, expression: object, line: int) -> Any:
+        """What an expression stands for."""
+        if isinstance(expression, list):
+            return [self.value(item, line) for item in expression]
+        if isinstance(expression, Call):
+            return self._call(expression, line)
+        if isinstance(expression, Reference):
+            return self._look_up(expression, line)
+        return expression
+
+    def assign(self, target: Reference, value: object, line: int) -> None:
+        if not (target.indexes or target.components):
+            self._values[target.name] = value
+            return
+        place: Any = self._values.get(target.name)
+        path = self._path(target, line)
+        for index in path[:-1]:
+            place = place[index] if isinstance(place, list) else None
+        if not isinstance(place, list) or path[-1] >= len(place):
+            self.fail(line, f'{target.name} has no such part to assign to')
+        place[path[-1]] = value
+
+    # --- motion data
+
+    def target(self, expression: object, line: int) -> tuple[np.ndarray, Rotation]:
+        """Position [m] and orientation of a robtarget, in its work object."""
+        value = self.value(expression, line)
+        if not (isinstance(value, list) and len(value) == 4 and self._is_frame(value[:2])):
+            self.fail(line, 'a robtarget expected')
+        return self.frame(value[:2], line)
+
+    def frame(self, value: list, line: int) -> tuple[np.ndarray, Rotation]:
+        """Position [m] and orientation of [[x, y, z] in mm, [q1, q2, q3, q4] scalar first]."""
+        w, x, y, z = value[1]
+        norm = float(np.linalg.norm([w, x, y, z]))
+        if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+            self.fail(line, f'quaternion {value[1]} has the norm {norm:.4f} instead of 1')
+        return np.array(value[0]) * 1e-3, Rotation.from_quat([x, y, z, w])
+
+    def speed_m_per_s(self, expression: object, line: int) -> float:
+        """Speed of the TCP of a speeddata."""
+        name = expression.name if isinstance(expression, Reference) else ''
+        if name not in self._values:
+            if name == 'vmax':
+                return VMAX_M_PER_S
+            if predefined := re.fullmatch(r'v(\d+)', name):
+                return float(predefined[1]) * 1e-3
+        value = self.value(expression, line)
+        if not (isinstance(value, list) and len(value) == 4 and isinstance(value[0], float)):
+            self.fail(line, 'a speeddata expected')
+        return value[0] * 1e-3
+
+    def zone_m(self, expression: object, line: int) -> float:
+        """Radius of a zonedata in which the corner is cut; 0 for a stop point."""
+        name = expression.name if isinstance(expression, Reference) else ''
+        if name not in self._values:
+            if name == 'fine':
+                return 0.0
+            if predefined := re.fullmatch(r'z(\d+)', name):
+                return max(float(predefined[1]), 0.3) * 1e-3  # z0 is 0.3 mm
+        value = self.value(expression, line)
+        if not (isinstance(value, list) and len(value) == 7):
+            self.fail(line, 'a zonedata expected')
+        return 0.0 if value[0] else value[1] * 1e-3
+
+    def work_object(self, name: str, line: int) -> tuple[np.ndarray, Rotation] | None:
+        """Object frame in the world [m]; None when the module does not define it."""
+        if name not in self._values:
+            return (np.zeros(3), Rotation.identity()) if name == 'wobj0' else None
+        value: Any = self._values[name]
+        if not (isinstance(value, list) and len(value) == 5):
+            self.fail(line, f'{name} is no wobjdata')
+        if value[0]:
+            self.fail(line, f'the robot holds the work object {name}; give a fixed one')
+        position, rotation = self.frame(value[3], line)
+        object_position, object_rotation = self.frame(value[4], line)
+        return position + rotation.apply(object_position), rotation * object_rotation
+
+    def tool_is_held(self, name: str) -> bool:
+        value = self._values.get(name)
+        return not isinstance(value, list) or value[0] is not False
+
+    # --- names and functions
+
+    @staticmethod
+    def _is_frame(value: list) -> bool:
+        return all(isinstance(part, list) for part in value) and list(map(len, value)) == [3, 4]
+
+    def _path(self, reference: Reference, line: int) -> list[int]:
+        path = [int(self.value(index, line)) - 1 for index in reference.indexes]
+        for component in reference.components:
+            if component not in COMPONENTS:
+                self.fail(line, f'component {component} of {reference.name} is not known')
+            path.append(COMPONENTS[component])
+        return path
+
+    def _look_up(self, reference: Reference, line: int) -> object:
+        if reference.name not in self._values:
+            kind = self._types.get(reference.name)
+            what = f'{kind} {reference.name} has no value yet' if kind else (
+                f'{reference.name} is not declared in this module'
+            )  # fmt: skip
+            self.fail(line, what)
+        value = self._values[reference.name]
+        for index in self._path(reference, line):
+            if not isinstance(value, list) or not 0 <= index < len(value):
+                self.fail(line, f'{reference.name} has no such part')
+            value = value[index]
+        return copy.deepcopy(value)
+
+    def _call(self, call: Call, line: int) -> object:
+        arguments = [self.value(argument, line) for argument in call.arguments]
+        if call.function in ARITHMETIC and all(isinstance(a, float) for a in arguments):
+            return ARITHMETIC[call.function](*arguments)
+        if call.function not in ('offs', 'reltool') or len(arguments) != 4 or call.options:
+            self.fail(line, f'{call.function} is not evaluated here; write its value instead')
+        return self._displaced(call.function, arguments[0], arguments[1:], line)
+
+    def _displaced(self, function: str, target: Any, step_mm: list, line: int) -> list:
+        _, rotation = self.target(target, line)
+        if function == 'reltool':
+            step_mm = rotation.apply(step_mm).tolist()
+        moved = copy.deepcopy(target)
+        moved[0] = [value + step for value, step in zip(moved[0], step_mm, strict=True)]
+        return moved

@@ -1,0 +1,286 @@
+"""ABB RAPID programs as moves of the TCP, with the gun's switching."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.rapid.data import RapidData
+from paint_deposition.files.rapid.syntax import Instruction, Module, parse_module
+from paint_deposition.files.rapid.values import Reference
+
+# Instruction -> number of its targets; the last is where it ends.
+MOVES = {
+    'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
+    'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
+}  # fmt: skip
+JOINT_MOVES = ('moveabsj', 'moveextj')
+TRIGGERS = ('triggio', 'triggequip')
+
+
+@dataclass(frozen=True)
+class GunSwitch:
+    """A change of the gun on the way: so far from the start or before the end of the move."""
+
+    distance_m: float
+    from_start: bool
+    on: bool
+
+
+@dataclass(frozen=True)
+class RapidMove:
+    """A move of the TCP as programmed; zones cut its corners on the robot.
+
+    Attributes:
+        instruction: RAPID's name in lower case. line: where it stands.
+        position_m, quaternion_xyzw: pose of the TCP at the end, in the world (or in the work
+            object, where the module does not define that).
+        via_m: (3,) point on the way of a circular move, None for others.
+        speed_m_per_s: programmed speed; zone_m: radius in which the corner is cut, 0: stop.
+        spraying: whether the gun is on as the move begins.
+        switches: changes on the way, in the order written.
+    """
+
+    instruction: str
+    line: int
+    position_m: np.ndarray
+    quaternion_xyzw: np.ndarray
+    via_m: np.ndarray | None
+    speed_m_per_s: float
+    zone_m: float
+    tool: str
+    work_object: str
+    spraying: bool
+    switches: tuple[GunSwitch, ...] = ()
+
+
+@dataclass
+class RapidProgram:
+    """Moves in the order they run, and what was left out or assumed, a line each.
+
+    ``gun_signal`` is the digital output that opens the gun, '' where none is set.
+    """
+
+    module: str
+    gun_signal: str = ''
+    moves: list[RapidMove] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_program(
+    path: Path | str, procedure: str | None = None, gun_signal: str | None = None
+) -> RapidProgram:
+    """Read the moves of a RAPID module (.mod, .prg).
+
+    Args:
+        procedure: where to begin; None: main, or the only procedure. Procedures that it calls
+            without arguments are followed.
+        gun_signal: digital output that opens the gun; None: the only one that the module sets.
+
+    Raises:
+        RecordingError: one line naming file, line and remedy: what is no RAPID, moves inside
+            loops and conditions, values from elsewhere, quaternions more than 1 % off.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding='utf-8', errors='replace')
+    except OSError as error:
+        raise RecordingError(f'cannot read {path}: {error.strerror}') from None
+    module = parse_module(text, str(path))
+    return _Run(module, str(path), gun_signal).run(procedure)
+
+
+class _Run:
+    def __init__(self, module: Module, source: str, gun_signal: str | None) -> None:
+        self._module = module
+        self._source = source
+        self._data = RapidData(module, source)
+        self._program = RapidProgram(module.name)
+        self._signal = self._gun_signal(gun_signal)
+        self._program.gun_signal = self._signal or ''
+        self._gun_on = False
+        self._brush: float | None = None
+        self._triggers: dict[str, GunSwitch] = {}
+        self._position_m: np.ndarray | None = None
+        self._calls: list[str] = []
+
+    def run(self, procedure: str | None) -> RapidProgram:
+        self._follow(self._entry(procedure))
+        if not self._program.moves:
+            raise RecordingError(f'{self._source} has no moves of the TCP; nothing to read')
+        return self._program
+
+    def _entry(self, procedure: str | None) -> str:
+        names = list(self._module.procedures)
+        if procedure is None:
+            procedure = names[0] if len(names) == 1 else 'main'
+        if procedure.lower() not in names:
+            found = ' '.join(names) or 'none'
+            raise RecordingError(
+                f'{self._source} has no procedure {procedure}; its procedures: {found}'
+            )
+        return procedure.lower()
+
+    def _gun_signal(self, given: str | None) -> str | None:
+        everything = [i for body in self._module.procedures.values() for i in body]
+        signals = sorted({name for i in everything if (name := _signal_of(i))})
+        if given is None and len(signals) > 1:
+            raise RecordingError(
+                f'{self._source} sets {" ".join(signals)}; say which of them opens the gun'
+            )
+        if given is not None and given.lower() not in signals:
+            raise RecordingError(
+                f'{self._source} never sets {given}; it sets: {" ".join(signals) or "none"}'
+            )
+        return given.lower() if given else next(iter(signals), None)
+
+    def _note(self, text: str) -> None:
+        if text not in self._program.notes:
+            self._program.notes.append(text)
+
+    # --- instructions
+
+    def _follow(self, procedure: str) -> None:
+        if procedure in self._calls:
+            raise RecordingError(f'{self._source}: procedure {procedure} calls itself')
+        self._calls.append(procedure)
+        for instruction in self._module.procedures[procedure]:
+            self._execute(instruction)
+        self._calls.pop()
+
+    def _execute(self, i: Instruction) -> None:
+        matters = i.name in MOVES or i.name in self._module.procedures or self._is_gun(i)
+        if i.block and matters:
+            self._data.fail(
+                i.line, f'{i.name} inside {i.block.upper()} is not followed; unroll it'
+            )
+        if i.name in MOVES:
+            self._move(i)
+        elif i.name in JOINT_MOVES:
+            self._note(f'line {i.line}: {i.name} skipped: joint angles need the robot')
+            self._position_m = None
+        elif i.name in self._module.procedures:
+            self._follow(i.name)
+        elif i.name == ':=' and not i.block:
+            target: Any = i.arguments[0].value
+            self._data.assign(target, self._data.value(i.arguments[1].value, i.line), i.line)
+        elif i.name == 'setbrush':
+            self._brush = float(self._data.value(i.arguments[0].value, i.line))
+        elif i.name in TRIGGERS and self._is_gun(i):
+            self._triggers[_name(i.arguments[0].value)] = self._switch(i)
+        elif self._is_gun(i):
+            self._gun_on = self._level(i)
+
+    def _is_gun(self, i: Instruction) -> bool:
+        return self._signal is not None and _signal_of(i) == self._signal
+
+    def _level(self, i: Instruction) -> bool:
+        if i.name in ('set', 'reset'):
+            return i.name == 'set'
+        return bool(self._data.value(i.arguments[-1].value, i.line))
+
+    def _switch(self, i: Instruction) -> GunSwitch:
+        options = i.options()
+        if options.get('time'):
+            self._data.fail(i.line, f'{i.name} by time is not followed; give a distance')
+        distance_m = float(self._data.value(i.arguments[1].value, i.line)) * 1e-3
+        return GunSwitch(distance_m, bool(options.get('start')), self._level(i))
+
+    # --- moves
+
+    def _move(self, i: Instruction) -> None:
+        count = MOVES[i.name]
+        own_signal = i.name.endswith('do')
+        values = [a.value for a in (i.arguments[:-2] if own_signal else i.arguments)]
+        if len(values) < count + 3:
+            self._data.fail(i.line, f'{i.name} needs a target, a speed, a zone and a tool')
+        tool, work_object = _name(values[-1]), _name(i.options().get('wobj') or 'wobj0')
+        if not self._data.tool_is_held(tool):
+            self._data.fail(
+                i.line, f'tool {tool} stands still; only tools the robot holds are read'
+            )
+        poses = [self._in_world(value, work_object, i.line) for value in values[:count]]
+        position_m, rotation = poses[-1]
+        spraying, switches = self._gun(i, values[count + 1 : -2])
+        self._program.moves.append(
+            RapidMove(
+                instruction=i.name,
+                line=i.line,
+                position_m=position_m,
+                quaternion_xyzw=rotation.as_quat(),
+                via_m=poses[0][0] if count == 2 else None,
+                speed_m_per_s=self._speed(i, values[count], position_m),
+                zone_m=self._data.zone_m(values[-2], i.line),
+                tool=tool,
+                work_object=work_object,
+                spraying=spraying,
+                switches=switches,
+            )
+        )
+        self._position_m = position_m
+        if switches:
+            self._gun_on = switches[-1].on
+        if own_signal and self._is_gun(i):
+            self._gun_on = self._level(i)
+
+    def _in_world(
+        self, target: object, work_object: str, line: int
+    ) -> tuple[np.ndarray, Rotation]:
+        position_m, rotation = self._data.target(target, line)
+        frame = self._data.work_object(work_object, line)
+        if frame is None:
+            self._note(f'work object {work_object} is not in the module: poses are in its frame')
+            return position_m, rotation
+        return frame[0] + frame[1].apply(position_m), frame[1] * rotation
+
+    def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
+        options = i.options()
+        if 'v' in options:
+            return float(self._data.value(options['v'], i.line)) * 1e-3
+        if 't' in options and self._position_m is not None:
+            duration_s = float(self._data.value(options['t'], i.line))
+            return float(np.linalg.norm(position_m - self._position_m)) / duration_s
+        if _name(value) == 'vmax':
+            self._note("vmax is the robot's own; 5 m/s assumed")
+        return self._data.speed_m_per_s(value, i.line)
+
+    def _gun(self, i: Instruction, between: list) -> tuple[bool, tuple[GunSwitch, ...]]:
+        if i.name.startswith('paint'):
+            if self._brush is None:
+                self._note('no SetBrush: paint moves are taken as spraying')
+            return self._brush != 0.0, ()
+        if not i.name.startswith('trigg'):
+            return self._gun_on, ()
+        names = [
+            *map(_name, between),
+            *(_name(i.options()[k]) for k in i.options() if _is_trigger(k)),
+        ]
+        switches = [self._triggers[name] for name in names if name in self._triggers]
+        at_start = [switch for switch in switches if switch.from_start and not switch.distance_m]
+        later = tuple(switch for switch in switches if switch not in at_start)
+        self._gun_on = at_start[-1].on if at_start else self._gun_on
+        return self._gun_on, later
+
+
+def _signal_of(i: Instruction) -> str:
+    """The digital output that an instruction sets, '' if none."""
+    if i.name in ('setdo', 'set', 'reset') and i.arguments:
+        return _name(i.arguments[0].value)
+    if i.name in TRIGGERS:
+        return _name(i.options().get('dop') or '')
+    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.arguments) > 2:
+        return _name(i.arguments[-2].value)
+    return ''
+
+
+def _is_trigger(option: str) -> bool:
+    return option in ('t2', 't3', 't4', 't5', 't6', 't7', 't8')
+
+
+def _name(value: object) -> str:
+    return value.name if isinstance(value, Reference) else str(value)

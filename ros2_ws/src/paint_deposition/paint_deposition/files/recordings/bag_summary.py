@@ -1,0 +1,81 @@
+"""What a bag holds, at a glance: its topics, and how good its streams of poses are."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+
+from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
+from paint_deposition.files.recordings.bags import (
+    BOOL_TYPE,
+    POSE_TYPE,
+    STATE_TYPE,
+    read_trajectory,
+)
+from paint_deposition.motion.path_builder import gap_ns
+
+
+@dataclass(frozen=True)
+class PoseStream:
+    """Figures of one PoseStamped topic, from its header stamps."""
+
+    topic: str
+    frame_id: str
+    poses: int
+    duration_s: float
+    mean_rate_hz: float
+    gaps: int
+    longest_gap_s: float
+    repeated_stamps: int
+    backward_stamps: int
+
+
+@dataclass(frozen=True)
+class BagSummary:
+    """Topics of a bag, its pose streams, and the topics that can serve as trigger."""
+
+    path: str
+    topics: list[BagTopic]
+    pose_streams: list[PoseStream]
+    triggers: list[str]
+
+    def as_dict(self) -> dict:
+        return {
+            'path': self.path,
+            'topics': [topic._asdict() for topic in self.topics],
+            'pose_streams': [asdict(stream) for stream in self.pose_streams],
+            'triggers': self.triggers,
+        }
+
+
+def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
+    """Look at every topic of a bag and read its poses; a longer interval is counted as a gap."""
+    with open_bag(path) as bag:
+        topics = bag.topics
+        triggers = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
+    streams = [
+        _pose_stream(path, topic.name, max_pose_gap_s)
+        for topic in topics
+        if topic.type == POSE_TYPE and topic.message_count
+    ]
+    return BagSummary(str(path), topics, streams, triggers)
+
+
+def _pose_stream(path: Path | str, topic: str, max_pose_gap_s: float) -> PoseStream:
+    trajectory = read_trajectory(path, topic)
+    steps_ns = np.diff(trajectory.stamps_ns)
+    gaps_ns = steps_ns[steps_ns > gap_ns(max_pose_gap_s)]
+    duration_s = trajectory.duration_s
+    return PoseStream(
+        topic=topic,
+        frame_id=trajectory.frame_id,
+        poses=len(trajectory),
+        duration_s=duration_s,
+        mean_rate_hz=len(steps_ns) / duration_s if duration_s > 0.0 else 0.0,
+        gaps=len(gaps_ns),
+        longest_gap_s=float(steps_ns.max(initial=0)) * 1e-9,
+        repeated_stamps=int(np.count_nonzero(steps_ns == 0)),
+        backward_stamps=int(np.count_nonzero(steps_ns < 0)),
+    )

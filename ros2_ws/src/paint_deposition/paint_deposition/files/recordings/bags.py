@@ -1,0 +1,268 @@
+"""A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+from rosbags.typesys import get_typestore
+from rosbags.typesys.store import Typestore
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.recorded_qos import offered_qos
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trigger import relative_flow
+
+POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
+STATE_TYPE = 'paint_msgs/msg/AtomizerState'
+BOOL_TYPE = 'std_msgs/msg/Bool'
+POSE_TOPIC = '/atomizer/pose'
+STATE_TOPIC = '/atomizer/state'
+# A Bool has no stamp; the time it was logged at stands in for it as long as the poses show that
+# the recorder's clock is the robot's.
+MAX_CLOCK_OFFSET_S = 1.0
+WRITTEN_DEPTH = 500
+
+
+def read_trajectory(
+    path: Path | str, pose_topic: str | None = None, state_topic: str | None = None
+) -> Trajectory:
+    """Read the atomizer's motion from a bag.
+
+    Args:
+        path: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP, split or not) or lone .mcap.
+        pose_topic: its PoseStamped topic, leading slash or not; None takes the only one.
+        state_topic: paint_msgs/AtomizerState, which counts from its header stamp, or
+            std_msgs/Bool, which counts from its log time. None: the gun always sprays, and
+            topics that could be its trigger are noted.
+
+    Returns:
+        The poses as recorded, unscreened, with stamps in integer nanoseconds.
+
+    Raises:
+        RecordingError: one line that names the bag, what is wrong and what to do.
+    """
+    with open_bag(path) as bag:
+        poses = choose_pose_topic(bag, pose_topic)
+        state = choose_state_topic(bag, state_topic) if state_topic else None
+        notes = () if state else _unused_triggers(bag)
+        read = _read_poses(bag, poses)
+        changes = sorted(_flow_changes(bag, state), key=lambda change: change[0]) if state else []
+        if state and state.type == BOOL_TYPE:
+            _refuse_other_clock(bag, state, read)
+    return Trajectory(
+        stamps_ns=read.stamps_ns,
+        positions_m=read.positions_m,
+        quaternions_xyzw=read.quaternions_xyzw,
+        frame_id=read.frame_id,
+        trigger_stamps_ns=np.array([stamp for stamp, _ in changes], dtype=np.int64),
+        trigger_flow=np.array([flow for _, flow in changes], dtype=float),
+        notes=notes,
+    )
+
+
+def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
+    """The named PoseStamped topic of a bag, or its only one; the errors list those there are."""
+    candidates = bag.topics_of(POSE_TYPE)
+    if not name:
+        if len(candidates) != 1:
+            raise RecordingError(f'{bag.path}: name a pose topic; {_listed(candidates)}')
+        name = candidates[0]
+    topic = bag.find(name)
+    if topic is None:
+        raise RecordingError(f'{bag.path} has no topic {name}; {_listed(candidates)}')
+    if topic.type != POSE_TYPE:
+        raise RecordingError(
+            f'{topic.name} in {bag.path} is {topic.type}, not {POSE_TYPE}; {_listed(candidates)}'
+        )
+    if topic.message_count == 0:
+        raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
+    return topic
+
+
+def choose_state_topic(bag: Bag, name: str) -> BagTopic:
+    """The named trigger topic of a bag."""
+    candidates = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
+    listed = _listed(candidates, 'state')
+    topic = bag.find(name)
+    if topic is None:
+        raise RecordingError(f'{bag.path} has no topic {name}; {listed}')
+    if topic.type not in (STATE_TYPE, BOOL_TYPE):
+        raise RecordingError(
+            f'{topic.name} in {bag.path} is {topic.type}, '
+            f'not {STATE_TYPE} or {BOOL_TYPE}; {listed}'
+        )
+    return topic
+
+
+def stamp_ns(header: Any) -> int:
+    """A header's stamp in integer nanoseconds, which a float could not hold."""
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def _listed(candidates: list[str], kind: str = 'PoseStamped') -> str:
+    if not candidates:
+        return f'it has no {kind} topic'
+    return f'its {kind} topics: {" ".join(candidates)}'
+
+
+def _unused_triggers(bag: Bag) -> tuple[str, ...]:
+    """One note that names the topics that could be the trigger; none where there are none."""
+    # States say what they are, a Bool may be anything: the first is the likeliest trigger.
+    topics = [
+        topic
+        for kind in (STATE_TYPE, BOOL_TYPE)
+        for topic in bag.topics
+        if topic.type == kind and topic.message_count
+    ]
+    if not topics:
+        return ()
+    named = ' and '.join(f'{topic.name} ({topic.type})' for topic in topics)
+    return (
+        f'recording {bag.path}: {named} {"is" if len(topics) == 1 else "are"} not used, the gun '
+        f'sprays whenever poses flow; add `state_topic: {topics[0].name}` (--state-topic) if '
+        'that is the trigger',
+    )
+
+
+class _Poses(NamedTuple):
+    topic: str
+    stamps_ns: np.ndarray
+    log_times_ns: np.ndarray
+    positions_m: np.ndarray
+    quaternions_xyzw: np.ndarray
+    frame_id: str
+
+
+def _read_poses(bag: Bag, topic: BagTopic) -> _Poses:
+    stamps, log_times, rows = [], [], []
+    frames: Counter[str] = Counter()
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        p, q = message.pose.position, message.pose.orientation
+        stamps.append(stamp_ns(message.header))
+        log_times.append(log_time_ns)
+        rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
+        frames[message.header.frame_id.lstrip('/')] += 1
+    if len(rows) != topic.message_count:
+        raise RecordingError(
+            f'{bag.path} lists {topic.message_count} messages on {topic.name} and holds '
+            f'{len(rows)}; run: paint recover {bag.path}'
+        )
+    if len(frames) > 1:
+        found = ', '.join(f"'{frame}' ({count})" for frame, count in sorted(frames.items()))
+        raise RecordingError(f'{topic.name} in {bag.path} mixes frames {found}; record one frame')
+    if len(stamps) > 1 and len(set(stamps)) == 1:
+        raise RecordingError(
+            f'all {len(stamps)} poses on {topic.name} in {bag.path} are stamped {stamps[0]} ns; '
+            'let the publisher stamp each pose'
+        )
+    values = np.array(rows, dtype=float)
+    return _Poses(
+        topic.name,
+        np.array(stamps, dtype=np.int64),
+        np.array(log_times, dtype=np.int64),
+        np.ascontiguousarray(values[:, :3]),
+        np.ascontiguousarray(values[:, 3:]),
+        next(iter(frames)),
+    )
+
+
+def _flow_changes(bag: Bag, topic: BagTopic) -> Iterator[tuple[int, float]]:
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        if topic.type == BOOL_TYPE:
+            yield log_time_ns, relative_flow(bool(message.data))
+            continue
+        stamp = stamp_ns(message.header)
+        if stamp == 0:
+            raise RecordingError(
+                f'{topic.name} in {bag.path} has a state without a stamp; '
+                'let the publisher stamp each state'
+            )
+        yield stamp, relative_flow(message.spraying, message.flow)
+
+
+def _refuse_other_clock(bag: Bag, state: BagTopic, poses: _Poses) -> None:
+    offset_s = float(np.median((poses.log_times_ns - poses.stamps_ns) * 1e-9))
+    if abs(offset_s) > MAX_CLOCK_OFFSET_S:
+        raise RecordingError(
+            f'{state.name} in {bag.path} has no stamps, and {poses.topic} was logged '
+            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead of {BOOL_TYPE}'
+        )
+
+
+def write_pose_bag(
+    folder: Path | str,
+    trajectory: Trajectory,
+    pose_topic: str = POSE_TOPIC,
+    state_topic: str = STATE_TOPIC,
+    custom_data: Mapping[str, str] | None = None,
+) -> Path:
+    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and Bool for its trigger.
+
+    The trigger's messages come before the poses that they hold for. A Bool is on or off: a
+    trajectory with another flow than 0 or 1 is refused.
+    """
+    levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
+    if levels:
+        raise RecordingError(
+            f'{folder}: a Bool trigger cannot hold flow {min(levels):g}; use 0 and 1'
+        )
+    types = get_typestore(definitions.STANDARD_STORE)
+    with RunWriter(folder, custom_data, ros_distro='kilted') as run:
+        _add_topic(run, pose_topic, POSE_TYPE)
+        if len(trajectory.trigger_stamps_ns):
+            _add_topic(run, state_topic, BOOL_TYPE)
+        for topic, time_ns, message, message_type in _in_order(
+            trajectory, types, pose_topic, state_topic
+        ):
+            cdr = bytes(types.serialize_cdr(message, message_type))
+            run.write(topic, cdr, time_ns, time_ns)
+    return run.folder
+
+
+def _add_topic(run: RunWriter, name: str, message_type: str) -> None:
+    qos = [offered_qos(WRITTEN_DEPTH)]
+    run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
+
+
+def _in_order(
+    trajectory: Trajectory, types: Typestore, pose_topic: str, state_topic: str
+) -> Iterator[tuple[str, int, object, str]]:
+    bool_class = types.types[BOOL_TYPE]
+    triggers = [
+        (int(stamp), 0, state_topic, bool_class(flow > 0.0), BOOL_TYPE)
+        for stamp, flow in zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True)
+    ]
+    poses = [
+        (int(stamp), 1, pose_topic, _pose(types, int(stamp), trajectory, row), POSE_TYPE)
+        for row, stamp in enumerate(trajectory.stamps_ns)
+    ]
+    for time_ns, _, topic, message, message_type in sorted(
+        triggers + poses, key=lambda item: item[:2]
+    ):
+        yield topic, time_ns, message, message_type
+
+
+def _pose(types: Typestore, time_ns: int, trajectory: Trajectory, row: int) -> object:
+    make = types.types
+    sec, nanosec = divmod(time_ns, 1_000_000_000)
+    x, y, z = trajectory.positions_m[row].tolist()
+    quaternion = trajectory.quaternions_xyzw[row].tolist()
+    if not all(map(math.isfinite, (x, y, z, *quaternion))):
+        raise RecordingError(f'pose {row} of {len(trajectory)} is not finite; nothing written')
+    return make[POSE_TYPE](
+        make['std_msgs/msg/Header'](
+            make['builtin_interfaces/msg/Time'](sec, nanosec), trajectory.frame_id
+        ),
+        make['geometry_msgs/msg/Pose'](
+            make['geometry_msgs/msg/Point'](x, y, z),
+            make['geometry_msgs/msg/Quaternion'](*quaternion),
+        ),
+    )

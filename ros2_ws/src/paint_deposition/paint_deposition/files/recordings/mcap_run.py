@@ -1,0 +1,264 @@
+"""A run on disk: serialised messages in exactly the MCAP layout that rosbag2 writes.
+
+A folder `<run>/` with `<run>_0.mcap` and, once the run is complete, `metadata.yaml` (version 9).
+The folder without `metadata.yaml` is an unfinished run, as it is for rosbag2.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from io import BufferedWriter, FileIO
+from pathlib import Path
+
+import yaml
+from mcap.writer import CompressionType, IndexType, Writer
+from rosbags.interfaces import Qos
+from rosbags.rosbag2.metadata import dump_qos_v9
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.message_definitions import Definition
+
+METADATA_VERSION = 9
+COMPRESSIONS = {
+    'zstd': CompressionType.ZSTD,
+    'lz4': CompressionType.LZ4,
+    'none': CompressionType.NONE,
+}
+# What is not yet in a closed chunk is lost when the process is killed, so chunks are closed by
+# size and by age. At 250 Hz the default megabyte of mcap would hold half a minute of poses.
+CHUNK_BYTES = 64 * 1024
+CHUNK_SECONDS = 0.5
+NO_TIME_NS = 2**63 - 1
+# With all indexes, mcap writes the offset of an empty attachment group, which checkers refuse.
+INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
+
+
+@dataclass(frozen=True)
+class RunTopic:
+    """What a bag says of a topic; `qos` are the profiles its publishers offered."""
+
+    name: str
+    type: str
+    definition: Definition
+    qos: Sequence[Qos] = ()
+
+
+class RunWriter:
+    """Writes serialised messages into a new run folder.
+
+    Call `close_old_chunk` a few times a second from a live recorder: a killed process then loses
+    at most the last half second and the time to the next call. Any OSError (a full disk) closes
+    the file as it is and raises RecordingError; nothing is written after that, and `recover`
+    reads what is there. Use as a context manager: an exception leaves the run unfinished.
+
+    Args:
+        folder: the run to create; it must not exist.
+        custom_data: text by name, kept in `metadata.yaml` and in the file (mesh hash, model).
+        compression: 'zstd', 'lz4' or 'none'.
+        ros_distro: as rosbag2 records it; default is the environment's ROS_DISTRO.
+    """
+
+    def __init__(
+        self,
+        folder: Path | str,
+        custom_data: Mapping[str, str] | None = None,
+        compression: str = 'zstd',
+        ros_distro: str | None = None,
+        chunk_bytes: int = CHUNK_BYTES,
+        chunk_seconds: float = CHUNK_SECONDS,
+    ) -> None:
+        self.folder = Path(folder)
+        self.path = self.folder / f'{self.folder.name}_0.mcap'
+        self.custom_data = {key: str(value) for key, value in (custom_data or {}).items()}
+        self.ros_distro = ros_distro or os.environ.get('ROS_DISTRO', 'unknown')
+        self.counts: dict[str, int] = {}
+        self.complete = False
+        self._topics: dict[str, RunTopic] = {}
+        self._channels: dict[str, int] = {}
+        self._schemas: dict[str, int] = {}
+        self._first_ns = NO_TIME_NS
+        self._last_ns = 0
+        self._chunk_seconds = chunk_seconds
+        self._chunk_opened_s: float | None = None
+        self._failure: str | None = None
+        self._raw = self._create()
+        self._stream = BufferedWriter(self._raw)
+        self._writer = Writer(
+            self._stream,
+            chunk_size=chunk_bytes,
+            compression=COMPRESSIONS[compression],
+            index_types=INDEXES,
+        )
+        self._guarded(self._start)
+
+    @property
+    def message_count(self) -> int:
+        return sum(self.counts.values())
+
+    @property
+    def bytes_written(self) -> int:
+        """Size of the file so far [bytes]."""
+        return self.path.stat().st_size
+
+    def add_topic(self, topic: RunTopic) -> None:
+        """Make a topic known; one that never gets a message is still listed in the metadata."""
+        if topic.name in self._topics:
+            raise RecordingError(f'{topic.name} is already recorded in {self.folder}')
+        self._guarded(self._register, topic)
+
+    def write(self, topic: str, cdr: bytes, log_time_ns: int, publish_time_ns: int) -> None:
+        """Append a message: when it was received, and when its publisher sent it."""
+        self._guarded(
+            self._writer.add_message,
+            self._channels[topic],
+            log_time_ns,
+            cdr,
+            publish_time_ns,
+            self.counts[topic],
+        )
+        self.counts[topic] += 1
+        self._first_ns = min(self._first_ns, log_time_ns)
+        self._last_ns = max(self._last_ns, log_time_ns)
+        if self._chunk_opened_s is None:
+            self._chunk_opened_s = time.monotonic()
+        self.close_old_chunk()
+
+    def close_old_chunk(self) -> None:
+        """Hand the open chunk to the operating system if it is older than half a second."""
+        opened = self._chunk_opened_s
+        if opened is not None and time.monotonic() - opened >= self._chunk_seconds:
+            self._guarded(self._writer.flush)
+            self._chunk_opened_s = None
+
+    def finish(self) -> Path:
+        """Complete the run and return its folder."""
+        if not self.complete:
+            self._guarded(self._finish)
+            self.complete = True
+        return self.folder
+
+    def abandon(self) -> None:
+        """Close the file as it is; the run stays unfinished."""
+        self._raw.close()
+
+    def __enter__(self) -> RunWriter:
+        return self
+
+    def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:
+        if exception_type is None:
+            self.finish()
+        else:
+            self.abandon()
+
+    def _create(self) -> FileIO:
+        try:
+            self.folder.parent.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir()
+            return FileIO(self.path, 'xb')
+        except FileExistsError:
+            raise RecordingError(f'{self.folder} already exists; choose another name') from None
+        except OSError as error:
+            raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
+
+    def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
+        """Run a step that writes; the first failure is the last write."""
+        if self._failure:
+            raise RecordingError(self._failure)
+        try:
+            step(*arguments)
+        except OSError as error:
+            self._failure = (
+                f'{self.folder} is incomplete after {self.message_count} messages: '
+                f'{error.strerror or error}; run `paint recover {self.folder}`'
+            )
+            # Closing below the buffer drops what the full disk did not take.
+            self._raw.close()
+            raise RecordingError(self._failure) from None
+
+    def _start(self) -> None:
+        self._writer.start(profile='ros2', library='paint_deposition')
+        self._write_metadata_record()
+        self._writer.flush()
+
+    def _register(self, topic: RunTopic) -> None:
+        if topic.type not in self._schemas:
+            definition = topic.definition
+            self._schemas[topic.type] = self._writer.register_schema(
+                topic.type, definition.encoding, definition.text.encode()
+            )
+        profiles = dump_qos_v9(list(topic.qos))
+        self._channels[topic.name] = self._writer.register_channel(
+            topic.name,
+            'cdr',
+            self._schemas[topic.type],
+            {
+                'offered_qos_profiles': _yaml(profiles).strip(),
+                'topic_type_hash': topic.definition.type_hash,
+            },
+        )
+        self._topics[topic.name] = topic
+        self.counts[topic.name] = 0
+
+    def _finish(self) -> None:
+        self._writer.flush()
+        self._write_metadata_record()
+        self._writer.finish()
+        self._stream.flush()
+        os.fsync(self._stream.fileno())
+        self._stream.close()
+        temporary = self.folder / 'metadata.yaml.tmp'
+        with temporary.open('w') as stream:
+            stream.write(_yaml({'rosbag2_bagfile_information': self._information()}))
+            stream.flush()
+            os.fsync(stream.fileno())
+        temporary.rename(self.folder / 'metadata.yaml')
+
+    def _write_metadata_record(self) -> None:
+        self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._information())})
+
+    def _information(self) -> dict:
+        duration_ns = self._last_ns - self._first_ns if self.message_count else 0
+        times = {
+            'starting_time': {'nanoseconds_since_epoch': self._first_ns},
+            'duration': {'nanoseconds': duration_ns},
+            'message_count': self.message_count,
+        }
+        return {
+            'version': METADATA_VERSION,
+            'storage_identifier': 'mcap',
+            **times,
+            'topics_with_message_count': [self._topic_entry(name) for name in self._topics],
+            'compression_format': '',
+            'compression_mode': '',
+            'relative_file_paths': [self.path.name],
+            'files': [{'path': self.path.name, **times}],
+            'custom_data': self.custom_data,
+            'ros_distro': self.ros_distro,
+        }
+
+    def _topic_entry(self, name: str) -> dict:
+        topic = self._topics[name]
+        return {
+            'topic_metadata': {
+                'name': name,
+                'type': topic.type,
+                'serialization_format': 'cdr',
+                'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
+                'type_description_hash': topic.definition.type_hash,
+            },
+            'message_count': self.counts[name],
+        }
+
+
+class _NoAliases(yaml.SafeDumper):
+    """Repeats equal values in full, as rosbag2 does, instead of with anchors."""
+
+    def ignore_aliases(self, _data: object) -> bool:
+        return True
+
+
+def _yaml(value: object) -> str:
+    return yaml.dump(value, Dumper=_NoAliases, sort_keys=False, allow_unicode=True)

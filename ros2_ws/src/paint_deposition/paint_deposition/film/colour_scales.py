@@ -1,0 +1,81 @@
+"""Film and residual as colours, the same in viewers, files and pictures."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.film.colour_tables import COOLWARM, VIRIDIS
+
+TABLE = 256
+# Rows of a palette behind the map's own colours.
+UNDER, OVER, BARE = TABLE, TABLE + 1, TABLE + 2
+# None of them is near a colour of the maps, in CIELAB by 30 at least.
+UNDER_RGB = (250, 153, 191)
+OVER_RGB = (214, 38, 41)
+BARE_RGB = (158, 158, 158)
+NICE_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+
+
+def _palette(table: bytes, under: tuple[int, int, int], over: tuple[int, int, int]) -> np.ndarray:
+    colours = np.empty((TABLE + 3, 4), dtype=np.uint8)
+    colours[:TABLE, :3] = np.frombuffer(table, dtype=np.uint8).reshape(TABLE, 3)
+    colours[UNDER, :3], colours[OVER, :3], colours[BARE, :3] = under, over, BARE_RGB
+    colours[:, 3] = 255
+    colours.setflags(write=False)
+    return colours
+
+
+# (259, 4) RGBA: the map, then the colours for under, over and bare metal.
+FILM_PALETTE = _palette(VIRIDIS, UNDER_RGB, OVER_RGB)
+RESIDUAL_PALETTE = _palette(COOLWARM, (0, 150, 136), (255, 160, 0))
+
+
+@dataclass(frozen=True)
+class ColourScale:
+    """Which value has which colour.
+
+    Attributes:
+        low, high: ends of the map, in the unit of the values; below and above are the palette's
+            under and over colours.
+        palette: (259, 4) uint8 RGBA.
+    """
+
+    low: float
+    high: float
+    palette: np.ndarray
+
+    def rows(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """(V,) row of the palette for each value (V,); bare where not ``shown`` (V,) bool."""
+        share = (values - self.low) * (TABLE / (self.high - self.low))
+        row = np.clip(np.nan_to_num(share), 0, TABLE - 1).astype(np.int16)
+        row[values < self.low] = UNDER
+        row[values > self.high] = OVER
+        row[~shown | np.isnan(values)] = BARE
+        return row
+
+    def rgba(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
+        """(V, 4) uint8 colours; see ``rows``."""
+        return self.palette[self.rows(values, shown)]
+
+
+def film_scale(film_um: np.ndarray, low_um: float = 0.0, high_um: float = 0.0) -> ColourScale:
+    """The scale for a film [um]: fixed, or from 0 to a round figure if both ends are 0."""
+    if low_um == 0.0 and high_um == 0.0:
+        high_um = round_up(float(film_um.max(initial=0.0)))
+    return ColourScale(low_um, high_um, FILM_PALETTE)
+
+
+def residual_scale(residual_um: np.ndarray, largest_um: float = 0.0) -> ColourScale:
+    """The scale for residuals [um], even about 0: fixed, or to a round figure if 0."""
+    if largest_um == 0.0:
+        largest_um = round_up(float(np.abs(residual_um).max(initial=0.0)))
+    return ColourScale(-largest_um, largest_um, RESIDUAL_PALETTE)
+
+
+def round_up(value: float) -> float:
+    """The next round figure; 1 for 0, so that a scale has a width."""
+    if value <= 0.0:
+        return 1.0
+    unit = 10.0 ** math.floor(math.log10(value))
+    return next(step * unit for step in NICE_STEPS if step * unit >= value * (1.0 - 1e-9))

@@ -1,0 +1,252 @@
+"""The pattern from painted parts, section 4.1 of Conner et al. (IROS 2002).
+
+On a panel the three Gaussians of eq. (3) are fitted first; the greater offset radius and the
+greatest standard deviation start the fit of the 2D model, which goes through the same simulation
+as every film, so that door and panel alike can be in a campaign.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
+from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
+from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.parameters import Unknowns
+from paint_deposition.fitting.study import Study
+from paint_deposition.readings.campaign import Campaign, Experiment
+from paint_deposition.readings.panel import Panel
+from paint_deposition.readings.plausibility import (
+    check_enough,
+    check_panel,
+    check_readings,
+    check_units_beside,
+)
+
+STARTS = 8
+# Residuals beyond this many standard deviations are named; a fit that leaves chi-square per
+# degree of freedom above the limit is not explained by the gauge's noise.
+OUTLIER_SIGMAS = 4.0
+MOST_CHI_SQUARE = 2.0
+
+
+@dataclass(frozen=True)
+class PanelFit:
+    """A panel's one-dimensional fit: where its points lie, and eq. (3)."""
+
+    panel: Panel
+    collapse: CollapseFit
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Measured and predicted film of an experiment, over its points.
+
+    Attributes:
+        experiment: its name. points: how many.
+        measured_mean_um, predicted_mean_um: mean films [um].
+        residual_sd_um: standard deviation of measured minus predicted [um].
+        rmse_um: root mean square of the same [um].
+    """
+
+    experiment: str
+    points: int
+    measured_mean_um: float
+    predicted_mean_um: float
+    residual_sd_um: float
+    rmse_um: float
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A model fitted to a campaign, and how well it is known.
+
+    Attributes:
+        study: the campaign, ready for inference. fit: the fit of all parameters.
+        parameters: of the pattern and of varied effects, with uncertainties.
+        correlations: of pairs, strongest first.
+        agreements: of each experiment.
+        panels: one-dimensional fit of each experiment, None where it is no flat panel.
+        warnings: what the reader must know, in plain words.
+    """
+
+    study: Study
+    fit: Fit
+    parameters: tuple[Estimate, ...]
+    correlations: tuple[Correlation, ...]
+    agreements: tuple[Agreement, ...]
+    panels: tuple[PanelFit | None, ...]
+    warnings: tuple[str, ...]
+
+    @property
+    def model(self) -> DepositionModel:
+        """The calibrated model."""
+        return self.fit.model
+
+    @property
+    def chi_square_per_freedom(self) -> float:
+        """About 1 where only the gauge's noise is left."""
+        return self.fit.chi_square / max(len(self.study) - len(self.fit.vector), 1)
+
+
+def calibrate(
+    campaign: Campaign,
+    start: DepositionModel | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Calibration:
+    """Fit the pattern, and the amplitudes of the start's effects, to all readings.
+
+    Args:
+        campaign: painted parts with readings.
+        start: fixes projection and effects and is a first guess of the pattern; default: a 50 mm
+            bell, whose pattern is then guessed from the first panel.
+        seed: of the further starts.
+        progress: called with a line for each step.
+
+    Raises:
+        ReadingsError: the readings cannot be what they are said to be, or determine nothing.
+    """
+    model = start or DepositionModel()
+    study = Study.of(campaign, model.effects)
+    check_enough(len(study))
+    first = 0
+    for experiment in study.campaign.experiments:
+        sigma = study.noise.sigma_um[first : first + len(experiment.readings)]
+        first += len(experiment.readings)
+        check_readings(experiment.readings, sigma)
+    progress('fitting the collapse of the panels')
+    panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
+    progress('fitting the pattern')
+    fit = _best_fit(study, model, panels, given=start is not None, seed=seed)
+    values = estimates(fit)
+    pairs = correlations(fit)
+    agreements = tuple(
+        _agreement(study, number, fit.predicted_um) for number in range(len(panels))
+    )
+    return Calibration(
+        study, fit, values, pairs, agreements, panels, tuple(_warnings(study, fit, values, pairs))
+    )
+
+
+def predict(model: DepositionModel, campaign: Campaign) -> tuple[Agreement, ...]:
+    """How a model agrees with readings it was not fitted to, experiment by experiment."""
+    study = Study.of(campaign, model.effects)
+    predicted = study.forward.predict_um(model)
+    return tuple(
+        _agreement(study, number, predicted) for number in range(len(campaign.experiments))
+    )
+
+
+def _panel_fit(study: Study, number: int) -> PanelFit | None:
+    experiment = study.campaign.experiments[number]
+    panel = Panel.of(experiment)
+    if panel is None:
+        return None
+    rows = study.experiment_of == number
+    measured, sigma = study.measured_um[rows], study.sigma_um[rows]
+    check_panel(experiment.readings, panel, measured, sigma)
+    collapse = fit_collapse(panel, measured, sigma)
+    check_units_beside(experiment.readings, measured, collapse.predicted_um)
+    return PanelFit(panel, collapse)
+
+
+def _best_fit(
+    study: Study,
+    model: DepositionModel,
+    panels: tuple[PanelFit | None, ...],
+    given: bool,
+    seed: int,
+) -> Fit:
+    """The better of the fits from the given pattern and from the first panel's collapse."""
+    starts = [model] if given else []
+    first = next((panel for panel in panels if panel is not None), None)
+    if first is not None:
+        starts.insert(0, started_from(model, first))
+    fits = [study.fit(Unknowns.of(one, *one.effects), STARTS, seed) for one in starts or [model]]
+    return min(fits, key=lambda fit: fit.chi_square + fit.penalty)
+
+
+def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
+    """First values of the 2D model from the 1D fit, as in the paper.
+
+    The greater offset radius is the ring's, the greatest standard deviation that of both
+    Gaussians; lengths are taken back from the panel's distance to the model plane. K1 is put
+    right by the fit.
+    """
+    collapse = panel.collapse.collapse
+    projection = model.projection
+    distance = panel.panel.distance_m + projection.emission_offset_m
+    shrink = projection.model_plane_m / distance
+    sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
+    planar = model.planar.model_copy(
+        update={
+            'r_m': float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9)),
+            'sigma1_m': sigma,
+            'sigma2_m': sigma,
+        }
+    )
+    return model.model_copy(update={'planar': planar})
+
+
+def _agreement(study: Study, number: int, predicted_um: np.ndarray) -> Agreement:
+    rows = study.experiment_of == number
+    measured, predicted = study.measured_um[rows], predicted_um[rows]
+    residual = measured - predicted
+    return Agreement(
+        study.campaign.experiments[number].name,
+        int(rows.sum()),
+        float(measured.mean()),
+        float(predicted.mean()),
+        float(residual.std()),
+        float(np.sqrt(np.mean(residual**2))),
+    )
+
+
+def _warnings(
+    study: Study,
+    fit: Fit,
+    values: tuple[Estimate, ...],
+    pairs: tuple[Correlation, ...],
+) -> list[str]:
+    warnings = list(study.campaign.notes)
+    warnings += [] if fit.converged else ['the fit did not come to rest: its values are not final']
+    warnings += [
+        f'{value.name} is not determined by these readings: {value.reason}'
+        for value in values
+        if not value.determined
+    ]
+    warnings += [
+        f'{pair.first} and {pair.second} can hardly be told apart (correlation '
+        f'{pair.value:+.2f}): trust their combination, not each'
+        for pair in pairs
+        if pair.too_close
+    ]
+    freedom = max(len(study) - len(fit.vector), 1)
+    if fit.chi_square > MOST_CHI_SQUARE * freedom:
+        warnings.append(
+            f'residuals are {np.sqrt(fit.chi_square / freedom):.1f} times the noise of the gauge: '
+            'something is missing from the model, see paint diagnose'
+        )
+    far = np.flatnonzero(np.abs(fit.residual) > OUTLIER_SIGMAS)
+    if len(far):
+        worst = far[np.argmax(np.abs(fit.residual[far]))]
+        warnings.append(
+            f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
+            f"deviations, most of all point '{_label(study, int(worst))}': measure there again"
+        )
+    if study.noise.source == 'assumed':
+        warnings.append(
+            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} um): repeat some '
+            'readings to know it'
+        )
+    return warnings
+
+
+def _label(study: Study, point: int) -> str:
+    number = int(study.experiment_of[point])
+    experiment: Experiment = study.campaign.experiments[number]
+    first = int(np.flatnonzero(study.experiment_of == number)[0])
+    return str(experiment.readings.point[experiment.means.first[point - first]])

@@ -1,0 +1,244 @@
+"""Weighted least squares on the readings, through the forward simulation."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+from scipy.stats import norm, qmc
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.fitting.forward import Forward
+from paint_deposition.fitting.parameters import PATTERN, Unknowns
+
+# Steps of the finite differences, in the vector's units.
+STEP = 1e-3
+SPREAD_OF_STARTS = 0.8
+# Shapes that are tried for each start that is kept.
+TRIED_A_START = 8
+# Steps of the first search from each start, and how many of the best are taken to the end.
+SCREENING_STEPS = 6
+FINISHED = 4
+MOST_STEPS = 60
+# Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
+EVENNESS = 0.05
+# A weaker ring, as a share of all paint, has no asymmetry to speak of.
+LEAST_RING = 0.01
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to readings.
+
+    Attributes:
+        unknowns: what was varied.
+        vector: (k,) best values.
+        model: the model they stand for.
+        predicted_um: (P,) [um].
+        residual: (P,) measured minus predicted, over the standard deviation.
+        jacobian: (P, k) derivative of predictions over the standard deviation.
+        converged: whether the last search ended by itself.
+        extra_log_det: log determinant of the covariance of further deviations, if the fit
+            allowed for them; residual and jacobian are then whitened by it as well.
+    """
+
+    unknowns: Unknowns
+    vector: np.ndarray
+    model: DepositionModel
+    predicted_um: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    converged: bool
+    extra_log_det: float = 0.0
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of squared whitened residuals."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def penalty(self) -> float:
+        """Sum of squared deviations from the priors, in their widths."""
+        centre, width = self.unknowns.prior
+        return float(np.sum(((self.vector - centre) / width) ** 2))
+
+    @property
+    def precision(self) -> np.ndarray:
+        """(k, k) inverse covariance of the vector, priors included."""
+        _, width = self.unknowns.prior
+        return self.jacobian.T @ self.jacobian + np.diag(width**-2.0)
+
+    @property
+    def covariance(self) -> np.ndarray:
+        """(k, k) covariance of the vector."""
+        return np.linalg.inv(self.precision)
+
+
+def fit_readings(
+    forward: Forward,
+    measured_um: np.ndarray,
+    sigma_um: np.ndarray,
+    unknowns: Unknowns,
+    starts: int = 1,
+    seed: int = 0,
+    extra: np.ndarray | None = None,
+) -> Fit:
+    """Find the most probable values.
+
+    Args:
+        forward: predicts the points.
+        measured_um, sigma_um: (P,) point means and their standard deviations [um].
+        unknowns: what is varied; its start model is the first start.
+        starts: how many starts; others are the best of many shapes of the pattern around the
+            first, drawn with the given seed.
+        extra: (P, n) directions, over the standard deviation, along which the readings may
+            deviate further with unit variance.
+    """
+    lower = None
+    if extra is not None:
+        lower = cholesky(np.eye(len(measured_um)) + extra @ extra.T, lower=True)
+    problem = _Problem(forward, measured_um, sigma_um, unknowns, lower)
+    first = problem.scaled_to_mean(unknowns.encode(unknowns.start))
+    if starts > 1:
+        candidates = [first, *_promising(problem, first, starts - 1, seed)]
+        rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
+        rough.sort(key=lambda result: result.cost)
+        candidates = [result.x for result in rough[:FINISHED]]
+    else:
+        candidates = [first]
+    found = [problem.search(start, MOST_STEPS) for start in candidates]
+    best = min(found, key=lambda result: result.cost)
+    model = unknowns.decode(best.x)
+    predicted = forward.predict_um(model)
+    return Fit(
+        unknowns,
+        best.x,
+        model,
+        predicted,
+        problem.whitened((measured_um - predicted) / sigma_um),
+        problem.whitened(derivatives(forward, unknowns, best.x, sigma_um, predicted)),
+        bool(best.status > 0),
+        0.0 if lower is None else 2.0 * float(np.sum(np.log(np.diag(lower)))),
+    )
+
+
+def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """The best of many shapes of the pattern, spread evenly over what bells usually have.
+
+    For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
+    so that only these three need be searched (variable projection, Golub and Pereyra 1973).
+    """
+    shape = [k for k, c in enumerate(PATTERN) if c.name in ('r_m', 'log_sigma1', 'log_sigma2')]
+    _, width = problem.unknowns.prior
+    spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
+    tried = []
+    for away in spread:
+        vector = first.copy()
+        vector[shape] += SPREAD_OF_STARTS * width[shape] * away
+        tried.append(problem.with_best_gains(np.clip(vector, problem.low, problem.high)))
+    return sorted(tried, key=problem.cost)[:count]
+
+
+def derivatives(
+    forward: Forward,
+    unknowns: Unknowns,
+    vector: np.ndarray,
+    sigma_um: np.ndarray,
+    predicted_um: np.ndarray | None = None,
+) -> np.ndarray:
+    """(P, k) derivative of the predictions by the vector, over the standard deviation."""
+    if predicted_um is None:
+        predicted_um = forward.predict_um(unknowns.decode(vector))
+    _, high = unknowns.bounds
+    columns = []
+    for k in range(len(vector)):
+        step = STEP if vector[k] + STEP <= high[k] else -STEP
+        moved = vector.copy()
+        moved[k] += step
+        change = forward.predict_um(unknowns.decode(moved)) - predicted_um
+        columns.append(change / step / sigma_um)
+    return np.column_stack(columns)
+
+
+class _Problem:
+    """Residuals and their derivatives for the optimiser; priors are further residuals."""
+
+    def __init__(
+        self,
+        forward: Forward,
+        measured_um: np.ndarray,
+        sigma_um: np.ndarray,
+        unknowns: Unknowns,
+        lower: np.ndarray | None,
+    ) -> None:
+        self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
+        self.unknowns, self.lower = unknowns, lower
+        self.centre, self.width = unknowns.prior
+        self.low, self.high = unknowns.bounds
+        self._last: tuple[bytes, np.ndarray] | None = None
+
+    def predict(self, vector: np.ndarray) -> np.ndarray:
+        key = vector.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, self.forward.predict_um(self.unknowns.decode(vector)))
+        return self._last[1]
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        if self.lower is None:
+            return columns
+        return solve_triangular(self.lower, columns, lower=True)
+
+    def residuals(self, vector: np.ndarray) -> np.ndarray:
+        misfit = self.whitened((self.predict(vector) - self.measured) / self.sigma)
+        return np.concatenate([misfit, (vector - self.centre) / self.width])
+
+    def jacobian(self, vector: np.ndarray) -> np.ndarray:
+        data = derivatives(self.forward, self.unknowns, vector, self.sigma, self.predict(vector))
+        return np.vstack([self.whitened(data), np.diag(1.0 / self.width)])
+
+    def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
+        """The same with K1 such that the mean film is right: the rest is then close enough."""
+        predicted = self.predict(vector)
+        weights = self.sigma**-2.0
+        most = float(np.sum(weights * predicted**2))
+        ratio = float(np.sum(weights * predicted * self.measured)) / most if most > 0 else 1.0
+        scaled = vector.copy()
+        scaled[0] += np.log(max(ratio, 1e-3))
+        return np.clip(scaled, self.low, self.high)
+
+    def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
+        """The same with the best K1, K2, K3 and phi, as far as other effects are linear."""
+        parts = np.tile(vector, (4, 1))
+        parts[:, 0] = 0.0
+        # Ring alone, centre alone, and the ring lopsided along x and along y.
+        parts[:, 1:4] = [[0, 0, 0], [1, 0, 0], [0, 0.9, 0], [0, 0, 0.9]]
+        films = np.stack([self.predict(part) for part in parts]) / self.sigma
+        films[2:] = (films[2:] - films[0]) / 0.9
+        even = EVENNESS * np.linalg.norm(films[0])
+        solved = lsq_linear(
+            np.vstack([films.T, np.diag([0.0, 0.0, even, even])[2:]]),
+            np.concatenate([self.measured / self.sigma, np.zeros(2)]),
+            bounds=([0.0, 0.0, -np.inf, -np.inf], np.inf),
+        ).x
+        ring, centre, *lopsided = solved
+        if ring <= LEAST_RING * (ring + centre):
+            return self.scaled_to_mean(vector)
+        gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
+        return np.clip([*gains, *vector[4:]], self.low, self.high)
+
+    def cost(self, vector: np.ndarray) -> float:
+        return float(np.sum(self.residuals(vector) ** 2))
+
+    def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
+        margin = 1e-9 * (self.high - self.low)
+        return least_squares(
+            self.residuals,
+            np.clip(start, self.low + margin, self.high - margin),
+            jac=self.jacobian,
+            bounds=(self.low, self.high),
+            x_scale=self.width,
+            max_nfev=most_steps,
+            ftol=1e-6,
+            xtol=1e-6,
+            gtol=1e-6,
+        )

@@ -1,1 +1,0 @@
-"""Files in and out: recordings, meshes, tables, models, campaigns, robot programs."""

@@ -1,1 +1,0 @@
-"""From gauge readings to a model: calibration, comparison, diagnosis, recommendation."""

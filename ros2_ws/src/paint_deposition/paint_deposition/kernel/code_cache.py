@@ -1,0 +1,90 @@
+"""Compiled kernels kept on disk, and told apart by everything that went into them."""
+
+import hashlib
+import inspect
+import sys
+from collections.abc import Callable, Iterator
+from functools import cache
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+
+def identity(laws: list[Callable[..., float]], *variant: object) -> str:
+    """A name for the code of laws, of everything that is compiled with them, and the variant.
+
+    Compiled code refers to the laws' modules by name, so those names are part of it: the module
+    of a user's own effect is named by its source.
+    """
+    parts = [_code_around(), repr((numba.__version__, variant)).encode()]
+    for law in laws:
+        parts.extend(_compiled_with(law, set()))
+    return hashlib.sha256(b'\0'.join(parts)).hexdigest()[:24]
+
+
+@cache
+def _code_around() -> bytes:
+    return b'\0'.join(file.read_bytes() for file in sorted(Path(__file__).parent.glob('*.py')))
+
+
+def _compiled_with(value: Any, seen: set[int]) -> Iterator[bytes]:
+    """What a function or constant brings into compiled code, with all that it names in turn."""
+    function = getattr(value, 'py_func', value)
+    if isinstance(function, FunctionType):
+        if id(function.__code__) in seen:
+            return
+        seen.add(id(function.__code__))
+        yield _fingerprint(function.__code__)
+        yield _source_of(function.__module__)
+        named = inspect.getclosurevars(function)
+        for name, other in sorted((dict(named.globals) | dict(named.nonlocals)).items()):
+            yield name.encode()
+            yield from _compiled_with(other, seen)
+    elif isinstance(value, ModuleType):
+        yield _source_of(value.__name__)
+    elif isinstance(value, np.ndarray):
+        yield repr((value.dtype, value.shape)).encode() + value.tobytes()
+    elif isinstance(value, (int, float, complex, str, tuple)):
+        yield repr(value).encode()
+
+
+@cache
+def _source_of(module: str) -> bytes:
+    """A module's name and a digest of its file."""
+    file = getattr(sys.modules.get(module), '__file__', None)
+    try:
+        source = Path(file).read_bytes() if file else b''
+    except OSError:
+        source = b''
+    return module.encode() + hashlib.sha256(source).digest()
+
+
+def _fingerprint(code: CodeType) -> bytes:
+    return code.co_code + repr((code.co_consts, code.co_names, code.co_varnames)).encode()
+
+
+class CodeCache(FunctionCache):
+    """Numba's cache on disk, for a function that depends on laws as well as on its own code.
+
+    Numba tells functions apart by what they enclose, which for compiled functions differs in
+    every process, so that nothing would ever be found again. It also numbers the variants of a
+    function in one index: two processes that compile at the same time give one number to
+    different variants, and one of them is later loaded for the other. Here each has its own file.
+
+    Args:
+        function: what will be compiled.
+        name: its ``identity``.
+    """
+
+    def __init__(self, function: Callable[..., Any], name: str) -> None:
+        super().__init__(function)
+        self._identity = name
+        stamp = self._impl.locator.get_source_stamp()
+        self._cache_file = IndexDataCacheFile(self._cache_path, f'kernel-{name}', stamp)
+
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        return sig, codegen.magic_tuple(), self._identity

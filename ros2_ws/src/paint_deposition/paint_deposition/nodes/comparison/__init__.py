@@ -1,0 +1,1 @@
+"""The node that sets gauge readings against the film."""

@@ -1,0 +1,227 @@
+"""Node `model_comparison`: gauge readings against the film of a model, as the part is painted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point
+from paint_msgs.msg import ComparisonStats
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from paint_deposition.comparison.residual_field import reached, spreading
+from paint_deposition.comparison.residuals import Residuals
+from paint_deposition.errors import PaintError
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.film.colour_scales import ColourScale, residual_scale
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.nodes.painting.legend import legend
+from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.painting_parameters import AT_START
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
+from paint_deposition.nodes.runtime.messages import ColouredMesh, to_time
+from paint_deposition.nodes.runtime.parameters import NodeParameter
+from paint_deposition.nodes.runtime.shutdown import run_node
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.readings.campaign import Experiment
+from paint_deposition.readings.gauge_noise import gauge_noise
+
+# The automatic scale ends at this share of the thickest reading.
+SHARE_OF_READING = 0.25
+
+
+class ModelComparison(PaintingNode):
+    """Paints the places of gauge readings and publishes what is missing there.
+
+    The residual, measured minus predicted, starts as the whole reading and falls to what the
+    model does not explain. It is predicted in double precision at the places of the readings, and
+    spread over the skin around them only to be looked at.
+    """
+
+    PARAMETERS = (
+        *PaintingNode.PARAMETERS,
+        NodeParameter(
+            'measurements_file',
+            '',
+            'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
+            is_path=True,
+            fixed_because=AT_START,
+        ),
+        NodeParameter(
+            'color_max_um',
+            0.0,
+            'Residual at the ends of the colours; 0: a quarter of the thickest reading [um]',
+            low=0.0,
+            high=10_000.0,
+        ),
+        NodeParameter(
+            'color_radius_m',
+            0.0,
+            'How far around a reading the skin has its colour; 0: from their spacing [m]',
+            low=0.0,
+            high=5.0,
+        ),
+    )
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('model_comparison', **kwargs)
+        watched = self.watch.publisher
+        self._outputs = {
+            topic: self.create_publisher(
+                message, topic, qos.LATCHED, event_callbacks=watched(topic)
+            )
+            for topic, message in (
+                ('comparison/mesh', Marker),
+                ('comparison/stats', ComparisonStats),
+                ('comparison/legend', MarkerArray),
+            )
+        }
+        self.create_service(Trigger, '~/compare', self._compare)
+        self._shown: FilmIntegrator | None = None
+        tasks = painting_tasks(self) | {'comparison': self._status}
+        self._diagnostics = Diagnostics(self, tasks)
+        self._publish_legend()
+        self.publish()
+
+    # --- the part and its readings
+
+    def _read_part(self) -> None:
+        if not self.values['measurements_file']:
+            raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
+        self._readings = read_readings(self.values['measurements_file'])
+        self._noise = gauge_noise([self._readings])
+
+    def _points_on(self, surface: Surface) -> SurfacePoints:
+        return self._experiment.points
+
+    def _take_surface(self, surface: Surface) -> None:
+        self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
+        super()._take_surface(surface)
+        self._frame_id = self.values['frame_id'].lstrip('/')
+        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, self._frame_id, 'residual')
+        self._spread_colours()
+
+    def _spread_colours(self) -> None:
+        count, points = len(self._experiment), self.points
+        self._spreading = spreading(
+            self.surface,
+            points.positions_m[:count],
+            points.normals[:count],
+            self.values['color_radius_m'],
+        )
+        self._coloured = reached(self._spreading)
+
+    def residuals(self) -> Residuals:
+        """Every reading against the film of all poses received."""
+        predicted = self.film.up_to_date().gauge_um[: len(self._experiment)]
+        at_readings = predicted[self._experiment.means.owner]
+        return Residuals(
+            self._readings.positions_m,
+            at_readings,
+            self._readings.thickness_um - at_readings,
+            self._noise.sigma_um,
+        )
+
+    # --- parameters
+
+    def _changed(self, names: set[str]) -> None:
+        if 'color_radius_m' in names:
+            self._spread_colours()
+        if 'color_max_um' in names:
+            self._publish_legend()
+        self._shown = None
+
+    # --- what is shown
+
+    @property
+    def _scale(self) -> ColourScale:
+        thickest = float(np.abs(self._readings.thickness_um).max())
+        return residual_scale(np.array([SHARE_OF_READING * thickest]), self.values['color_max_um'])
+
+    @property
+    def _model_name(self) -> str:
+        return Path(self.values['model_file']).name or 'default model'
+
+    def publish(self) -> None:
+        """Publish the comparison if the film has changed."""
+        self.up_to_date()
+        film = self.film.up_to_date()
+        if film is self._shown:
+            return
+        self._shown = film
+        residuals = self.residuals()
+        stamp_ns = self.film.newest_ns or 0
+        self._outputs['comparison/stats'].publish(self._stats(residuals, stamp_ns))
+        means = self._experiment.means
+        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
+        scale = self._scale
+        rows = scale.rows(self._spreading @ at_points, self._coloured)
+        self._outputs['comparison/mesh'].publish(
+            self._mesh.serialised(stamp_ns, scale.palette, rows)
+        )
+
+    def _publish_legend(self) -> None:
+        self._outputs['comparison/legend'].publish(
+            legend(self._scale, 'um', self.surface, self._frame_id)
+        )
+
+    def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
+        x, y, z = residuals.positions_m[residuals.worst].tolist()
+        message = ComparisonStats(
+            model=self._model_name,
+            readings=len(residuals.residual_um),
+            readings_painted=int(residuals.painted.sum()),
+            bias_um=residuals.bias_um,
+            rmse_um=residuals.rmse_um,
+            rmse_painted_um=residuals.rmse_painted_um,
+            chi_square_per_reading=residuals.chi_square_per_reading,
+            noise_floor_um=np.nan if self._noise.source == 'assumed' else self._noise.typical_um,
+            worst_position=Point(x=x, y=y, z=z),
+            worst_residual_um=float(residuals.residual_um[residuals.worst]),
+        )
+        message.header.frame_id = self._frame_id
+        message.header.stamp = to_time(stamp_ns)
+        return message
+
+    def summary(self) -> str:
+        """The comparison in one line."""
+        found = self.residuals()
+        x, y, z = found.positions_m[found.worst]
+        return (
+            f'{self._model_name}: {len(found.residual_um)} readings, {found.painted.sum()} where '
+            f'paint is predicted; residual {found.bias_um:+.2f} um on average, rms '
+            f'{found.rmse_um:.2f} um (gauge {self._noise.typical_um:.2f} um, '
+            f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
+            f'worst {found.residual_um[found.worst]:+.2f} um at ({x:.3f}, {y:.3f}, {z:.3f}) m'
+        )
+
+    def _status(self) -> Status:
+        found = self.residuals()
+        return Status(
+            OK,
+            f'rms {found.rmse_um:.2f} um at {len(found.residual_um)} readings',
+            {
+                'readings': self.values['measurements_file'],
+                'bias [um]': f'{found.bias_um:.3f}',
+                'noise of the gauge [um]': f'{self._noise.typical_um:.3f}',
+                'noise known from': self._noise.source,
+            },
+        )
+
+    def _compare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self.up_to_date()
+        response.success = True
+        response.message = self.summary()
+        self.get_logger().info(response.message)
+        return response
+
+
+def main() -> int:
+    """Run the node; the return value is the process's exit code."""
+    return run_node(ModelComparison)

@@ -1,0 +1,1 @@
+"""The simulator, and what all nodes share that follow the atomizer."""

@@ -1,0 +1,264 @@
+"""Node `deposition_simulator`: the film on a part as the atomizer paints it."""
+
+from __future__ import annotations
+
+import re
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from paint_msgs.msg import ThicknessField, ThicknessStats
+from paint_msgs.srv import SaveFilm
+from rclpy.callback_groups import ReentrantCallbackGroup
+from rclpy.task import Future
+from sensor_msgs.msg import PointCloud2
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from paint_deposition.errors import PaintError
+from paint_deposition.film.colour_scales import ColourScale, film_scale
+from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.nodes.painting.legend import legend
+from paint_deposition.nodes.painting.painting_diagnostics import film_status, painting_tasks
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.simulator_parameters import SIMULATOR
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
+from paint_deposition.nodes.runtime.messages import (
+    ColouredMesh,
+    FilmCloud,
+    FilmField,
+    stats_message,
+)
+from paint_deposition.nodes.runtime.shutdown import run_node
+from paint_deposition.part.identity import mesh_id
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.results.film import write_film
+
+STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+
+
+class DepositionSimulator(PaintingNode):
+    """Paints a mesh from `atomizer/pose` and `atomizer/state` and publishes the film.
+
+    Mesh (a Marker), legend and statistics are latched; cloud and field go out as the film
+    changes, and once more when somebody new listens. Everything shows all poses received.
+    """
+
+    PARAMETERS = (*PaintingNode.PARAMETERS, *SIMULATOR)
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('deposition_simulator', **kwargs)
+        watched = self.watch.publisher
+        self._outputs = {
+            topic: self.create_publisher(message, topic, profile, event_callbacks=watched(topic))
+            for topic, message, profile in (
+                ('thickness/mesh', Marker, qos.LATCHED),
+                ('thickness/legend', MarkerArray, qos.LATCHED),
+                ('thickness/stats', ThicknessStats, qos.LATCHED),
+                ('thickness/cloud', PointCloud2, qos.RESULTS),
+                ('thickness/field', ThicknessField, qos.RESULTS),
+            )
+        }
+        self.create_service(Trigger, '~/reset', self._reset)
+        # In a group of its own: while it waits for the disk, poses must not wait for it.
+        saving = ReentrantCallbackGroup()
+        self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
+        self._shown: FilmIntegrator | None = None
+        self._scale: ColourScale | None = None
+        self._stats = ThicknessStats()
+        self._counts_shown: tuple | None = None
+        self._greeted = 0
+        self._saving: set[threading.Thread] = set()
+        self._publish_s = 0.0
+        self._diagnostics = Diagnostics(self, painting_tasks(self) | {'film': self._film_status})
+        self.publish()
+
+    # --- the part and its film
+
+    def _points_on(self, surface: Surface) -> SurfacePoints:
+        return surface.points()
+
+    def _precision(self) -> Precision:
+        return self.values['precision']
+
+    def _take_surface(self, surface: Surface) -> None:
+        super()._take_surface(surface)
+        frame_id = self.values['frame_id'].lstrip('/')
+        self.mesh_id = mesh_id(surface)
+        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+        self._cloud = FilmCloud(surface.vertices_m, frame_id)
+        self._field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
+        self._frame_id = frame_id
+
+    def statistics(self, film_um: np.ndarray, emitted_cm3: float) -> FilmStatistics:
+        """The film's figures with the target and the limit that are set."""
+        return film_statistics(
+            film_um,
+            self.surface.vertex_areas_m2,
+            emitted_cm3,
+            painted_above_um=self.values['painted_above_um'],
+            target_um=self.values['target_um'],
+            target_tolerance_um=self.values['target_tolerance_um'],
+        )
+
+    # --- parameters
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        super()._check(values)
+        low, high = values['color_min_um'], values['color_max_um']
+        if (low, high) != (0.0, 0.0) and low >= high:
+            raise PaintError(
+                f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
+            )
+
+    def _changed(self, names: set[str]) -> None:
+        self._shown = None
+
+    # --- publishing
+
+    def publish(self) -> None:
+        """Publish the film if it has changed, or somebody new listens."""
+        began_s = time.monotonic()
+        self.up_to_date()
+        film = self.film.up_to_date()
+        newcomers = self.watch.newcomers
+        news = film is not self._shown
+        if news or newcomers > self._greeted:
+            self._publish_film(film, with_latched=news)
+            self._publish_s = time.monotonic() - began_s
+        self._shown, self._greeted = film, newcomers
+        self._publish_stats()
+
+    def _publish_film(self, film: FilmIntegrator, with_latched: bool) -> None:
+        film_um = film.film_um
+        stamp_ns = self.film.newest_ns or 0
+        self._outputs['thickness/cloud'].publish(self._cloud.message(stamp_ns, film_um))
+        self._outputs['thickness/field'].publish(self._field.message(stamp_ns, film_um))
+        if not with_latched:
+            return
+        figures = self.statistics(film_um, film.emitted_cm3)
+        self._stats = stats_message(self._frame_id, stamp_ns, figures)
+        self._counts_shown = None
+        scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
+        rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
+        self._outputs['thickness/mesh'].publish(
+            self._mesh.serialised(stamp_ns, scale.palette, rows)
+        )
+        if self._scale is None or (scale.low, scale.high) != (self._scale.low, self._scale.high):
+            self._scale = scale
+            self._outputs['thickness/legend'].publish(
+                legend(scale, 'um', self.surface, self._frame_id)
+            )
+
+    def _publish_stats(self) -> None:
+        """Publish the statistics if the film or a count has changed."""
+        counts, refused = self.film.counts, self.input.poses_refused
+        shown = (
+            counts.received + refused,
+            counts.rejected + refused,
+            counts.gaps,
+            self.input.intervals.longest_ns * 1e-9,
+        )
+        if shown == self._counts_shown:
+            return
+        self._counts_shown = shown
+        message = self._stats
+        message.poses_received, message.poses_rejected, message.pose_gaps = shown[:3]
+        message.longest_gap_s = shown[3]
+        self._outputs['thickness/stats'].publish(message)
+
+    def _film_status(self) -> Status:
+        status = film_status(self)
+        last_ms = f'{self._publish_s * 1e3:.0f}'
+        return Status(
+            status.level, status.message, {**status.values, 'last publication [ms]': last_ms}
+        )
+
+    # --- services
+
+    def close(self) -> None:
+        for thread in self._saving:
+            thread.join()
+
+    def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        poses = self.film.counts.received
+        self.reset()
+        self._shown = None
+        self.publish()
+        response.success = True
+        response.message = f'bare metal again; {poses} poses forgotten'
+        return response
+
+    async def _save_film(
+        self, request: SaveFilm.Request, response: SaveFilm.Response
+    ) -> SaveFilm.Response:
+        """Write in a thread: poses keep coming meanwhile."""
+        stem = request.name or time.strftime('film_%Y%m%d_%H%M%S')
+        if not STEM.fullmatch(stem):
+            response.message = (
+                f"name '{stem}': use letters, digits, '-', '_' and '.', the last not in front"
+            )
+            return response
+        self.up_to_date()
+        film = self.film.up_to_date()
+        written: Future = Future(executor=self.executor)
+        job = self._film_to_save(stem, film)
+        # Completed from another thread, a future does not wake the executor unless it has a
+        # callback to run.
+        written.add_done_callback(lambda _: None)
+        thread = threading.Thread(target=lambda: written.set_result(job()), name='saving')
+        self._saving = {thread, *(other for other in self._saving if other.is_alive())}
+        thread.start()
+        outcome = await written
+        if isinstance(outcome, Exception):
+            response.message = str(outcome)
+            return response
+        response.success = True
+        response.paths = [str(path) for path in outcome]
+        response.message = f'wrote {", ".join(path.name for path in outcome)}'
+        return response
+
+    def _film_to_save(self, stem: str, film: FilmIntegrator):
+        """A function that writes the film as it is now; it returns the paths, or the error."""
+        surface, film_um, values = self.surface, film.film_um, self.values
+        figures = self.statistics(film_um, film.emitted_cm3)
+        details = {
+            'mesh_file': values['mesh_file'],
+            'mesh_id': self.mesh_id,
+            'frame_id': self._frame_id,
+            'down': surface.down,
+            'model_file': values['model_file'],
+            'effects': [effect.id for effect in self.film.model.effects],
+            'poses': self.film.counts.as_dict(),
+            'poses_in_other_frames': dict(self.input.refused_frames),
+        }
+        folder = Path(values['output_directory'])
+        colours = values['color_min_um'], values['color_max_um']
+
+        def write() -> list[Path] | Exception:
+            try:
+                return write_film(
+                    folder,
+                    surface,
+                    film_um,
+                    figures,
+                    stem=stem,
+                    statistics_file=f'{stem}.json',
+                    details=details,
+                    color_range_um=colours,
+                )
+            except Exception as error:  # the caller of the service is told
+                return error
+
+        return write
+
+
+def main() -> int:
+    """Run the node; the return value is the process's exit code."""
+    return run_node(DepositionSimulator)

@@ -1,0 +1,115 @@
+"""What a node that paints says of its health."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
+
+# Share of real time above which there is little left for anything but painting.
+BUSY = 0.8
+# What happened to poses and states, in words, by the name of its count.
+IN_WORDS = {
+    'gaps': 'gaps',
+    'restarts': 'restarts of the stream',
+    'repeated_stamps': 'repeated stamps',
+    'backward_stamps': 'backward stamps',
+    'not_finite': 'poses that are not finite',
+    'not_unit_quaternions': 'quaternions not of unit length',
+    'late_triggers': 'late states',
+}
+
+
+def poses_status(node: PaintingNode) -> Status:
+    """The motion since the last reset: what came and what was wrong with it."""
+    source, counts = node.input, node.film.counts
+    rhythm_ns = source.intervals.typical_ns
+    values: dict[str, object] = {
+        'poses taken': counts.received,
+        'poses refused': counts.rejected + source.poses_refused,
+        **{words: getattr(counts, name) for name, words in IN_WORDS.items()},
+        'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
+        'intervals over 1.5 times the usual one': source.intervals.long,
+        'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
+        'poses without a frame': source.without_frame,
+        'poses waiting for tf': source.poses_held,
+        'states refused': source.refused_states,
+        'messages lost by the middleware': node.watch.lost_messages,
+        'gun': _gun_in_words(node.film.flow),
+    }
+    if source.refused_frames:
+        frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
+        return Status(
+            ERROR,
+            f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
+            f"'{node.frame.frame_id}' and {source.refusal}",
+            values,
+        )
+    wrong = [
+        f'{getattr(counts, name)} {words}'
+        for name, words in IN_WORDS.items()
+        if getattr(counts, name)
+    ]
+    if source.refused_states:
+        wrong.append(f'{source.refused_states} states refused')
+    if source.without_frame:
+        wrong.append(f'{source.without_frame} poses without a frame')
+    if wrong:
+        return Status(WARN, ', '.join(wrong), values)
+    return Status(OK, 'painting' if counts.received else 'waiting for poses', values)
+
+
+def topics_status(node: PaintingNode) -> Status:
+    """Partners that will not hear this node, or that it does not hear."""
+    found = node.watch.incompatible
+    if found:
+        listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
+        return Status(ERROR, listed, found)
+    return Status(OK, 'all partners fit')
+
+
+def film_status(node: PaintingNode) -> Status:
+    """Part and model."""
+    log = node.film.log
+    values = {
+        'mesh': node.values['mesh_file'],
+        'triangles': len(node.surface.faces),
+        'down': ' '.join(f'{value:g}' for value in node.surface.down),
+        'model': node.values['model_file'] or 'default',
+        'effects': ' '.join(effect.id for effect in node.film.model.effects) or 'none',
+        'poses remembered': log.poses,
+        'load of painting in real time': f'{node.load.share:.0%}',
+        **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
+    }
+    if not log.complete:
+        return Status(
+            WARN,
+            f'over {log.limit_poses} poses (pose_memory): a new model paints from then on only',
+            values,
+        )
+    if node.load.share > BUSY:
+        return Status(
+            WARN,
+            f'painting takes {node.load.share:.0%} of real time: poses may be lost; '
+            'use a larger max_edge_length_m',
+            values,
+        )
+    if node.repainting:
+        return Status(OK, 'preparing a changed model', values)
+    return Status(OK, 'up to date', values)
+
+
+def _gun_in_words(flow: float | None) -> str:
+    if flow is None:
+        return 'no state seen: always spraying'
+    return f'spraying, flow {flow:g}' if flow else 'off'
+
+
+def painting_tasks(node: PaintingNode) -> dict[str, Callable[[], Status]]:
+    """The tasks by name."""
+    return {
+        'poses': lambda: poses_status(node),
+        'topics': lambda: topics_status(node),
+        'film': lambda: film_status(node),
+    }

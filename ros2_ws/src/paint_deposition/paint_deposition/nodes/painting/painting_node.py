@@ -1,0 +1,278 @@
+"""What the nodes that paint have in common: the part, the motion that comes in, the model."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.parameter import Parameter
+from rclpy.timer import Timer
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import read_model
+from paint_deposition.film.integrator import Precision
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.nodes.painting import painting_parameters
+from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
+from paint_deposition.nodes.painting.frames import PartFrame
+from paint_deposition.nodes.painting.real_time_factor import Load
+from paint_deposition.nodes.painting.repainting import Repainting
+from paint_deposition.nodes.runtime.qos_watch import QosWatch
+from paint_deposition.nodes.runtime.shutdown import PaintNode
+from paint_deposition.part.facing import facing, toward_the_gun
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+
+TEND_PERIOD_S = 0.1
+# Which side of an open skin is outward is settled by so many poses that look at it; after so
+# many in all it stays as it is.
+POSES_FACING = 50
+POSES_CONSIDERED = 2000
+
+
+class PaintingNode(PaintNode, ABC):
+    """Paints points of a part with a model as the motion comes in.
+
+    A subclass says which points, with ``_points_on``, and shows the film.
+
+    Attributes:
+        surface: the refined part.
+        points: where it is painted.
+        film: what is painted so far.
+        input: what comes from the cell.
+        watch: partners with which there is no understanding.
+        load: how long painting takes beside the motion.
+    """
+
+    PARAMETERS = (
+        *painting_parameters.PART,
+        *painting_parameters.MOTION,
+        *painting_parameters.MODEL,
+        *painting_parameters.SHOWING,
+    )
+
+    def __init__(self, name: str, **kwargs: Any):
+        self._repainting: Repainting | None = None
+        self._facing_settled = False
+        self._notes_told = 0
+        self.load = Load()
+        super().__init__(name, **kwargs)
+        try:
+            self._check(self.values)
+            model = self._read_model(self.values)
+            self._read_part()
+            self._take_surface(self._read_surface())
+            self.film = self._make_film(model)
+            self.get_logger().info('getting ready; a model seen for the first time is compiled')
+            self.film.warm_up()
+        except PaintError:
+            self.destroy_node()
+            raise
+        self.frame = PartFrame(self, self.values['frame_id'])
+        self._place_part()
+        self.watch = QosWatch(self)
+        self.input = AtomizerInput(
+            self,
+            self.frame,
+            self,
+            self.watch,
+            self.values['pose_queue_depth'],
+            self.values['pose_reliability'],
+        )
+        self.add_on_set_parameters_callback(self._check_changes)
+        self.add_post_set_parameters_callback(self._apply_changes)
+        # A simulated clock may stand still; what has come is shown all the same.
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(TEND_PERIOD_S, self._tend, clock=self._steady)
+        self._show_timer = self._new_show_timer()
+
+    # --- for the subclass
+
+    @abstractmethod
+    def _points_on(self, surface: Surface) -> SurfacePoints:
+        """The points of the part to paint."""
+
+    def _read_part(self) -> None:
+        """Read what is needed to choose the points, before the part is taken."""
+
+    def _precision(self) -> Precision:
+        return 'double'
+
+    def _take_surface(self, surface: Surface) -> None:
+        """Take the part, at the start and when the gun shows which side is outward."""
+        self.surface = surface
+        self.points = self._points_on(surface)
+        for note in surface.notes[self._notes_told :]:
+            self.get_logger().warning(note)
+        self._notes_told = len(surface.notes)
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        """Raise PaintError if these parameter values do not go together."""
+        if values['part_pose'] and not values['part_parent_frame']:
+            raise PaintError('part_pose is given without part_parent_frame: name its frame')
+
+    def _changed(self, names: set[str]) -> None:
+        """Parameters of the subclass have changed; ``self.values`` has the new ones."""
+
+    @abstractmethod
+    def publish(self) -> None:
+        """Publish the film, if it has changed."""
+
+    # --- motion
+
+    def add_poses(self, batch: PoseBatch) -> None:
+        began_s = time.monotonic()
+        self.film.add_poses(batch)
+        self.load.note(time.monotonic() - began_s, batch.stamps_ns)
+
+    def add_trigger(self, change: TriggerChange) -> None:
+        self.film.add_trigger(change)
+
+    def reset(self) -> None:
+        """Back to bare metal, all counts to zero."""
+        self.input.reset()
+        self.film.reset()
+        if self._repainting is not None:
+            self._repaint()
+
+    def up_to_date(self) -> None:
+        """Take in all that has come, and whatever has been prepared."""
+        self.input.hand_on()
+        self._tend()
+
+    # --- the model
+
+    @property
+    def repainting(self) -> bool:
+        """Whether a changed model is being prepared."""
+        return self._repainting is not None
+
+    def _make_film(self, model: DepositionModel) -> LiveFilm:
+        return LiveFilm(
+            self.points,
+            model,
+            precision=self._precision(),
+            occluder=self.surface.occluder,
+            max_pose_gap_s=self.values['max_pose_gap_s'],
+            trigger_latency_s=self.values['trigger_latency_s'],
+            limit_poses=self.values['pose_memory'],
+        )
+
+    @staticmethod
+    def _read_model(values: Mapping[str, Any]) -> DepositionModel:
+        return read_model(values['model_file']) if values['model_file'] else DepositionModel()
+
+    def _read_surface(self) -> Surface:
+        values = self.values
+        if not values['mesh_file']:
+            raise PaintError(f"{self.get_name()}: mesh_file is empty: give the part's mesh")
+        down = np.array(values['down']) if values['down'] else None
+        return read_mesh(
+            values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'], down
+        )
+
+    def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
+        names = {change.name for change in changes}
+        values = self.values | {change.name: change.value for change in changes}
+        try:
+            self._check(values)
+            if 'model_file' in names:
+                self._read_model(values)
+            if 'max_pose_gap_s' in names and not self.film.log.complete:
+                raise PaintError(
+                    f'max_pose_gap_s: the motion is longer than pose_memory '
+                    f'({self.film.log.limit_poses} poses) and cannot be painted again; reset first'
+                )
+        except PaintError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply_changes(self, changes: list[Parameter]) -> None:
+        names = {change.name for change in changes}
+        self.values.update({change.name: change.value for change in changes})
+        if names & {'part_pose', 'part_parent_frame'}:
+            self._place_part()
+        if 'trigger_latency_s' in names:
+            self.film.trigger_latency_s = self.values['trigger_latency_s']
+        if names & {'model_file', 'max_pose_gap_s'}:
+            self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
+        if 'publish_rate_hz' in names:
+            self.destroy_timer(self._show_timer)
+            self._show_timer = self._new_show_timer()
+        self._changed(names)
+
+    def _new_show_timer(self) -> Timer:
+        return self.create_timer(
+            1.0 / self.values['publish_rate_hz'], self.publish, clock=self._steady
+        )
+
+    def _place_part(self) -> None:
+        self.frame.place(self.values['part_parent_frame'], self.values['part_pose'])
+
+    def _repaint(self, from_start: bool = True) -> None:
+        """Prepare a film, in a thread, with the values as they are now."""
+        self._give_up_repainting()
+        values = dict(self.values)
+        self._repainting = Repainting(
+            self.film, lambda: self._make_film(self._read_model(values)), from_start
+        )
+
+    def _tend(self) -> None:
+        """Take over a film that is ready, and see that the part is the right way round."""
+        if self._repainting is not None and self._repainting.done:
+            self._take_over(self._repainting)
+        if not self._facing_settled:
+            self._face_the_gun()
+
+    def _take_over(self, repainting: Repainting) -> None:
+        self._repainting = None
+        try:
+            film = repainting.take_over(self.film)
+        except Exception as error:  # from a user's effect, say; the old model goes on
+            self.get_logger().error(f'the new model is not used: {error}')
+            return
+        if film is None:
+            self._repaint()
+            return
+        self.film = film
+
+    def _face_the_gun(self) -> None:
+        poses = self.film.log.first_poses(POSES_CONSIDERED)
+        if poses is None:
+            return
+        finite = np.isfinite(poses.quaternions_xyzw).all(axis=1)
+        finite &= np.isfinite(poses.positions_m).all(axis=1)
+        x, y, z, w = poses.quaternions_xyzw[finite].T
+        axes = np.stack(
+            [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1
+        )
+        positions = poses.positions_m[finite]
+        seen = facing(self.surface, positions, axes)
+        faced = toward_the_gun(self.surface, positions, axes)
+        if faced is not self.surface:
+            self._take_surface(faced)
+            turned = self._make_film(self.film.model)
+            turned.follow(self.film.log.events)
+            self.film = turned
+            if self._repainting is not None:
+                self._repaint()
+        self._facing_settled = (
+            seen.front + seen.back >= POSES_FACING or len(poses) >= POSES_CONSIDERED
+        )
+
+    def _give_up_repainting(self) -> None:
+        if self._repainting is not None:
+            self._repainting.give_up()
+            self._repainting = None
+
+    def destroy_node(self) -> None:
+        self._give_up_repainting()
+        super().destroy_node()

@@ -1,0 +1,152 @@
+"""Parameters that the nodes which paint have in common."""
+
+from __future__ import annotations
+
+import math
+
+from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
+from paint_deposition.nodes.runtime.parameters import NodeParameter
+
+AT_START = 'it is read once, when the node starts; restart the node with the new value'
+SUBSCRIBED = 'the subscriptions are made with it when the node starts; restart the node'
+
+
+def is_direction(value: list[float]) -> bool:
+    """Nothing, or three finite numbers that are not all zero."""
+    return not value or (len(value) == 3 and all(map(math.isfinite, value)) and any(value))
+
+
+def is_pose(value: list[float]) -> bool:
+    """Nothing, or seven finite numbers whose last four are nearly a unit quaternion."""
+    if not value:
+        return True
+    if len(value) != 7 or not all(map(math.isfinite, value)):
+        return False
+    return abs(math.hypot(*value[3:]) - 1.0) <= 0.01
+
+
+PART = (
+    NodeParameter(
+        'mesh_file',
+        '',
+        "The part's mesh: STL, PLY or OBJ [path]",
+        is_path=True,
+        fixed_because='the film lies on this mesh; restart the node for another part',
+    ),
+    NodeParameter(
+        'mesh_scale',
+        1.0,
+        'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]',
+        low=1e-9,
+        high=1e3,
+        fixed_because='the film lies on this mesh; restart the node',
+    ),
+    NodeParameter(
+        'max_edge_length_m',
+        0.01,
+        'Triangles are split until no edge is longer [m]',
+        low=1e-4,
+        high=10.0,
+        fixed_because='the film lies on the refined mesh; restart the node',
+    ),
+    NodeParameter(
+        'down',
+        [],
+        'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
+        'stands, -y for one drawn lying in x-y [-]',
+        constraints='three numbers that are not all zero, or none',
+        allows=is_direction,
+        element=float,
+        fixed_because=AT_START,
+    ),
+    NodeParameter(
+        'frame_id',
+        'part',
+        'Frame of the mesh, of the poses and of what is published [name]',
+        constraints='a name',
+        allows=lambda value: bool(value.strip('/')),
+        fixed_because='everything published so far is in this frame; restart the node',
+    ),
+    NodeParameter(
+        'part_pose',
+        [],
+        'Pose of the mesh in part_parent_frame, x y z qx qy qz qw; empty: not known [m, -]',
+        constraints='seven numbers, the last four a unit quaternion, or none',
+        allows=is_pose,
+        element=float,
+    ),
+    NodeParameter(
+        'part_parent_frame',
+        '',
+        'Frame that part_pose is given in; poses in it are transformed [name]',
+    ),
+)
+
+MOTION = (
+    NodeParameter(
+        'max_pose_gap_s',
+        0.25,
+        'A longer interval between pose stamps is gun off; a change paints the motion so far '
+        'again [s]',
+        low=0.001,
+        high=60.0,
+    ),
+    NodeParameter(
+        'trigger_latency_s',
+        0.1,
+        'How much later than the poses of its time a state may come and still cut where it '
+        'belongs, by the stamps [s]',
+        low=0.0,
+        high=10.0,
+    ),
+    NodeParameter(
+        'pose_queue_depth',
+        5000,
+        'Poses that may wait while the node is busy; too few lose paint [poses]',
+        low=1,
+        high=100_000,
+        fixed_because=SUBSCRIBED,
+    ),
+    NodeParameter(
+        'pose_reliability',
+        'best_effort',
+        'What is asked of the publishers of poses and states; best_effort hears all of them, '
+        'reliable only those that promise it [name]',
+        choices=('best_effort', 'reliable'),
+        fixed_because=SUBSCRIBED,
+    ),
+    NodeParameter(
+        'pose_memory',
+        DEFAULT_LIMIT_POSES,
+        'Poses kept, about 100 bytes each, to paint the motion again with another model; beyond, '
+        'a new model paints from then on only [poses]',
+        low=10_000,
+        high=100_000_000,
+        fixed_because=AT_START,
+    ),
+)
+
+MODEL = (
+    NodeParameter(
+        'model_file',
+        '',
+        'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
+        'reads it and paints the motion so far again [path]',
+        is_path=True,
+    ),
+    NodeParameter(
+        'repaint',
+        True,
+        'Whether a new model paints the motion so far again; false: from then on only [-]',
+    ),
+)
+
+SHOWING = (
+    NodeParameter(
+        'publish_rate_hz',
+        2.0,
+        'How often what is shown goes out while the film changes [Hz]',
+        low=0.1,
+        high=30.0,
+    ),
+)

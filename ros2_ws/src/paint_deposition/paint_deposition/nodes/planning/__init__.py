@@ -1,0 +1,1 @@
+"""The node that recommends an index and plans passes."""

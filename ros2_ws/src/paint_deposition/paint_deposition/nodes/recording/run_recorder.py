@@ -1,0 +1,250 @@
+"""Node `run_recorder`: writes a run to disk as rosbag2 would, and says what it lost."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from paint_msgs.msg import PoseProgress
+from rclpy.clock import Clock, ClockType
+from rclpy.qos import QoSProfile
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+from std_srvs.srv import Trigger
+
+from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.files.provenance import provenance
+from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.bags import POSE_TYPE
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
+from paint_deposition.nodes.recording.recorder_parameters import RECORDER
+from paint_deposition.nodes.replay.flow_control import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.messages import to_time
+from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+
+# The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
+DEFAULT_TOPICS = (
+    'atomizer/pose',
+    'atomizer/state',
+    'thickness/cloud',
+    'thickness/field',
+    'thickness/stats',
+    'comparison/stats',
+    'planned_path',
+    '/diagnostics',
+    '/parameter_events',
+)
+DISCOVERY_PERIOD_S = 0.1
+FLUSH_PERIOD_S = 0.1
+PROGRESS_PERIOD_S = 0.2
+POSES_A_REPORT = 50
+POSE_QUEUE_DEPTH = 5000
+QUEUE_DEPTH = 100
+LOW_DISK_BYTES = 1_000_000_000
+
+
+class RunRecorder(PaintNode):
+    """Records serialised messages, byte by byte as they were published.
+
+    Publishers are found as they appear, and each topic's subscription is as reliable and as
+    latched as its publishers allow. When the disk fails or fills up the run is left incomplete,
+    the node says so and ends with an error; `paint recover` reads what is there.
+    """
+
+    PARAMETERS = RECORDER
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('run_recorder', **kwargs)
+        try:
+            notes = provenance(self.values['mesh_file'], self.values['model_file'])
+            self._run = RunWriter(self._folder(), notes, compression=self.values['compression'])
+        except PaintError:
+            self.destroy_node()
+            raise
+        wanted = self.values['topics'] or DEFAULT_TOPICS
+        self._wanted = [self.resolve_topic_name(name) for name in wanted]
+        self._topics: dict[str, RecordedTopic] = {}
+        self._refused: set[str] = set()
+        self._error: RecordingError | None = None
+        self._pose_topic = self.resolve_topic_name('atomizer/pose')
+        self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
+        self.create_service(Trigger, '~/stop', self._stop)
+        # A recorder keeps its own time: a simulated clock may stand still.
+        steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self.create_timer(DISCOVERY_PERIOD_S, self._discover, clock=steady)
+        self.create_timer(FLUSH_PERIOD_S, self._flush, clock=steady)
+        self.create_timer(PROGRESS_PERIOD_S, self._report_progress, clock=steady)
+        self._diagnostics = Diagnostics(self, {'recording': self._status})
+        self.get_logger().info(f'recording {len(self._wanted)} topics into {self._run.folder}')
+
+    @property
+    def folder(self) -> Path:
+        """The run's folder."""
+        return self._run.folder
+
+    @property
+    def message_count(self) -> int:
+        """Messages recorded so far."""
+        return self._run.message_count
+
+    def recorded(self, topic: str) -> int:
+        """Messages of one topic recorded so far."""
+        return self._run.counts.get(self.resolve_topic_name(topic), 0)
+
+    def close(self) -> None:
+        self._complete()
+
+    def destroy_node(self) -> None:
+        run = getattr(self, '_run', None)
+        if run and not run.complete:
+            run.abandon()
+        super().destroy_node()
+
+    def _folder(self) -> Path:
+        directory = Path(self.values['output_directory'])
+        return directory / (self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S'))
+
+    # --- finding the publishers
+
+    def _discover(self) -> None:
+        for name in self._wanted:
+            publishers = self.get_publishers_info_by_topic(name)
+            if publishers and name not in self._refused and self._error is None:
+                try:
+                    self._follow(name, publishers)
+                except RecordingError as error:
+                    self._refuse(name, error)
+
+    def _follow(self, name: str, publishers: list[TopicEndpointInfo]) -> None:
+        types = sorted({publisher.topic_type for publisher in publishers})
+        if len(types) > 1:
+            raise RecordingError(f'{name} is published as {" and ".join(types)}')
+        is_pose = types[0] == POSE_TYPE
+        profile = qos.accepting(
+            [publisher.qos_profile for publisher in publishers],
+            POSE_QUEUE_DEPTH if is_pose else QUEUE_DEPTH,
+        )
+        topic = self._topics.get(name)
+        if topic is None:
+            max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
+            topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
+            offered = [qos.as_recorded(publisher.qos_profile) for publisher in publishers]
+            self._guarded(
+                self._run.add_topic,
+                RunTopic(name, types[0], definitions.installed(types[0]), offered),
+            )
+            self._topics[name] = topic
+        if topic.profile is None or _offers_less(profile, topic.profile):
+            topic.subscribe(profile)
+
+    def _refuse(self, name: str, error: RecordingError) -> None:
+        self._refused.add(name)
+        self.get_logger().error(f'{name} is not recorded: {error}')
+
+    # --- writing
+
+    def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
+        self._guarded(self._run.write, name, cdr, received_ns, sent_ns)
+        if name == self._pose_topic and self._topics[name].counts.messages % POSES_A_REPORT == 0:
+            self._report_progress()
+
+    def _flush(self) -> None:
+        if not self._run.complete:
+            self._guarded(self._run.close_old_chunk)
+
+    def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
+        """Write, unless writing has failed before; the first failure ends the recording."""
+        if self._error is not None:
+            return
+        try:
+            step(*arguments)
+        except RecordingError as error:
+            self._give_up(error)
+
+    def _give_up(self, error: RecordingError) -> None:
+        self._error = error
+        self.get_logger().error(str(error))
+        self.fail(error)
+
+    def _report_progress(self) -> None:
+        topic = self._topics.get(self._pose_topic)
+        if topic is None:
+            return
+        progress = PoseProgress(poses_received=topic.counts.messages)
+        progress.header.stamp = to_time(topic.counts.newest_stamp_ns)
+        self._progress.publish(progress)
+
+    # --- ending
+
+    def _stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        self._complete()
+        response.success = self._run.complete
+        response.message = self.summary()
+        self.finish()
+        return response
+
+    def _complete(self) -> None:
+        if self._run.complete or self._error is not None:
+            return
+        for topic in self._topics.values():
+            topic.drain()
+        self._guarded(self._run.finish)
+        self.get_logger().info(self.summary())
+        never = [name for name in self._wanted if name not in self._topics]
+        if never and self.values['topics']:
+            self.get_logger().warning(f'never published: {" ".join(never)}')
+
+    def summary(self) -> str:
+        """What was recorded and what was lost, in a line."""
+        counts = [topic.counts for topic in self._topics.values()]
+        messages, missed = (sum(getattr(c, key) for c in counts) for key in ('messages', 'missed'))
+        state = 'complete' if self._run.complete else 'INCOMPLETE'
+        lost = f', {missed} missed' if missed else ''
+        gaps = sum(count.gaps for count in counts)
+        return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self._run.folder}'
+
+    def _status(self) -> Status:
+        try:
+            size, free = self._run.bytes_written, shutil.disk_usage(self._run.folder).free
+        except OSError as error:
+            gone = f'{self._run.path}: {error.strerror}; nothing more can be recorded there'
+            if self._error is None:
+                self._give_up(RecordingError(gone))
+            return Status(ERROR, gone)
+        counts = {name: topic.counts for name, topic in self._topics.items()}
+        level, message = OK, 'recording'
+        if self._error is not None:
+            level, message = ERROR, str(self._error)
+        elif self._refused:
+            level, message = ERROR, f'not recorded: {" ".join(sorted(self._refused))}'
+        elif free < LOW_DISK_BYTES:
+            level, message = WARN, 'the disk is almost full'
+        elif any(count.missed for count in counts.values()):
+            level, message = WARN, 'messages were missed'
+        values = {
+            'run': self._run.folder,
+            'bytes': size,
+            'disk free bytes': free,
+            'longest pose gap s': max((c.longest_gap_ns for c in counts.values()), default=0)
+            * 1e-9,
+        }
+        for name, count in counts.items():
+            values[name] = f'{count.messages} messages, {count.missed} missed, {count.gaps} gaps'
+        return Status(level, message, values)
+
+
+def _offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
+    """True when some publisher no longer matches the subscription; the weaker policy is larger."""
+    return (
+        offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
+    )
+
+
+def main() -> int:
+    """Run the node; the return value is the process's exit code."""
+    return run_node(RunRecorder)

@@ -1,0 +1,207 @@
+"""Node `bag_player`: replays the poses and the trigger of a bag, in time or as fast as taken."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from geometry_msgs.msg import PoseStamped
+from paint_msgs.msg import AtomizerState
+from rclpy.clock import Clock as SteadyClock
+from rclpy.clock import ClockType
+from rosgraph_msgs.msg import Clock
+from std_srvs.srv import Trigger
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
+from paint_deposition.files.recordings.bags import (
+    BOOL_TYPE,
+    STATE_TYPE,
+    choose_pose_topic,
+    choose_state_topic,
+    read_trajectory,
+)
+from paint_deposition.nodes.replay.flow_control import Audience
+from paint_deposition.nodes.replay.player_parameters import PLAYER
+from paint_deposition.nodes.replay.replay_clock import ReplayClock
+from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.messages import to_time
+from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+
+CLOCK_PERIOD_S = 0.01
+STOP_NOTICED_S = 0.05
+
+
+class BagPlayer(PaintNode):
+    """Publishes `atomizer/pose` and `atomizer/state` as recorded, and the bag's time on /clock.
+
+    Every pose goes out as the bytes that were recorded, in the recorded order, whatever the rate;
+    a std_msgs/Bool trigger becomes an AtomizerState stamped with its log time. At rate 0 the
+    player stays at most `window` poses ahead of the slowest node that reports PoseProgress on
+    `atomizer/progress`; nodes that do not report get what their queues hold. When looping, the
+    stamps jump back to the start of the bag with every round. /clock runs on between the messages,
+    and says the same time over and over while the replay stands still.
+    """
+
+    PARAMETERS = PLAYER
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('bag_player', **kwargs)
+        try:
+            self._poses_in_bag, self._states_in_bag = self._choose_topics()
+        except PaintError:
+            self.destroy_node()
+            raise
+        depth = max(qos.POSE_DEPTH, self.values['window'])
+        profile = qos.replayed(depth)
+        self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
+        self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
+        self._clock_publisher = (
+            self.create_publisher(Clock, '/clock', qos.CLOCK)
+            if self.values['publish_clock']
+            else None
+        )
+        self._clock_order = threading.Lock()
+        self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
+        steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
+        if self._clock_publisher:
+            self.create_timer(CLOCK_PERIOD_S, self._publish_clock, clock=steady)
+        self.create_service(Trigger, '~/pause', self._pause)
+        self.create_service(Trigger, '~/resume', self._resume)
+        self._stopped = threading.Event()
+        self._audience = Audience(self, self._pose_publisher, self.values['window'], self._stopped)
+        self.poses_published = 0
+        self.states_published = 0
+        self._diagnostics = Diagnostics(self, {'replay': self._status})
+        self._thread = threading.Thread(target=self._replay, name='replay', daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        self._stop_thread()
+        self.get_logger().info(
+            f'replayed {self.poses_published} poses, {self.states_published} states'
+        )
+
+    def destroy_node(self) -> None:
+        self._stop_thread()
+        super().destroy_node()
+
+    def _stop_thread(self) -> None:
+        thread = getattr(self, '_thread', None)
+        if thread and thread.is_alive():
+            self._stopped.set()
+            thread.join()
+
+    def _choose_topics(self) -> tuple[BagTopic, BagTopic | None]:
+        values = self.values
+        if not values['bag']:
+            raise PaintError('bag_player: bag is empty: give the path of a recording')
+        with open_bag(values['bag']) as bag:
+            poses = choose_pose_topic(bag, values['pose_topic'])
+            if values['state_topic']:
+                states = choose_state_topic(bag, values['state_topic'])
+                if states.type == BOOL_TYPE:
+                    # Its log times only serve where the recorder's clock is the robot's.
+                    read_trajectory(values['bag'], poses.name, states.name)
+                return poses, states
+            unused = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
+            if unused:
+                self.get_logger().info(
+                    f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
+                )
+            return poses, None
+
+    # --- called by the executor
+
+    def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = self._time.running
+        response.message = 'paused' if response.success else 'already paused'
+        self._time.pause()
+        return response
+
+    def _resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+        response.success = not self._time.running
+        response.message = 'resumed' if response.success else 'not paused'
+        self._time.resume()
+        return response
+
+    def _status(self) -> Status:
+        doing = self._audience.doing if self._time.running else 'paused'
+        return Status(
+            WARN if doing.startswith('waiting') else OK,
+            doing,
+            {
+                'bag': self.values['bag'],
+                'poses published': self.poses_published,
+                'states published': self.states_published,
+                'poses ahead of the slowest subscriber': self._audience.poses_ahead,
+            },
+        )
+
+    # --- the replay's own thread
+
+    def _replay(self) -> None:
+        try:
+            self._stand_at_the_start()
+            self._audience.wait_for_subscribers(self.values['wait_for_subscribers'])
+            while not self._stopped.is_set():
+                self._play_once()
+                self._audience.wait_until_taken()
+                if not self.values['loop']:
+                    break
+        except Exception as error:
+            self.fail(error)
+            return
+        self.finish()
+
+    def _stand_at_the_start(self) -> None:
+        with open_bag(self.values['bag']) as bag:
+            for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
+                self._time.stand_at(message.log_time_ns)
+                return
+
+    def _play_once(self) -> None:
+        begun = False
+        with open_bag(self.values['bag']) as bag:
+            for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
+                if not begun:
+                    begun = True
+                    self._time.stand_at(message.log_time_ns)
+                    self._time.start()
+                self._wait_for_turn(message.log_time_ns)
+                if self._stopped.is_set():
+                    return
+                self._time.reach(message.log_time_ns)
+                self._publish(message)
+        self._time.stop()
+        self._publish_clock()
+
+    def _wait_for_turn(self, log_time_ns: int) -> None:
+        """Wait while paused, and until a message's time has come or there is room for it."""
+        while not self._stopped.is_set():
+            if self._time.wait_for(log_time_ns, timeout_s=STOP_NOTICED_S):
+                break
+        if self.values['rate'] == 0.0:
+            self._audience.wait_for_room()
+
+    def _publish(self, message: ReplayMessage) -> None:
+        if message.is_pose:
+            self._audience.sent(message.stamp_ns)
+            self._pose_publisher.publish(message.cdr)
+            self.poses_published += 1
+        else:
+            self._state_publisher.publish(message.cdr)
+            self.states_published += 1
+
+    def _publish_clock(self) -> None:
+        with self._clock_order:
+            time_ns = self._time.time_ns
+            if self._clock_publisher and time_ns is not None:
+                self._clock_publisher.publish(Clock(clock=to_time(time_ns)))
+
+
+def main() -> int:
+    """Run the node; the return value is the process's exit code."""
+    return run_node(BagPlayer)

@@ -1,0 +1,76 @@
+"""What a bag player publishes, in order: poses as they were recorded, the trigger as states."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from typing import Any, NamedTuple
+
+from paint_msgs.msg import AtomizerState
+from rclpy.serialization import deserialize_message, serialize_message
+from std_msgs.msg import Bool
+
+from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
+from paint_deposition.files.recordings.bags import BOOL_TYPE, STATE_TYPE, stamp_ns
+from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.nodes.runtime.messages import to_time
+
+STAMP_OFFSET = 4  # behind the four bytes that say how the message is encoded
+
+
+class ReplayMessage(NamedTuple):
+    """One serialised message; `stamp_ns` is its header's."""
+
+    log_time_ns: int
+    is_pose: bool
+    stamp_ns: int
+    cdr: bytes
+
+
+def replay_messages(bag: Bag, poses: BagTopic, states: BagTopic | None) -> Iterator[ReplayMessage]:
+    """Poses and states in the order of their log times, states first among equal ones."""
+    names = [poses.name] + ([states.name] if states else [])
+    as_state = _state_converter(bag, states)
+    for _, simultaneous in groupby(bag.messages(names), key=lambda message: message.log_time_ns):
+        for message in sorted(simultaneous, key=lambda message: message.topic == poses.name):
+            is_pose = message.topic == poses.name
+            cdr = message.cdr if is_pose else as_state(message)
+            yield ReplayMessage(message.log_time_ns, is_pose, header_stamp_ns(cdr), cdr)
+
+
+def header_stamp_ns(cdr: bytes) -> int:
+    """Stamp of a serialised message that begins with a header [ns]."""
+    little_endian = cdr[1] & 1
+    sec, nanosec = struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET)
+    return sec * 1_000_000_000 + nanosec
+
+
+def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
+    if states is None or states.type == BOOL_TYPE:
+        return _state_of_bool
+    if bag.type_hash(states.name) == definitions.installed(STATE_TYPE).type_hash:
+        return lambda message: message.cdr
+    # Recorded with another version of the message: fields of the same name are taken over.
+    return lambda message: serialize_message(_state_of(bag.decode(message)))
+
+
+def _state_of_bool(message: RawMessage) -> bytes:
+    spraying = deserialize_message(message.cdr, Bool).data
+    state = AtomizerState(spraying=spraying, flow=relative_flow(spraying))
+    state.header.stamp = to_time(message.log_time_ns)
+    unknown = float('nan')
+    state.shaping_air_l_per_min = state.bell_speed_rpm = state.voltage_kv = unknown
+    return serialize_message(state)
+
+
+def _state_of(recorded: Any) -> AtomizerState:
+    state = AtomizerState()
+    for name, kind in AtomizerState.get_fields_and_field_types().items():
+        if kind == 'double':
+            setattr(state, name, float(getattr(recorded, name, float('nan'))))
+    state.spraying = bool(recorded.spraying)
+    state.header.stamp = to_time(stamp_ns(recorded.header))
+    state.header.frame_id = recorded.header.frame_id
+    return state

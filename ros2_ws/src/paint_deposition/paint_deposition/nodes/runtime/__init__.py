@@ -1,0 +1,1 @@
+"""What every node has: process, parameters, quality of service, diagnostics."""

@@ -1,0 +1,78 @@
+"""The quality of service of every topic, by what it carries."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rclpy.duration import Duration
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rosbags.interfaces import Qos, QosTime
+
+from paint_deposition.files.recordings.recorded_qos import offered_qos
+
+# Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
+# builds one mesh marker, whatever the reliability: a full queue drops its oldest message.
+POSE_DEPTH = 500
+
+
+def _profile(
+    depth: int,
+    reliability: ReliabilityPolicy,
+    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
+) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=reliability,
+        durability=durability,
+    )
+
+
+def poses(depth: int = POSE_DEPTH) -> QoSProfile:
+    """Subscription to poses or gun states: connects to reliable and best-effort publishers."""
+    return _profile(depth, ReliabilityPolicy.BEST_EFFORT)
+
+
+def replayed(depth: int = POSE_DEPTH) -> QoSProfile:
+    """Publication of replayed poses and states: reliable, so that acknowledgement can be asked."""
+    return _profile(depth, ReliabilityPolicy.RELIABLE)
+
+
+# The newest message is kept for whoever comes later: meshes, statistics, run status.
+LATCHED = _profile(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+# Clouds, fields and other results that are drawn or recorded as they come.
+RESULTS = _profile(10, ReliabilityPolicy.RELIABLE)
+# Progress reports of those who take poses; the newest one says all.
+PROGRESS = _profile(100, ReliabilityPolicy.RELIABLE)
+DIAGNOSTICS = _profile(10, ReliabilityPolicy.RELIABLE)
+CLOCK = _profile(1, ReliabilityPolicy.BEST_EFFORT)
+
+
+def accepting(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
+    """Subscription that all these publishers match, as reliable and as latched as they allow."""
+    all_reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
+    all_latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
+    return _profile(
+        depth,
+        ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
+        DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def as_recorded(profile: QoSProfile) -> Qos:
+    """A publisher's profile, as the middleware tells it, the way bags store it."""
+    return offered_qos(
+        profile.depth,
+        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
+        latched=profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
+        history=profile.history.name,
+        liveliness=profile.liveliness.name,
+        deadline=_as_time(profile.deadline),
+        lifespan=_as_time(profile.lifespan),
+        lease=_as_time(profile.liveliness_lease_duration),
+        plain_names=profile.avoid_ros_namespace_conventions,
+    )
+
+
+def _as_time(duration: Duration) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, 10**9))

@@ -1,0 +1,91 @@
+"""Films of single passes over a part, kept so that any raster of them is a sum."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.pass_motion import trajectory_of
+from paint_deposition.planning.passes import RasterStyle, plan_pass
+from paint_deposition.planning.surface_map import SkinMap
+
+MOST_POINTS = 1500
+LINES_PER_SCALE = 5.0
+COARSEST_STEP_M = 0.02
+# Sub-steps for choosing a raster may be coarser than for its film: 1e-4 of the peak.
+STEPS_PER_SIGMA = 5.0
+SLOWEST_RATE_HZ = 10.0
+
+
+class LineFilms:
+    """Film at points spread evenly over the painted side, for passes along many lines.
+
+    Args:
+        surface: the part. skin: its smoothed skin.
+        model: effects on the finished film are left out.
+        style: how passes are run.
+        finest_m: scale on which the film changes across a pass [m].
+        beyond_m: lines are laid this far past the part's edges [m].
+        progress: called with the share done.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        skin: SkinMap,
+        model: DepositionModel,
+        style: RasterStyle,
+        finest_m: float,
+        beyond_m: float,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        chosen = _spread(surface.vertex_areas_m2[skin.painted])
+        rows = np.flatnonzero(skin.painted)[chosen]
+        points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
+        low, high = skin.extent_m[1]
+        self.low_m, self.high_m = low - beyond_m, high + beyond_m
+        step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
+        self.lines_m = np.linspace(
+            self.low_m, self.high_m, math.ceil((self.high_m - self.low_m) / step) + 1
+        )
+        bare = model.model_copy(
+            update={'projection': model.projection.model_copy(update={'occlusion': False})}
+        )
+        integrator = FilmIntegrator(points, bare)
+        longest = finest_m / STEPS_PER_SIGMA
+        # Slower poses would be gaps, at which the gun is off.
+        rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
+        self.films_um = np.empty((len(self.lines_m), len(rows)))
+        for k, across in enumerate(self.lines_m):
+            planned = plan_pass(skin, float(across), style)
+            motion = trajectory_of((planned,), style, rate_hz=rate)
+            path, _ = spray_path(motion, max_step_m=longest)
+            integrator.reset()
+            integrator.add(path)
+            self.films_um[k] = integrator.raw_um
+            progress((k + 1) / len(self.lines_m))
+        # Cubic splines through the lines' films are linear in them: one matrix for all points.
+        self._basis = CubicSpline(self.lines_m, np.eye(len(self.lines_m)))
+
+    def weights(self, lines_m: np.ndarray) -> np.ndarray:
+        """(..., L) weights of the kept films for passes along lines (..., n) [m]."""
+        return self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
+
+    def sigma_n(self, lines_m: np.ndarray) -> np.ndarray:
+        """(...) standard deviation over mean of the film of passes along lines (..., n) [m]."""
+        film = self.weights(lines_m) @ self.films_um
+        return film.std(axis=-1) / film.mean(axis=-1)
+
+
+def _spread(area_m2: np.ndarray) -> np.ndarray:
+    """Rows that stand for equal shares of the area, MOST_POINTS at most."""
+    reached = np.cumsum(area_m2)
+    count = min(MOST_POINTS, 4 * len(area_m2))
+    shares = (np.arange(count) + 0.5) / count * reached[-1]
+    return np.searchsorted(reached, shares)

@@ -1,0 +1,1 @@
+"""Gauge readings: noise, outliers, covariates, and the campaign that they belong to."""

@@ -1,0 +1,170 @@
+"""Figures and arrays that the report shows, computed once from the inference's results."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.profiles import Profile, profiles_of
+from paint_deposition.comparison.residual_field import point_residuals_um
+from paint_deposition.diagnosis.next_experiment import Place, Spray
+from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.fitting.study import Study
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.readings.campaign import Experiment
+from paint_deposition.results.fitted_model import history_as_list
+
+# Share of the skin that stays within the range told; single vertices at rims do not count.
+MOST_OF_THE_SKIN = 0.98
+
+
+@dataclass(frozen=True)
+class Change:
+    """What one effect does to the readings a gauge would take, over all experiments.
+
+    Attributes:
+        least_um, most_um: with the effect minus without it, over most of the skin [um].
+        rms_um: root mean square over the skin [um].
+    """
+
+    least_um: float
+    most_um: float
+    rms_um: float
+
+
+@dataclass(frozen=True)
+class ReportData:
+    """Everything the report is made of.
+
+    Attributes:
+        study: the readings.
+        models, comparisons: base first, best last; one where nothing was added.
+        diagnosis: or None after a comparison alone.
+        places, sprays: what to measure and spray next.
+        history: of the model, oldest first, as in its file.
+    """
+
+    study: Study
+    models: tuple[DepositionModel, ...]
+    comparisons: tuple[Comparison, ...]
+    diagnosis: Diagnosis | None = None
+    places: tuple[Place, ...] = ()
+    sprays: tuple[Spray, ...] = ()
+    history: tuple[Mapping[str, Any], ...] = ()
+
+    @staticmethod
+    def of(
+        study: Study,
+        models: Sequence[tuple[DepositionModel, Comparison]],
+        diagnosis: Diagnosis | None = None,
+        places: Sequence[Place] = (),
+        sprays: Sequence[Spray] = (),
+        older: Sequence[Mapping[str, Any]] = (),
+    ) -> 'ReportData':
+        """Put the results together; models between the first and the last are history."""
+        chosen = [models[0], models[-1]] if len(models) > 1 else [models[0]]
+        return ReportData(
+            study,
+            tuple(model for model, _ in chosen),
+            tuple(comparison for _, comparison in chosen),
+            diagnosis,
+            tuple(places),
+            tuple(sprays),
+            tuple(history_as_list(study, diagnosis.history, older)) if diagnosis else (),
+        )
+
+    @property
+    def experiments(self) -> tuple[Experiment, ...]:
+        """Of the campaign."""
+        return self.study.campaign.experiments
+
+    @property
+    def improved(self) -> bool:
+        """Whether there is a before and an after."""
+        return len(self.models) > 1
+
+    @property
+    def model(self) -> DepositionModel:
+        """The best model."""
+        return self.models[-1]
+
+    @cached_property
+    def residuals_um(self) -> list[np.ndarray]:
+        """For each model (P,) at the points, averaged over repeats [um]."""
+        return [np.concatenate(point_residuals_um(self.study, c)) for c in self.comparisons]
+
+    @cached_property
+    def rmse_um(self) -> list[float]:
+        """For each model, over the points [um]."""
+        return [float(np.sqrt(np.mean(r**2))) for r in self.residuals_um]
+
+    @cached_property
+    def chi_square_per_point(self) -> list[float]:
+        """For each model; about 1 where only the gauge's noise is left."""
+        return [float(np.mean((r / self.study.sigma_um) ** 2)) for r in self.residuals_um]
+
+    @cached_property
+    def profiles(self) -> list[Profile]:
+        """Along columns and rows."""
+        return profiles_of(self.study, self.models)
+
+    @cached_property
+    def skins_um(self) -> list[list[np.ndarray]]:
+        """Film on the skin: for each experiment and each model (V,) [um]."""
+        return [[painted.film_um for painted in row] for row in self._painted]
+
+    @cached_property
+    def gained_um(self) -> list[np.ndarray]:
+        """What a gauge would read more with the best model than with the first, (V,) each [um]."""
+        return [row[-1].gauge_um - row[0].gauge_um for row in self._painted]
+
+    @cached_property
+    def _painted(self) -> list[list[FilmIntegrator]]:
+        numbers = range(len(self.experiments))
+        return [[self._paint(k, model) for model in self.models] for k in numbers]
+
+    @cached_property
+    def changes(self) -> dict[str, Change]:
+        """What each effect of the best model does, by id; the pattern stays as it is."""
+        found = {}
+        for effect in self.model.effects:
+            others = tuple(e for e in self.model.effects if e.id != effect.id)
+            without = self.model.model_copy(update={'effects': others})
+            difference, area = [], []
+            for k, painted in enumerate(self._painted):
+                difference.append(painted[-1].gauge_um - self._paint(k, without).gauge_um)
+                area.append(self.experiments[k].surface.vertex_areas_m2)
+            found[effect.id] = _change(np.concatenate(difference), np.concatenate(area))
+        return found
+
+    @cached_property
+    def _skins(self) -> list[SurfacePoints]:
+        return [experiment.surface.points() for experiment in self.experiments]
+
+    def _paint(self, index: int, model: DepositionModel) -> FilmIntegrator:
+        experiment, points = self.experiments[index], self._skins[index]
+        integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
+        integrator.add(experiment.path)
+        return integrator
+
+    def rows_of(self, index: int) -> slice:
+        """Points of the study that belong to an experiment."""
+        first, stop = np.searchsorted(self.study.experiment_of, [index, index + 1])
+        return slice(int(first), int(stop))
+
+
+def _change(difference_um: np.ndarray, area_m2: np.ndarray) -> Change:
+    order = np.argsort(difference_um)
+    share = np.cumsum(area_m2[order]) / area_m2.sum()
+    tail = 0.5 * (1.0 - MOST_OF_THE_SKIN)
+    least, most = (
+        float(difference_um[order[min(np.searchsorted(share, at), len(order) - 1)]])
+        for at in (tail, 1.0 - tail)
+    )
+    rms = float(np.sqrt(np.average(difference_um**2, weights=area_m2)))
+    return Change(min(least, 0.0), max(most, 0.0), rms)

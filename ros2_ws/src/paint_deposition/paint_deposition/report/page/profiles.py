@@ -1,0 +1,150 @@
+"""Profiles along columns and rows with the residual below each: Figure 8 of the paper."""
+
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.comparison.profiles import Profile
+from paint_deposition.report.page.data import ReportData
+from paint_deposition.report.page.style import (
+    ACCENT,
+    BEFORE,
+    INK,
+    MUTED,
+    TWO_SIDED_95,
+    axis,
+    base_layout,
+    chart_title,
+    figure,
+    grid_domains,
+)
+
+ROW_PX, TOP_PX, BOTTOM_PX = 300, 56, 40
+# Share of a chart's height that the residual takes, and the gap above it.
+RESIDUAL_SHARE, GAP_SHARE = 0.26, 0.05
+
+
+def charts_a_row(count: int) -> int:
+    """Two to four, so that few places stay empty."""
+    if count < 5:
+        return count if count < 4 else 2
+    return min((3, 4), key=lambda columns: -count % columns)
+
+
+def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
+    """Film along each column or row of one experiment: measured, before and after."""
+    experiment = data.experiments[index].name
+    profiles = [p for p in data.profiles if p.experiment == experiment]
+    columns = charts_a_row(len(profiles))
+    inner = ROW_PX * -(-len(profiles) // columns) - 60
+    layout = base_layout(margin={'l': 48, 'r': 12, 't': TOP_PX, 'b': BOTTOM_PX}, annotations=[])
+    layout['legend'] |= {'y': 1.0 + 24 / inner, 'traceorder': 'normal'}
+    film_range, residual_range = _ranges(data, profiles)
+    traces: list[dict] = []
+    domains = grid_domains(len(profiles), columns, inner, (46, 66))
+    for k, (profile, (x, y)) in enumerate(zip(profiles, domains, strict=True)):
+        film, residual = (f'{2 * k + n}' if 2 * k + n > 1 else '' for n in (1, 2))
+        cut = y[0] + RESIDUAL_SHARE * (y[1] - y[0])
+        floor = cut + GAP_SHARE * (y[1] - y[0])
+        traces += _film_traces(data, profile, f'x{film}', f'y{film}', k == 0)
+        traces += _residual_traces(data, profile, f'x{film}', f'y{residual}')
+        layout[f'xaxis{film}'] = axis(
+            f'{profile.axis} [mm]', domain=x, anchor=f'y{residual}', nticks=7
+        )
+        first = x[0] == 0.0
+        layout[f'yaxis{film}'] = axis(
+            'film [µm]' if first else '', domain=[floor, y[1]], anchor=f'x{film}',
+            range=film_range, nticks=6,
+        )  # fmt: skip
+        layout[f'yaxis{residual}'] = axis(
+            'residual' if first else '', domain=[y[0], cut], anchor=f'x{film}',
+            range=residual_range, nticks=4, zeroline=True, zerolinecolor=MUTED, zerolinewidth=1,
+        )  # fmt: skip
+        text = f'<b>{_escaped(profile.label)}</b>  {errors_in_words(data, profile.rows)}'
+        layout['annotations'].append(chart_title(text, x[0], y[1]))
+    return figure(f'profiles-{index}', traces, layout, inner + TOP_PX + BOTTOM_PX)
+
+
+def errors_in_words(data: ReportData, rows: np.ndarray) -> str:
+    """RMSE of these points for each model."""
+    errors = [f'{np.sqrt(np.mean(r[rows] ** 2)):.2f}' for r in data.residuals_um]
+    return f'RMSE {" → ".join(errors)} µm'
+
+
+def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], list[float]]:
+    lines = [p.lines_um.max(initial=0.0) for p in profiles]
+    measured = [data.study.measured_um[p.rows].max() for p in profiles]
+    rows = np.concatenate([p.rows for p in profiles])
+    off = max(np.abs(r[rows]).max() for r in data.residuals_um)
+    noise = TWO_SIDED_95 * data.study.sigma_um[rows].max()
+    reach = 1.05 * (off + 0.6 * noise)
+    return [0.0, 1.03 * max(*lines, *measured, 1.0) + noise], [-reach, reach]
+
+
+def _film_traces(data: ReportData, p: Profile, x: str, y: str, first: bool) -> list[dict]:
+    common = {'xaxis': x, 'yaxis': y, 'type': 'scatter'}
+    line_mm = 1e3 * p.line_m
+    traces = [
+        common | {
+            'x': line_mm, 'y': single, 'mode': 'lines', 'name': 'each pass alone',
+            'legendgroup': 'pass', 'showlegend': first and number == 0, 'legendrank': 9,
+            'line': {'color': BEFORE, 'width': 1, 'dash': 'dot'},
+            'hovertemplate': f'pass {number + 1}: %{{y:.1f}} µm<extra></extra>',
+        }
+        for number, single in enumerate(p.passes_um)
+    ]  # fmt: skip
+    # The thin line lies over the bold one, so that both are seen where they agree.
+    for k in reversed(range(len(data.models))):
+        last = k == len(data.models) - 1
+        name = 'model' if not data.improved else 'model after' if last else 'model before'
+        trace = common | {
+            'name': name, 'legendgroup': name, 'showlegend': first, 'legendrank': 2 + k,
+            'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',
+        }  # fmt: skip
+        if len(line_mm):
+            style = {'color': ACCENT, 'width': 3.5} if last else {'color': INK, 'width': 1.2}
+            trace |= {'x': line_mm, 'y': p.lines_um[k], 'mode': 'lines', 'line': style}
+        else:
+            marker = {'size': 8, 'color': ACCENT} if last else {
+                'size': 7, 'symbol': 'circle-open', 'color': INK}  # fmt: skip
+            predicted = data.study.measured_um[p.rows] - data.residuals_um[k][p.rows]
+            trace |= {'x': 1e3 * p.position_m, 'y': predicted, 'mode': 'markers',
+                      'marker': marker}  # fmt: skip
+        traces.append(trace)
+    traces.append(common | {
+        'x': 1e3 * p.position_m, 'y': data.study.measured_um[p.rows], 'mode': 'markers',
+        'name': 'measured, bars: 95 % gauge noise', 'legendgroup': 'measured',
+        'showlegend': first, 'legendrank': 1, 'marker': {'size': 5, 'color': INK},
+        'error_y': _bars(data, p),
+        'hovertemplate': 'measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>',
+    })  # fmt: skip
+    return traces
+
+
+def _residual_traces(data: ReportData, p: Profile, x: str, y: str) -> list[dict]:
+    """Measured minus predicted; the bars of the last are the gauge's noise."""
+    traces = []
+    for k, residual in enumerate(data.residuals_um):
+        last = k == len(data.models) - 1
+        colour = ACCENT if last else BEFORE
+        trace = {
+            'xaxis': x, 'yaxis': y, 'type': 'scatter', 'mode': 'lines+markers',
+            'x': 1e3 * p.position_m, 'y': residual[p.rows], 'showlegend': False,
+            'marker': {'size': 4.5, 'color': colour}, 'line': {'width': 1, 'color': colour},
+            'hovertemplate': 'residual %{y:+.2f} µm<extra></extra>',
+        }  # fmt: skip
+        if last:
+            trace['error_y'] = _bars(data, p) | {'color': ACCENT}
+        traces.append(trace)
+    return traces
+
+
+def _bars(data: ReportData, p: Profile) -> dict[str, Any]:
+    return {
+        'type': 'data', 'array': TWO_SIDED_95 * data.study.sigma_um[p.rows],
+        'color': INK, 'thickness': 1, 'width': 0,
+    }  # fmt: skip
+
+
+def _escaped(text: str) -> str:
+    return text.replace('&', '&amp;').replace('<', '&lt;').replace(' -', ' −')

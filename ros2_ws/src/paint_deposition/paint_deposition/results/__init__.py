@@ -1,0 +1,1 @@
+"""Results on disk: films, plans, calibrations, comparisons and diagnoses."""

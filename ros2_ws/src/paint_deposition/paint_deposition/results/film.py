@@ -1,0 +1,78 @@
+"""A finished film on disk, for node and command: painted mesh, table and figures."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import replacing
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.meshes import write_mesh_ply
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.part.surface import Surface
+
+CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
+
+
+def write_film(
+    folder: str | Path,
+    surface: Surface,
+    film_um: np.ndarray,
+    statistics: FilmStatistics,
+    *,
+    stem: str = 'film',
+    statistics_file: str = 'stats.json',
+    details: Mapping[str, Any] | None = None,
+    color_range_um: tuple[float, float] = (0.0, 0.0),
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write ``<stem>.ply``, ``<stem>.csv`` and the statistics, each file whole or not at all.
+
+    Args:
+        folder: where to; made if it is not there.
+        film_um: (V,) film at the vertices of the surface [um].
+        details: more to say in the statistics, such as counts of poses and the files used.
+        color_range_um: ends of the colour map in the PLY [um]; both 0 is automatic.
+        overwrite: whether older files of these names may go.
+
+    Returns:
+        The absolute paths written, in the order above.
+
+    Raises:
+        PaintError: a file of that name is there, or the folder cannot be written.
+    """
+    folder = Path(folder).expanduser().absolute()
+    paths = [folder / f'{stem}.ply', folder / f'{stem}.csv', folder / statistics_file]
+    if not overwrite:
+        refuse_overwriting(paths)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        shown = film_um > statistics.painted_above_um
+        colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
+        write_mesh_ply(paths[0], surface, film_um, colours)
+        write_film_csv(paths[1], surface.vertices_m, film_um)
+        write_json(paths[2], {**statistics.as_dict(), **(details or {})})
+    except OSError as error:
+        raise PaintError(
+            f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'
+        ) from None
+    return paths
+
+
+def refuse_overwriting(paths: list[Path]) -> None:
+    """Raise PaintError if one of the files exists."""
+    there = [path for path in paths if path.exists()]
+    if there:
+        raise PaintError(
+            f'{there[0]} is there already; choose another name, or move the old file away'
+        )
+
+
+def write_film_csv(path: str | Path, positions_m: np.ndarray, film_um: np.ndarray) -> None:
+    """Write (V, 3) positions [m] and (V,) film [um] as a table, whole or not at all."""
+    rows = np.column_stack([positions_m, film_um])
+    with replacing(path) as temporary:
+        np.savetxt(temporary, rows, '%.9g', delimiter=',', header=CSV_HEADER, comments='')

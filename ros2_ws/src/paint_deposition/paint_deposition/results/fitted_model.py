@@ -1,0 +1,89 @@
+"""A model fitted to readings as a model file: what it started from stays on record."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.diagnosis.verdict import Step
+from paint_deposition.files.model_file import ModelFile, write_model
+from paint_deposition.fitting.estimates import estimates
+from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.parameters import PATTERN_NAMES
+from paint_deposition.fitting.study import Study
+
+# What a step of the history added, where it was no effect.
+PATTERN, REFIT = 'pattern', 'refit'
+
+
+def write_fitted(
+    path: str | Path,
+    study: Study,
+    steps: Sequence[Step],
+    start: ModelFile | None = None,
+    header_comment: str = '',
+) -> None:
+    """Write the last step's model; an older file is replaced at once.
+
+    Args:
+        path: YAML.
+        study: the readings that it was fitted to.
+        steps: the models, the one started from, fitted anew, first.
+        start: what was started from: the name stays, the history goes on, and uncertainties
+            stay where the fit has no newer ones.
+        header_comment: lines to put at the top.
+    """
+    name, older_uncertainty, older = '', {}, ()
+    if start is not None:
+        name, older_uncertainty, older = start.name, start.uncertainty, start.history
+    write_model(
+        path,
+        steps[-1].model,
+        header_comment,
+        history_as_list(study, steps, older),
+        _uncertainty(steps[-1].fit, older_uncertainty),
+        name,
+    )
+
+
+def history_as_list(
+    study: Study, steps: Sequence[Step], older: Sequence[Mapping[str, Any]] = ()
+) -> list[dict[str, Any]]:
+    """What was added to a model and the errors it left.
+
+    Errors are comparable within a campaign only, so each step names its own, with the noise of
+    its gauge. The model started from is the last of the older steps: fitted anew to the same
+    campaign it replaces that step, fitted to another one it follows it.
+
+    Args:
+        study: the readings.
+        steps: the models, the one started from, fitted anew, first.
+        older: what the start model's own file says.
+    """
+    campaign = study.campaign.name
+    found = [
+        {
+            'added': step.added,
+            'rmse_um': round(step.rmse_um, 4),
+            'holdout_rmse_um': round(step.holdout_rmse_um, 4),
+            'noise_floor_um': round(study.noise_floor_um, 4),
+            'campaign': campaign,
+        }
+        for step in steps
+    ]
+    kept = [dict(step) for step in older]
+    if kept and kept[-1].get('campaign', campaign) == campaign:
+        found[0] = kept.pop() | found[0] | {'added': older[-1].get('added', PATTERN)}
+    else:
+        found[0]['added'] = REFIT if kept or steps[0].model.effects else PATTERN
+    return [*kept, *found]
+
+
+def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
+    """Standard deviations in the sections of the model."""
+    sections = {key: dict(value) for key, value in older.items() if isinstance(value, Mapping)}
+    for value in estimates(fit):
+        section, _, name = value.name.rpartition('.')
+        if value.name in PATTERN_NAMES:
+            section = 'planar'
+        sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
+    return sections

@@ -1,0 +1,56 @@
+"""Profiles along columns of readings."""
+
+import numpy as np
+import pytest
+
+from paint_deposition.comparison.profiles import profiles_of
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.fitting.study import Study
+from small_campaign import small_campaign
+
+DRIFTING = DepositionModel(effects=(AirDrift(shift_down_m=0.02),))
+
+
+@pytest.fixture(scope='module')
+def study(tmp_path_factory):
+    return Study.of(small_campaign(tmp_path_factory.mktemp('campaign')))
+
+
+@pytest.fixture(scope='module')
+def profiles(study):
+    return profiles_of(study, [DepositionModel(), DRIFTING])
+
+
+def test_every_reading_is_on_one_profile_of_its_own_experiment(study, profiles):
+    rows = np.concatenate([p.rows for p in profiles])
+    assert np.array_equal(np.sort(rows), np.arange(len(study)))
+    for profile in profiles:
+        names = {study.campaign.experiments[k].name for k in study.experiment_of[profile.rows]}
+        assert names == {profile.experiment}
+
+
+def test_lines_pass_through_what_is_predicted_at_the_readings(study, profiles):
+    for k, model in enumerate((DepositionModel(), DRIFTING)):
+        predicted = study.forward.predict_um(model)
+        for profile in profiles:
+            here = np.searchsorted(profile.line_m, profile.position_m)
+            line = profile.lines_um[k][here]
+            assert line == pytest.approx(predicted[profile.rows], rel=1e-6, abs=1e-6)
+
+
+def test_single_passes_add_up_to_the_film(profiles):
+    for profile in profiles:
+        assert len(profile.passes_um) > 1
+        assert profile.passes_um.sum(axis=0) == pytest.approx(profile.lines_um[1], rel=1e-6)
+
+
+def test_readings_without_groups_fall_into_strips(tmp_path):
+    campaign = small_campaign(tmp_path, experiments=('door',), style='random')
+    study = Study.of(campaign)
+    profiles = profiles_of(study, [DepositionModel()])
+    rows = np.concatenate([p.rows for p in profiles])
+    assert np.array_equal(np.sort(rows), np.arange(len(study)))
+    for profile in profiles:
+        assert len(profile.line_m) == 0
+        assert np.all(np.diff(profile.position_m) >= 0.0)

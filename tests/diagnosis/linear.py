@@ -1,0 +1,59 @@
+"""Fits of models that are exactly linear, to compare closed forms with direct ones."""
+
+import numpy as np
+
+from paint_deposition.diagnosis.evidence import BaseSpace, Hypothesis
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.parameters import Unknowns
+
+UNKNOWNS = Unknowns.of(DepositionModel())
+
+
+def linear_fit(random: np.random.Generator, count: int, data: np.ndarray | None = None) -> Fit:
+    """Most probable values of a linear model with the pattern's priors and noise 1.
+
+    Args:
+        random: draws the model, and data from it if none are given.
+        count: of the readings.
+        data: (count,) readings.
+    """
+    centre, width = UNKNOWNS.prior
+    jacobian = random.normal(size=(count, len(centre))) / width
+    if data is None:
+        data = jacobian @ (centre + width * random.normal(size=len(width)))
+        data = data + random.normal(size=count)
+    return fit_linear(jacobian, data)
+
+
+def fit_linear(jacobian: np.ndarray, data: np.ndarray) -> Fit:
+    """The most probable values (ridge regression toward the priors)."""
+    centre, width = UNKNOWNS.prior
+    precision = jacobian.T @ jacobian + np.diag(width**-2.0)
+    vector = np.linalg.solve(precision, jacobian.T @ data + centre / width**2)
+    predicted = jacobian @ vector
+    return Fit(UNKNOWNS, vector, DepositionModel(), predicted, data - predicted, jacobian, True)
+
+
+def prior_covariance(fit: Fit) -> np.ndarray:
+    """(P, P) covariance of readings that the base model predicts before it is fitted."""
+    scaled = fit.jacobian * fit.unknowns.prior[1]
+    return np.eye(len(fit.residual)) + scaled @ scaled.T
+
+
+def deviation(fit: Fit) -> np.ndarray:
+    """(P,) data minus prediction at the priors' centre."""
+    return fit.residual + fit.jacobian @ (fit.vector - fit.unknowns.prior[0])
+
+
+def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of amplitudes with these signs, ten typical sizes wide."""
+    sides = np.array(sides, dtype=float)
+    return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)
+
+
+def hypothesis(base: BaseSpace, columns: np.ndarray, sides=None, **named) -> Hypothesis:
+    """Something missing along these directions of the readings."""
+    sides = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)
+    given = {'effects': ('x',), 'other': '', 'prior': 0.5} | named
+    return Hypothesis(columns=base.project(columns), sides=sides, **given)

@@ -1,0 +1,299 @@
+"""RAPID programs: the real one, what programs are made of, and what cannot be followed."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.rapid.program import GunSwitch, RapidProgram, read_program
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.planning.planned_move import PlannedMove
+
+AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
+IDENTITY = [0.0, 0.0, 0.0, 1.0]
+
+
+def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
+    return f'[[{x},{y},{z}],[{wxyz}],{AXES}]'
+
+
+@pytest.fixture
+def read(tmp_path):
+    """`read(body, data='', **options)`: the program of a module with this `main` and data."""
+
+    def read(body: str, data: str = '', procedures: str = '', **options) -> RapidProgram:
+        path = tmp_path / 'test.mod'
+        path.write_text(
+            f'MODULE Test\n{data}\nPROC main()\n{body}\nENDPROC\n{procedures}\nENDMODULE\n'
+        )
+        return read_program(path, **options)
+
+    return read
+
+
+def refusal(read, *arguments, **options) -> str:
+    with pytest.raises(RecordingError) as refused:
+        read(*arguments, **options)
+    text = str(refused.value)
+    assert '\n' not in text
+    return text
+
+
+def test_the_real_program(shared_data):
+    program = read_program(shared_data / 'rapid/ECL_Grey_T_ROB1.mod')
+    assert len(program.moves) == 10
+    assert program.notes == ['line 13: moveabsj skipped: joint angles need the robot']
+    first, last = program.moves[0], program.moves[-1]
+    assert first.instruction == 'movej'
+    np.testing.assert_allclose(first.position_m, [0.61391, 2.32615, 1.04068], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(last.position_m, [3.62106, 2.12387, 1.04068], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(first.quaternion_xyzw, [0.5] * 4)
+    assert {move.speed_m_per_s for move in program.moves} == {0.1}
+    assert {move.zone_m for move in program.moves} == {0.0}
+    assert not any(move.spraying for move in program.moves)
+
+
+def test_scalar_first_becomes_scalar_last(read):
+    # A quarter turn about z: q1 = cos 45 deg, q4 = sin 45 deg, with the digits RAPID writes.
+    (move,) = read(f'MoveL {target(1, 2, 3, "0.70711,0,0,0.70711")},v100,z10,tool0;').moves
+    np.testing.assert_allclose(move.quaternion_xyzw, [0, 0, 0.5**0.5, 0.5**0.5], atol=1e-9)
+    np.testing.assert_allclose(move.position_m, [0.001, 0.002, 0.003])
+    assert np.linalg.norm(move.quaternion_xyzw) == pytest.approx(1.0, abs=1e-15)
+
+
+def test_a_quaternion_that_is_no_rotation_is_refused(read):
+    text = refusal(read, f'MoveL {target(0, wxyz="1,0,0,0.2")},v100,z10,tool0;')
+    assert 'test.mod line 4: quaternion [1.0, 0.0, 0.0, 0.2] has the norm 1.0198' in text
+
+
+def test_declared_targets_speeds_and_zones(read):
+    data = f"""
+    LOCAL CONST robtarget pStart:={target(100)};
+    TASK PERS robtarget pEnd:={target(900)};
+    CONST robtarget row{{2}}:=[{target(1)},{target(2)}];
+    VAR speeddata vSlow:=[250.5,500,5000,1000];
+    CONST zonedata zOwn:=[FALSE,7.5,11,11,1.1,11,1.1];
+    CONST zonedata zStop:=[TRUE,7.5,11,11,1.1,11,1.1];
+    VAR num step:=50;
+    """
+    body = r"""
+    MoveJ pStart, v1000, FINE, tool0;
+    movel PEND, vslow, zOwn, tBell \WObj:=wobj0;
+    MoveL row{2}, v600\V:=450, zStop, tBell;
+    MoveL Offs(pEnd,0,step,-2*step), vmax, z0, tBell;
+    step := step + 10;
+    MoveL RelTool(pEnd,0,0,step), v5, z200, tBell;
+    pEnd.trans.z := 7;
+    MoveL pEnd\ID:=10, [120,500,5000,1000], z10, tBell;
+    """
+    program = read(body, data)
+    x = [move.position_m.tolist() for move in program.moves]
+    expected = [[100, 0, 0], [900, 0, 0], [2, 0, 0], [900, 50, -100], [900, 0, 60], [900, 0, 7]]
+    np.testing.assert_allclose(x, np.array(expected) * 1e-3, atol=1e-12)
+    speeds = [move.speed_m_per_s for move in program.moves]
+    assert speeds == pytest.approx([1.0, 0.2505, 0.45, 5.0, 0.005, 0.12])
+    zones = [move.zone_m for move in program.moves]
+    assert zones == pytest.approx([0.0, 0.0075, 0.0, 0.0003, 0.2, 0.01])
+    assert "vmax is the robot's own; 5 m/s assumed" in program.notes
+
+
+def test_poses_are_in_the_world(read):
+    """World pose = user frame, then object frame, then target."""
+    quarter = '0.7071068,0,0,0.7071068'
+    data = (
+        f"""PERS wobjdata wPart:=[FALSE,TRUE,"",[[1000,0,0],[{quarter}]],[[0,100,0],[1,0,0,0]]];"""
+    )
+    (move,) = read(rf'MoveL {target(10)},v100,fine,tBell\WObj:=wPart;', data).moves
+    np.testing.assert_allclose(move.position_m, [0.9, 0.01, 0.0], atol=1e-9)
+    quaternion = Rotation.from_euler('z', 90, degrees=True).as_quat()
+    np.testing.assert_allclose(move.quaternion_xyzw, quaternion, atol=1e-7)
+
+
+def test_an_unknown_work_object_is_the_frame(read):
+    program = read(rf'MoveL {target(10)},v100,fine,tBell\WObj:=wElse;')
+    assert program.moves[0].position_m[0] == 0.01
+    assert program.notes == ['work object welse is not in the module: poses are in its frame']
+
+
+def test_circular_moves_have_a_point_on_the_way(read):
+    (move,) = read(f'MoveC {target(100, 50)},{target(200)},v100,z10,tBell;').moves
+    np.testing.assert_allclose(move.via_m, [0.1, 0.05, 0.0])
+    np.testing.assert_allclose(move.position_m, [0.2, 0.0, 0.0])
+
+
+def test_brushes_switch_paint_moves(read):
+    body = f"""
+    SetBrush 3;
+    PaintL {target(0)},v600,z50,tBell;
+    MoveL {target(1)},v600,z50,tBell;
+    PaintC {target(2)},{target(3)},v600,z50,tBell;
+    SetBrush 0;
+    PaintL {target(4)},v600,b2,z50,tBell;
+    """
+    assert [move.spraying for move in read(body).moves] == [True, False, True, False]
+    assert read(f'PaintL {target(0)},v600,z50,tBell;').notes == [
+        'no SetBrush: paint moves are taken as spraying'
+    ]
+
+
+def test_outputs_and_triggers_switch_the_gun(read):
+    body = rf"""
+    TriggIO on,0\Start\DOp:=doGun,1;
+    TriggEquip off,30,0.1\DOp:=doGun,0;
+    SetDO doGun,0;
+    MoveJ {target(0)},v600,fine,tBell;
+    TriggL {target(1)},v600,on,z50,tBell;
+    TriggL {target(2)},v600,off,z50,tBell;
+    MoveL {target(3)},v600,z50,tBell;
+    SetDO doGun\SDelay:=0.1,high;
+    MoveL {target(4)},v600,z50,tBell;
+    Reset doGun;
+    MoveLDO {target(5)},v600,z50,tBell,doGun,1;
+    MoveL {target(6)},v600,z50,tBell;
+    """
+    moves = read(body, 'CONST num high:=1;').moves
+    assert [m.spraying for m in moves] == [False, True, True, False, True, False, True]
+    assert moves[2].switches == (GunSwitch(0.03, False, False),)
+    assert all(move.switches == () for move in moves if move is not moves[2])
+
+
+def test_the_gun_is_one_of_several_outputs(read):
+    body = f'SetDO doHorn,1;\nSet doGun;\nMoveL {target(1)},v600,fine,tBell;'
+    assert 'sets dogun dohorn; say which of them opens the gun' in refusal(read, body)
+    assert read(body, gun_signal='doGun').moves[0].spraying
+    assert 'never sets doFan; it sets: dogun dohorn' in refusal(read, body, gun_signal='doFan')
+
+
+def test_procedures_are_followed(read):
+    passes = f'PROC Pass1()\nMoveL {target(1)},v600,z1,tBell;\nERROR\nMoveL x;\nENDPROC'
+    program = read(f'Pass1;\nMoveL {target(2)},v600,z1,tBell;\nPass1;', procedures=passes)
+    assert [round(move.position_m[0] * 1e3) for move in program.moves] == [1, 2, 1]
+    alone = read('', procedures=passes, procedure='pass1')
+    assert len(alone.moves) == 1
+
+
+def test_conditions_without_moves_do_no_harm(read):
+    body = f"""
+    IF TestDI(diReady) THEN
+      WaitDI diReady,0;
+    ELSEIF reg1 > 3 THEN
+      TPWrite "more ""than"" three \\Num:=" \\Num:=reg1;
+    ELSE
+      reg1 := 4;
+    ENDIF
+    IF reg1=2 Stop;
+    TEST reg1 CASE 1,2: WaitTime 0.5; DEFAULT: Stop; ENDTEST
+    again:
+    MoveL {target(1)},v600,fine,tBell;
+    """
+    assert len(read(body).moves) == 1
+
+
+@pytest.mark.parametrize(
+    ('body', 'says'),
+    [
+        ('FOR i FROM 1 TO 3 DO\nMoveL p,v1,fine,t;\nENDFOR', 'line 5: movel inside FOR'),
+        ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'paintl inside WHILE is not followed'),
+        ('IF reg1=1 MoveL p,v1,fine,t;', 'line 4: movel inside IF is not followed; unroll it'),
+        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in this module'),
+        ('MoveL CRobT(),v100,fine,tBell;', 'crobt is not evaluated here'),
+        ('MoveL [[1,2,3],[1,0,0,0]],v100,fine,tBell;', 'line 4: a robtarget expected'),
+        (f'MoveL {target(1)},fast,fine,tBell;', 'fast is not declared'),
+        (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
+        (f'MoveL {target(1)},v100,fine,tBell', "line 5: ';' expected, found 'ENDPROC'"),
+        ('main;', 'procedure main calls itself'),
+        ('MoveL #;', "line 4: '#' is not RAPID"),
+        ('', 'has no moves of the TCP; nothing to read'),
+        (r'MoveAbsJ [[0,0,0,0,0,0],[0,0,0,0,0,0]],v100,fine,tBell;', 'has no moves of the TCP'),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_followed_is_named(read, body, says):
+    assert says in refusal(read, body)
+
+
+def test_tools_and_parts_in_unusual_hands_are_refused(read):
+    still = 'PERS tooldata tGun:=[FALSE,[[0,0,0],[1,0,0,0]],[1,[0,0,1],[1,0,0,0],0,0,0]];'
+    assert 'tgun stands still' in refusal(read, f'MoveL {target(1)},v100,fine,tGun;', still)
+    held = 'PERS wobjdata w:=[TRUE,TRUE,"",[[0,0,0],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];'
+    body = rf'MoveL {target(1)},v100,fine,tBell\WObj:=w;'
+    assert 'holds the work object w' in refusal(read, body, held)
+
+
+def test_other_files_are_refused(tmp_path, shared_data):
+    with pytest.raises(RecordingError, match='cannot read'):
+        read_program(tmp_path / 'none.mod')
+    with pytest.raises(RecordingError, match=r"README\.md line 1: '#' is not RAPID"):
+        read_program(shared_data / 'README.md')
+
+
+# --- writing
+
+coordinates = st.floats(-3.0, 3.0)
+quaternions = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
+
+
+@st.composite
+def planned_moves(draw) -> list[PlannedMove]:
+    moves = []
+    for number in range(draw(st.integers(1, 12))):
+        quaternion = np.array(draw(quaternions))
+        moves.append(
+            PlannedMove(
+                position_m=np.array([draw(coordinates) for _ in range(3)]),
+                quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
+                speed_m_per_s=draw(st.floats(0.01, 5.0)),
+                spraying=number > 0 and draw(st.booleans()),
+            )
+        )
+    return moves
+
+
+@given(moves=planned_moves())
+def test_what_is_written_is_read_back(tmp_path_factory, moves):
+    path = tmp_path_factory.mktemp('rapid') / 'passes.mod'
+    path.write_text(module_text(moves))
+    read = read_program(path).moves
+    assert [move.spraying for move in read] == [move.spraying for move in moves]
+    for planned, again in zip(moves, read, strict=True):
+        # 0.01 mm is asked for; the module has three decimals.
+        np.testing.assert_allclose(again.position_m, planned.position_m, rtol=0, atol=0.6e-6)
+        turned = Rotation.from_quat(again.quaternion_xyzw).inv() * Rotation.from_quat(
+            planned.quaternion_xyzw
+        )
+        assert turned.magnitude() < 1e-6
+        assert again.speed_m_per_s == pytest.approx(planned.speed_m_per_s, abs=1e-6)
+    assert all(move.switches == () for move in read)
+
+
+def one_pass(**changes) -> list[PlannedMove]:
+    approach = PlannedMove(np.zeros(3), np.array(IDENTITY), 1.0, False)
+    values = {
+        'position_m': np.array([1.0, 0, 0]), 'quaternion_xyzw': np.array(IDENTITY),
+        'speed_m_per_s': 0.6, 'spraying': True,
+    }  # fmt: skip
+    return [approach, PlannedMove(**values | changes)]
+
+
+def test_a_program_ends_with_the_gun_off():
+    lines = module_text(one_pass()).splitlines()
+    assert lines[-3:] == ['    SetDO doGun,0;', '  ENDPROC', 'ENDMODULE']
+    assert max(len(line) for line in lines) < 200
+
+
+@pytest.mark.parametrize(
+    ('moves', 'options', 'says'),
+    [
+        ([], {}, 'begins with an approach'),
+        (one_pass()[1:], {}, 'begins with an approach'),
+        (one_pass(speed_m_per_s=0.0), {}, 'speed of 0 m/s'),
+        (one_pass(position_m=np.array([np.nan, 0, 0])), {}, 'move 2 is no pose'),
+        (one_pass(quaternion_xyzw=np.array([0, 0, 0, 1.2])), {}, 'move 2 is no pose'),
+        (one_pass(), {'tool': 't Bell'}, "'t Bell' is no RAPID name"),
+        (one_pass(), {'zone_mm': 12}, 'zone of 12 mm: choose one of 0, 1, 5'),
+    ],
+)
+def test_what_no_robot_could_run_is_refused(moves, options, says):
+    with pytest.raises(PlanError, match=says):
+        module_text(moves, **options)

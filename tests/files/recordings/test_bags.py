@@ -1,0 +1,240 @@
+"""Poses and triggers out of bags of every kind, and the one line for bags that do not serve."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass, write_bag
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.message_definitions import Definition, standard
+from paint_deposition.motion.trajectory import Trajectory
+
+
+def same(read: Trajectory, written: Trajectory) -> bool:
+    return read.frame_id == written.frame_id and all(
+        np.array_equal(getattr(read, name), getattr(written, name))
+        for name in (
+            'stamps_ns',
+            'positions_m',
+            'quaternions_xyzw',
+            'trigger_stamps_ns',
+            'trigger_flow',
+        )
+    )
+
+
+def refusal(*arguments) -> str:
+    with pytest.raises(RecordingError) as refused:
+        read_trajectory(*arguments)
+    text = str(refused.value)
+    assert '\n' not in text
+    return text
+
+
+def test_a_written_trajectory_comes_back_exactly(tmp_path):
+    written = straight_pass()
+    folder = write_pose_bag(tmp_path / 'pass', written)
+    assert same(read_trajectory(folder, '/atomizer/pose', '/atomizer/state'), written)
+    assert same(read_trajectory(folder / 'pass_0.mcap', None, 'atomizer/state'), written)
+
+
+def test_stamps_keep_every_nanosecond(tmp_path):
+    written = straight_pass()
+    assert any(int(float(stamp)) != stamp for stamp in written.stamps_ns.tolist())
+    read = read_trajectory(write_pose_bag(tmp_path / 'pass', written))
+    assert read.stamps_ns.dtype == np.int64
+    assert read.stamps_ns.tolist() == written.stamps_ns.tolist()
+
+
+@pytest.mark.parametrize('storage', ['ros1', 'sqlite3', 'mcap'])
+@pytest.mark.parametrize('topic', ['atomizer/pose', '/atomizer/pose'])
+def test_every_storage_and_spelling_of_the_topic(tmp_path, storage, topic):
+    written = straight_pass(triggers=False)
+    entries = pose_entries(written, 'atomizer/pose', ros1=storage == 'ros1')
+    name = 'made.bag' if storage == 'ros1' else 'made'
+    path = write_bag(tmp_path / name, entries, storage)
+    assert same(read_trajectory(path, topic), written)
+    assert same(read_trajectory(path), written)
+
+
+def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
+    written, messages = straight_pass(triggers=False), Messages()
+    entries = pose_entries(written, delay_ns=3_000_000)
+    entries += [('/gun', START_NS + 700, messages.trigger(True))]
+    entries += [('/gun', START_NS + 900, messages.trigger(False))]
+    # Logged late: only its own stamp says when the flow changed.
+    entries += [('/state', START_NS + 5_000, messages.state(START_NS + 70, True, 0.8))]
+    entries += [('/state', START_NS + 5_001, messages.state(START_NS + 90, False, 0.8))]
+    entries += [('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan')))]
+    folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
+    gun = read_trajectory(folder, None, 'gun')
+    assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]
+    assert gun.trigger_flow.tolist() == [1.0, 0.0]
+    state = read_trajectory(folder, None, '/state')
+    assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
+    assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
+    unused = read_trajectory(folder)
+    assert len(unused.trigger_stamps_ns) == 0
+    assert unused.notes == (
+        f'recording {folder}: /state (paint_msgs/msg/AtomizerState) and /gun (std_msgs/msg/Bool) '
+        'are not used, the gun sprays whenever poses flow; add `state_topic: /state` '
+        '(--state-topic) if that is the trigger',
+    )
+    assert gun.notes == ()
+
+
+def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
+    written, hour_ns = straight_pass(triggers=False), 3_600 * 10**9
+    entries = pose_entries(written, delay_ns=hour_ns)
+    entries += [('/gun', START_NS + hour_ns, Messages().trigger(True))]
+    folder = write_bag(tmp_path / 'other_clock', sorted(entries, key=lambda entry: entry[1]))
+    assert len(read_trajectory(folder)) == len(written)
+    assert '3.6e+03 s off its own stamps' in refusal(folder, None, '/gun')
+
+
+def test_the_first_ros1_bag_of_the_literature(shared_data):
+    truth = read_trajectory(shared_data / 'bags/evo_ROS_example.bag', '/groundtruth')
+    assert len(truth) == 12765
+    assert truth.frame_id == 'groundtruth'
+    assert truth.duration_s == pytest.approx(889.019, abs=1e-3)
+    assert np.abs(np.linalg.norm(truth.quaternions_xyzw, axis=1) - 1.0).max() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ('bag', 'arguments', 'says'),
+    [
+        ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
+        ('evo_ROS_example.bag', (), 'name a pose topic; its PoseStamped topics: ORB-SLAM S-PTAM'),
+        ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
+        ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
+        ('evo_nav2_turtlebot.mcap', ('odom',), '/odom in .* is nav_msgs/msg/Odometry, not geom'),
+        ('rosbag2_split', (), 'it has no PoseStamped topic'),
+        ('rosbag2_topics_and_services.mcap', (), 'it has no PoseStamped topic'),
+        ('evo_none.mcap', (), 'no bag at .*evo_none.mcap'),
+        ('../README.md', (), 'is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap'),
+        ('../rapid', (), 'is not a rosbag2 folder'),
+    ],
+)
+def test_what_real_bags_do_not_have(shared_data, bag, arguments, says):
+    assert re.search(says, refusal(shared_data / 'bags' / bag, *arguments))
+
+
+def test_poses_beside_service_events_are_read(tmp_path):
+    """rosbags cannot parse the events' type; only the types that are read have to be parsed."""
+    written = straight_pass(triggers=False)
+    folder = write_pose_bag(tmp_path / 'pass', written)
+    event = Definition('MSG: example_interfaces/srv/AddTwoInts_Event\nint64 a\n---\nint64 sum\n')
+    with open_bag(folder) as bag, RunWriter(tmp_path / 'mixed') as run:
+        run.add_topic(RunTopic('/add/_service_event', 'example_interfaces/srv/Add_Event', event))
+        run.add_topic(RunTopic('/p', POSE, standard(POSE)))
+        run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
+        for message in bag.messages():
+            run.write('/p', message.cdr, message.log_time_ns, message.log_time_ns)
+    assert same(read_trajectory(tmp_path / 'mixed'), written)
+
+
+def test_mixed_frames_are_named(tmp_path):
+    entries = pose_entries(straight_pass(8, triggers=False, frame_id='door'))
+    entries[5:] = pose_entries(straight_pass(8, triggers=False, frame_id='base'))[5:]
+    text = refusal(write_bag(tmp_path / 'mixed', entries))
+    assert "mixes frames 'base' (3), 'door' (5)" in text
+
+
+def test_poses_without_stamps_are_refused(tmp_path):
+    messages = Messages()
+    entries = [('/p', START_NS + k, messages.pose(0, (0, 0, 0), (0, 0, 0, 1))) for k in range(3)]
+    assert 'all 3 poses on /p' in refusal(write_bag(tmp_path / 'unstamped', entries))
+
+
+def test_a_topic_without_messages_is_refused(tmp_path):
+    with RunWriter(tmp_path / 'empty') as run:
+        run.add_topic(RunTopic('/p', POSE, standard(POSE)))
+    assert '/p in' in refusal(tmp_path / 'empty')
+    assert 'has no messages' in refusal(tmp_path / 'empty')
+
+
+def test_an_unfinished_file_says_how_to_recover_it(tmp_path):
+    folder = write_pose_bag(tmp_path / 'pass', straight_pass(500))
+    file = folder / 'pass_0.mcap'
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    assert refusal(file).endswith(f'run: paint recover {file}')
+    assert refusal(folder).endswith(f'run: paint recover {folder}')
+    file.write_bytes(content)
+    (folder / 'metadata.yaml').unlink()
+    assert refusal(folder).endswith(f'run: paint recover {folder}')
+
+
+def test_a_cut_ros1_bag_says_how_to_reindex_it(tmp_path, shared_data):
+    content = (shared_data / 'bags/evo_ROS_example.bag').read_bytes()
+    cut = tmp_path / 'cut.bag'
+    cut.write_bytes(content[:2_000_000])
+    assert refusal(cut).endswith(f'run: rosbag reindex {cut}')
+
+
+def test_other_files_under_a_bags_name(tmp_path):
+    for name in ('a.mcap', 'a.db3', 'a.bag'):
+        path = tmp_path / name
+        path.write_bytes(b'x' * 1000)
+        assert f'{path} is damaged' in refusal(path)
+        path.write_bytes(b'')
+        assert f'{path} is empty' in refusal(path)
+
+
+def test_a_folder_of_several_recordings_asks_for_one(tmp_path):
+    for name in ('monday', 'tuesday'):
+        folder = write_pose_bag(tmp_path / name, straight_pass(5))
+        shutil.copy(folder / f'{name}_0.mcap', tmp_path)
+    text = refusal(tmp_path)
+    assert 'name one of them: monday_0.mcap tuesday_0.mcap' in text
+
+
+def test_no_flipped_bit_goes_unnoticed(tmp_path):
+    """Chunks carry checksums: a damaged file is refused or reads exactly as it was written."""
+    written = straight_pass(400)
+    content = (write_pose_bag(tmp_path / 'pass', written) / 'pass_0.mcap').read_bytes()
+    damaged = tmp_path / 'damaged.mcap'
+    rng = np.random.default_rng(11)
+    refused = 0
+    for position in rng.choice(len(content), 60, replace=False):
+        flipped = bytearray(content)
+        flipped[position] ^= 1 << int(rng.integers(8))
+        damaged.write_bytes(flipped)
+        try:
+            assert same(read_trajectory(damaged, None, '/atomizer/state'), written)
+        except RecordingError:
+            refused += 1
+    assert refused > 20
+
+
+def test_an_existing_folder_is_not_overwritten(tmp_path):
+    write_pose_bag(tmp_path / 'pass', straight_pass(5))
+    with pytest.raises(RecordingError, match='already exists'):
+        write_pose_bag(tmp_path / 'pass', straight_pass(5))
+
+
+def test_a_bool_trigger_cannot_hold_half_a_flow(tmp_path):
+    written = straight_pass(5)
+    half = Trajectory(
+        written.stamps_ns, written.positions_m, written.quaternions_xyzw, 'door',
+        written.trigger_stamps_ns, np.array([0.5, 0.0]),
+    )  # fmt: skip
+    with pytest.raises(RecordingError, match=r'flow 0\.5'):
+        write_pose_bag(tmp_path / 'pass', half)
+    assert not (tmp_path / 'pass').exists()
+
+
+def test_raw_messages_of_a_ros1_bag_are_cdr(shared_data):
+    with open_bag(shared_data / 'bags/evo_ROS_example.bag') as bag:
+        raw = next(bag.messages(['groundtruth']))
+        decoded = bag.decode(raw)
+        topic, log_time_ns, first = next(bag.decoded(['groundtruth']))
+    assert (raw.topic, raw.log_time_ns) == (topic, log_time_ns)
+    assert raw.type == 'geometry_msgs/msg/PoseStamped'
+    assert decoded.pose.position.x == first.pose.position.x
+    assert decoded.header.stamp.nanosec == first.header.stamp.nanosec

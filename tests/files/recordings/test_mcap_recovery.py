@@ -1,0 +1,146 @@
+"""Everything up to the break comes back, with what rosbag2 needs to play it."""
+
+import os
+from collections import Counter
+
+import numpy as np
+import pytest
+import yaml
+from mcap.reader import make_reader
+from rosbags.rosbag2 import Reader
+
+from files.recorded import straight_pass
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.message_definitions import standard
+from paint_deposition.files.recordings.recorded_qos import offered_qos
+
+BOOL = 'std_msgs/msg/Bool'
+
+
+def messages(path):
+    with Reader(path) as reader:
+        return [(c.topic, c.msgtype, time, bytes(data)) for c, time, data in reader.messages()]
+
+
+def topics(path):
+    with Reader(path) as reader:
+        return {c.topic: (c.msgtype, c.msgdef, c.ext) for c in reader.connections}
+
+
+@pytest.mark.parametrize(
+    'name',
+    ['evo_nav2_turtlebot.mcap', 'rosbag2_split', 'rosbag2_cdr_test_0.mcap',
+     'rosbag2_topics_and_services.mcap'],
+)  # fmt: skip
+def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name):
+    source = shared_data / 'bags' / name
+    recovery = recover(source, tmp_path / 'recovered')
+    assert Counter(messages(tmp_path / 'recovered')) == Counter(messages(source))
+    assert topics(tmp_path / 'recovered') == topics(source)
+    assert recovery.message_count == len(messages(source))
+    assert recovery.breaks == []
+    assert recovery.damaged_chunks == 0
+
+
+@pytest.fixture
+def cut_run(tmp_path):
+    """A run cut in the middle of its third chunk or later; its custom data and QoS are special."""
+    with RunWriter(tmp_path / 'run', {'mesh': 'door.stl'}, ros_distro='jazzy') as writer:
+        qos = [offered_qos(1, latched=True), offered_qos(7, reliable=False)]
+        writer.add_topic(RunTopic('/gun', BOOL, standard(BOOL), qos))
+        rng = np.random.default_rng(3)
+        for number in range(9_000):
+            cdr = b'\0\1\0\0' + bytes([int(rng.integers(2))])
+            writer.write('/gun', cdr, (number + 1) * 1_000, number * 1_000)
+    content = writer.path.read_bytes()
+    writer.path.write_bytes(content[: int(0.6 * len(content))])
+    (writer.folder / 'metadata.yaml').unlink()
+    return writer.folder
+
+
+@pytest.mark.parametrize('given', ['folder', 'file'])
+def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
+    source = cut_run if given == 'folder' else cut_run / 'run_0.mcap'
+    recovery = recover(source, tmp_path / 'recovered')
+    assert 3_000 < recovery.message_count < 9_000
+    assert recovery.counts == {'/gun': recovery.message_count}
+    assert recovery.breaks[0].endswith('the end is missing')
+    times = [time for _, _, time, _ in messages(tmp_path / 'recovered')]
+    assert times == [(number + 1) * 1_000 for number in range(recovery.message_count)]
+    content = yaml.safe_load((tmp_path / 'recovered/metadata.yaml').read_text())
+    information = content['rosbag2_bagfile_information']
+    assert information['custom_data'] == {'mesh': 'door.stl'}
+    assert information['ros_distro'] == 'jazzy'
+    metadata = information['topics_with_message_count'][0]['topic_metadata']
+    assert [qos['depth'] for qos in metadata['offered_qos_profiles']] == [1, 7]
+    assert metadata['offered_qos_profiles'][0]['durability'] == 'transient_local'
+    assert metadata['offered_qos_profiles'][1]['reliability'] == 'best_effort'
+    assert metadata['type_description_hash'] == standard(BOOL).type_hash
+
+
+@pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
+def test_the_beginning_of_a_cut_chunk_is_read(tmp_path, compression):
+    """Recorders with large chunks leave most of a cut file in the last one."""
+    rng = np.random.default_rng(8)
+    bits = rng.integers(2, size=20_000).tolist()
+    with RunWriter(
+        tmp_path / 'run', compression=compression, chunk_bytes=10**7, chunk_seconds=1e9
+    ) as writer:
+        writer.add_topic(RunTopic('/gun', BOOL, standard(BOOL)))
+        for number, bit in enumerate(bits):
+            writer.write('/gun', b'\0\1\0\0' + bytes([bit]), number, number)
+    with writer.path.open('rb') as stream:
+        (chunk,) = make_reader(stream).get_summary().chunk_indexes
+    os.truncate(writer.path, chunk.chunk_start_offset + int(0.6 * chunk.chunk_length))
+    recovery = recover(writer.path, tmp_path / 'recovered')
+    read = [(time, data[4]) for _, _, time, data in messages(tmp_path / 'recovered')]
+    assert 2_000 < recovery.message_count < 20_000
+    assert read == list(enumerate(bits))[: len(read)]
+
+
+def test_a_flipped_bit_costs_one_chunk(tmp_path):
+    written = straight_pass(4_000)
+    folder = write_pose_bag(tmp_path / 'pass', written)
+    path = folder / 'pass_0.mcap'
+    content = bytearray(path.read_bytes())
+    content[len(content) // 3] ^= 0x10
+    path.write_bytes(content)
+    with pytest.raises(RecordingError, match='is damaged'):
+        read_trajectory(folder)
+    recovery = recover(folder, tmp_path / 'recovered')
+    assert recovery.damaged_chunks == 1
+    assert 3_000 < recovery.message_count < 4_002
+    read = read_trajectory(tmp_path / 'recovered', None, '/atomizer/state')
+    assert set(read.stamps_ns.tolist()) < set(written.stamps_ns.tolist())
+
+
+def test_progress_covers_the_file(tmp_path, cut_run):
+    read = []
+    recover(cut_run, tmp_path / 'recovered', on_bytes=read.append)
+    assert 0 < sum(read) <= (cut_run / 'run_0.mcap').stat().st_size
+
+
+def test_nothing_to_recover(tmp_path, shared_data):
+    with pytest.raises(RecordingError, match='does not exist'):
+        recover(tmp_path / 'none', tmp_path / 'recovered')
+    with pytest.raises(RecordingError, match=r'holds no \.mcap file'):
+        recover(tmp_path, tmp_path / 'recovered')
+    with pytest.raises(RecordingError, match='is not an MCAP file'):
+        recover(shared_data / 'bags/evo_ROS_example.bag', tmp_path / 'recovered')
+    writer = RunWriter(tmp_path / 'empty')
+    writer.abandon()
+    with pytest.raises(RecordingError, match='nothing to recover'):
+        recover(tmp_path / 'empty', tmp_path / 'recovered')
+    assert not (tmp_path / 'recovered').exists()
+
+
+def test_an_existing_folder_is_left_alone(tmp_path, cut_run):
+    target = tmp_path / 'recovered'
+    target.mkdir()
+    (target / 'mine').write_text('precious')
+    with pytest.raises(RecordingError, match='already exists'):
+        recover(cut_run, target)
+    assert (target / 'mine').read_text() == 'precious'

@@ -1,0 +1,167 @@
+"""Campaign files: what is read with them, and one clear line for each fault."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.campaign_file import read_campaign
+
+SAMPLE = 'ros2_ws/src/paint_deposition/samples/measured_door'
+
+
+@pytest.fixture(scope='module')
+def folder(repository, tmp_path_factory) -> Path:
+    """The sample door's files; the test writes its campaign file beside them."""
+    folder = tmp_path_factory.mktemp('campaign')
+    return Path(shutil.copytree(repository / SAMPLE, folder / 'door'))
+
+
+@pytest.fixture
+def campaign(folder):
+    """`campaign(key=value, ...)`: a campaign file of one experiment with these keys changed."""
+
+    def write(top: dict | None = None, experiments: list | None = None, **changes: object) -> Path:
+        entry = {'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door',
+                 'pose_topic': '/atomizer/pose', 'measurements': 'door.csv'} | changes  # fmt: skip
+        entry = {key: value for key, value in entry.items() if value is not ...}
+        content = {'experiments': experiments or [entry]} | (top or {})
+        path = folder / 'one.yaml'
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return write
+
+
+def changed_readings(folder: Path, change) -> str:
+    """A copy of the door's readings with `change(values)` made to every row; its name."""
+    header, *rows = (folder / 'door.csv').read_text().splitlines()
+    lines = [','.join(change(dict(zip(header.split(','), row.split(','), strict=True))))
+             for row in rows]  # fmt: skip
+    (folder / 'changed.csv').write_text('\n'.join([header, *lines]) + '\n')
+    return 'changed.csv'
+
+
+def test_the_sample_arrives_whole(repository):
+    told = []
+    campaign = read_campaign(repository / SAMPLE / 'campaign.yaml', told.append)
+    assert [e.name for e in campaign.experiments] == ['panel', 'door']
+    assert told[0] == 'reading panel'
+    door = campaign.experiments[1]
+    assert len(door.readings) == campaign.reading_count - len(campaign.experiments[0].readings)
+    assert len(door.points) == 3 * len(door)  # each with a neighbour up and one down the skin
+    assert door.files['mesh'].endswith('measured_door/door.stl')
+    assert set(door.groups) - {''}
+
+
+def test_down_and_the_model_are_taken_over(campaign, folder):
+    read = read_campaign(campaign(top={'model': 'start.yaml'}, down=[0, 0, -9.81], name=7))
+    assert read.model_file == str(folder / 'start.yaml')
+    assert read.experiments[0].surface.down.tolist() == [0, 0, -1]
+    assert read.experiments[0].name == '7'
+
+
+def test_a_trigger_that_is_not_named_is_noted(campaign):
+    """Without it the gun would spray on the way between passes, which changes every answer."""
+    told = []
+    read_campaign(campaign(), told.append)
+    (note,) = (line for line in told if 'state_topic' in line)
+    assert note.startswith('door: recording ')
+    assert '/atomizer/state (std_msgs/msg/Bool) is not used' in note
+    assert 'add `state_topic: /atomizer/state`' in note
+    told.clear()
+    read_campaign(campaign(state_topic='atomizer/state'), told.append)
+    assert told == ['reading door']
+
+
+@pytest.mark.parametrize(
+    ('changes', 'message'),
+    [
+        ({'mesh': ...}, "experiment 1 has no 'mesh'; name its file"),
+        ({'mesh': 5}, "experiment 1: 'mesh' is 5; expected text"),
+        ({'mesh': 'gate.stl'}, r"experiment 'door': .*gate\.stl: no such mesh file"),
+        ({'trajectory': 'nowhere'}, "experiment 'door': .*nowhere"),
+        ({'measurements': 'none.csv'}, "experiment 'door': .*none.csv: no such file"),
+        ({'pose_topic': '/pose'}, "experiment 'door': .*/atomizer/pose"),
+        ({'measurement': 'door.csv'}, "unknown key 'measurement' .* is 'measurements'"),
+        ({'speed': 1}, "unknown key 'speed' in experiment 1; the nearest known key is"),
+        ({'mesh_scale': 0}, "'mesh_scale' is 0; expected above 0"),
+        ({'mesh_scale': True}, "'mesh_scale' is True; expected above 0"),
+        (
+            {'mesh_scale': 1000.0},
+            "experiment 'door': .*millimetres; use .* mesh_scale: 0.001 in a campaign",
+        ),
+        ({'max_pose_gap_s': 'long'}, "'max_pose_gap_s' is 'long'; expected above 0"),
+        ({'down': 'z'}, "'down' is 'z'; expected"),
+        ({'down': [0, 0, float('nan')]}, "'down' is .*nan.*; expected"),
+        ({'down': [0, 0, 0]}, 'give the direction of gravity'),
+        ({'top': {'models': 'm.yaml'}}, "unknown key 'models' in campaign; .* 'model'"),
+        ({'top': {'model': 3}}, "campaign: 'model' is 3; expected text"),
+        ({'top': {'experiments': []}}, r"'experiments' is \[\]; list at least one"),
+        ({'top': {'experiments': {'name': 'door'}}}, "'experiments' is .*; list at least one"),
+        ({'experiments': ['door']}, "experiment 1 is 'door'; expected keys mesh, trajectory"),
+    ],
+)
+def test_a_fault_is_told_in_one_line(campaign, changes, message):
+    path = campaign(**changes)
+    with pytest.raises(PaintError, match=message) as refused:
+        read_campaign(path)
+    assert str(refused.value).startswith(str(path))
+    assert '\n' not in str(refused.value)
+
+
+def test_two_experiments_need_two_names(campaign):
+    entry = {'name': 'door', 'mesh': 'door.stl', 'trajectory': 'door', 'measurements': 'door.csv'}
+    with pytest.raises(PaintError, match="two experiments are called 'door'; rename one"):
+        read_campaign(campaign(experiments=[entry, entry]))
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        (None, 'no such file; give a campaign YAML'),
+        ('experiments: [', 'cannot be read as YAML .*line'),
+        ('experiments: []\nexperiments: []', "'experiments' is given twice"),
+        ('just words', "is not a campaign; expected the key 'experiments'"),
+    ],
+)
+def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
+    path = tmp_path / 'campaign.yaml'
+    if text is not None:
+        path.write_text(text)
+    with pytest.raises(PaintError, match=message) as refused:
+        read_campaign(path)
+    assert '\n' not in str(refused.value)
+
+
+def test_readings_in_millimetres_are_refused_with_the_remedy(campaign, folder):
+    def in_millimetres(row):
+        return [str(1e3 * float(v)) if k in ('x_m', 'y_m', 'z_m') else v for k, v in row.items()]
+
+    path = campaign(measurements=changed_readings(folder, in_millimetres))
+    with pytest.raises(PaintError, match=r"lie off the part's skin.*mesh frame, in metres"):
+        read_campaign(path)
+
+
+def test_readings_off_the_skin_are_counted_and_the_worst_named(campaign, folder):
+    def off(row):
+        moved = float(row['y_m']) - (0.06 if row['point'] == 'P003' else 0.0)
+        return [str(moved) if key == 'y_m' else value for key, value in row.items()]
+
+    path = campaign(measurements=changed_readings(folder, off))
+    with pytest.raises(
+        PaintError, match=r"1 of \d+ points lie off .*, point 'P003' at .* by 0\.0"
+    ):
+        read_campaign(path)
+
+
+def test_normals_pointing_into_the_part_are_refused(campaign, folder):
+    rows = (folder / 'door.csv').read_text().splitlines()
+    inward = [f'{rows[0]},nx,ny,nz', *(f'{row},0,-1,0' for row in rows[1:])]
+    (folder / 'inward.csv').write_text('\n'.join(inward) + '\n')
+    with pytest.raises(
+        PaintError, match=r'normals point away from the skin.*give outward normals'
+    ):
+        read_campaign(campaign(measurements='inward.csv'))

@@ -1,0 +1,120 @@
+"""Tables of readings: what is read from them, and one clear line for each fault."""
+
+import numpy as np
+import pytest
+from paint_deposition.files.gauge_readings import read_readings, write_predictions
+
+from paint_deposition.errors import ReadingsError
+
+HEADER = 'x_m,y_m,z_m,thickness_um'
+
+
+@pytest.fixture
+def table(tmp_path):
+    """`table(line, ...)`: a CSV file of these lines."""
+
+    def write(*lines: str):
+        path = tmp_path / 'door.csv'
+        path.write_text('\n'.join(lines) + '\n')
+        return path
+
+    return write
+
+
+def test_every_column_arrives_where_it_belongs(table):
+    path = table(
+        f'point,{HEADER},operator,group,sigma_um,nx,ny,nz',
+        'A1,0.1,0.2,0.3,21.5,Kim,left,0.8,0,-2,0',
+        'A2,0.4,0.5,0.6,22.5,Kim,right,,0,0,3',
+    )
+    readings = read_readings(path)
+    assert readings.positions_m == pytest.approx(np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]))
+    assert readings.thickness_um.tolist() == [21.5, 22.5]
+    assert readings.point.tolist() == ['A1', 'A2']
+    assert readings.group.tolist() == ['left', 'right']
+    assert readings.sigma_um[0] == 0.8
+    assert np.isnan(readings.sigma_um[1])
+    assert readings.normals.tolist() == [[0, -1, 0], [0, 0, 1]]
+    assert readings.source == str(path)
+
+
+def test_a_table_from_a_spreadsheet_is_read(tmp_path):
+    """Byte order mark, Windows line ends, blanks, empty and commented lines."""
+    path = tmp_path / 'sheet.csv'
+    path.write_bytes(b'\xef\xbb\xbfx_m, y_m ,z_m,thickness_um\r\n\r\n# door 7\r\n0,0, 1 ,20\r\n')
+    readings = read_readings(path)
+    assert readings.positions_m.tolist() == [[0.0, 0.0, 1.0]]
+    assert readings.normals is None
+
+
+def test_points_without_a_label_are_points_of_their_own(table):
+    readings = read_readings(table(f'{HEADER},point', '0,0,0,20,', '0,0,0.01,21,', '1,0,0,9,A'))
+    assert len(set(readings.point)) == 3
+
+
+def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
+    readings = read_readings(table(HEADER, '0,0,0,20', '1,0,0,30', '0,0,0,21', '0,0,1e-4,22'))
+    first, second, third, fourth = readings.point
+    assert first == third
+    assert len({first, second, fourth}) == 3
+
+
+@pytest.mark.parametrize(
+    ('lines', 'message'),
+    [
+        (['x_m,y_m,thickness_um', '0,0,20'], "no column 'z_m' .*the readings need x_m, y_m, z_m"),
+        (['x_m,y_m,zm,thickness_um', '0,0,0,20'], "no column 'z_m' .*did you mean 'zm'?"),
+        (['X_m,y_m,z_m,thickness_um', '0,0,0,20'], "no column 'x_m' .*did you mean 'X_m'?"),
+        (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], "give 'x_mm' in metres and call it x_m"),
+        (
+            ['x_m,y_m,z_m,thickness_mil', '0,0,0,1'],
+            "give 'thickness_mil' in micrometres and call it thickness_um",
+        ),
+        (['x_m;y_m;z_m;thickness_um', '0;0;0;20,5'], 'separate the columns with commas'),
+        ([HEADER], 'no readings below the header'),
+        ([], r"no column 'x_m' \(columns: none\)"),
+        ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),
+        ([HEADER, '0,0,0,20', '', '0,0,1,20,5'], 'line 4: 5 values under 4 column names'),
+        ([HEADER, '# one', '0,0,0,20 um'], "line 3: thickness_um is '20 um'; expected a number"),
+        ([HEADER, '0,0,0,'], "line 2: thickness_um is ''; expected a number"),
+        ([HEADER, '0,nan,0,20'], 'line 2: y_m is nan; expected a finite number'),
+        ([HEADER, '0,0,-inf,20'], 'line 2: z_m is -inf; expected a finite number'),
+        ([HEADER, '0,0,0,-9'], 'line 2: thickness_um is -9; expected -5 to 5000 micrometres'),
+        ([HEADER, '0,0,0,2e4'], 'line 2: thickness_um is 20000; expected -5 to 5000'),
+        ([f'{HEADER},x_m', '0,0,0,20,0'], "two columns are called 'x_m'"),
+        ([f'{HEADER},sigma_um', '0,0,0,20,0'], 'line 2: sigma_um is 0; expected above 0'),
+        ([f'{HEADER},sigma_um', '0,0,0,20,few'], "line 2: sigma_um is 'few'"),
+        ([f'{HEADER},nx,ny', '0,0,0,20,0,1'], 'has nx, ny only; give all of nx,ny,nz or none'),
+        ([f'{HEADER},nx,ny,nz', '0,0,0,20,0,0,0'], 'line 2: the normal nx,ny,nz has length zero'),
+        (
+            [f'{HEADER},point', '0,0,0,20,A', '0.2,0,0,20,A'],
+            "point 'A' is used 0.200 m apart; give each place a label of its own",
+        ),
+    ],
+)
+def test_a_fault_is_told_in_one_line(table, lines, message):
+    path = table(*lines)
+    with pytest.raises(ReadingsError, match=message) as refused:
+        read_readings(path)
+    assert str(refused.value).startswith(str(path))
+    assert '\n' not in str(refused.value)
+
+
+def test_a_file_that_is_no_table_is_refused(tmp_path):
+    with pytest.raises(ReadingsError, match='no such file; give a CSV'):
+        read_readings(tmp_path / 'none.csv')
+    (tmp_path / 'bytes.csv').write_bytes(b'x_m,\xff\xfe\x00')
+    with pytest.raises(ReadingsError, match='cannot be read as CSV text'):
+        read_readings(tmp_path / 'bytes.csv')
+    with pytest.raises(ReadingsError, match='cannot be read as CSV text'):
+        read_readings(tmp_path)
+
+
+def test_predictions_keep_the_readings_own_columns(table, tmp_path):
+    path = table(f'{HEADER},remark,predicted_um', '0,0,1,20,"thin, I think",7', '0,0,2,21,,8')
+    write_predictions(tmp_path / 'out.csv', path, [20.5, 21.25])
+    assert (tmp_path / 'out.csv').read_text().splitlines() == [
+        f'{HEADER},remark,predicted_um',
+        '0,0,1,20,"thin, I think",20.5000',
+        '0,0,2,21,,21.2500',
+    ]

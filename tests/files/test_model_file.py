@@ -1,0 +1,174 @@
+"""Model files: what is written reads back exactly, what is wrong is said in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import given
+from hypothesis import strategies as st
+
+from booth import SAMPLES
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.errors import ModelError
+from paint_deposition.files.model_file import read_model, read_model_file, write_model
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
+
+
+@pytest.fixture
+def written(tmp_path: Path):
+    """Writes a model file of this text."""
+
+    def write(text: str) -> Path:
+        path = tmp_path / 'model.yaml'
+        path.write_text(text, encoding='utf-8')
+        return path
+
+    return write
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(ModelError) as refused:
+        read_model(path)
+    message = str(refused.value)
+    assert message.startswith(str(path))
+    assert '\n' not in message
+    return message
+
+
+def test_the_default_model_is_that_of_the_configuration(repository: Path):
+    file = read_model_file(repository / 'config' / 'model.yaml')
+    assert file.model == DepositionModel()
+    assert not file.uncertainty
+    assert not file.history
+
+
+def test_the_configuration_explains_every_parameter(repository: Path):
+    lines = (repository / 'config' / 'model.yaml').read_text().splitlines()
+    for name in (*PlanarPattern.model_fields, *Projection.model_fields):
+        (line,) = [line for line in lines if line.strip().startswith(f'{name}:')]
+        assert '#' in line, name
+
+
+@pytest.mark.parametrize('effect', EFFECTS.values(), ids=lambda effect: effect.id)
+def test_every_effect_reads_back(effect, tmp_path: Path):
+    model = DepositionModel(effects=(effect.typical(),))
+    write_model(tmp_path / 'model.yaml', model)
+    assert read_model(tmp_path / 'model.yaml') == model
+
+
+NUMBERS = st.floats(1e-12, 1.0)
+
+
+@given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(0.0, 0.1), st.booleans())
+def test_numbers_read_back_to_the_bit(tmp_path_factory, k1, k2, sigma, shift, occlusion):
+    model = DepositionModel(
+        planar=PlanarPattern(K1_cm3_per_s=k1, K2=k2, sigma1_m=sigma),
+        projection=Projection(occlusion=occlusion),
+        effects=(EFFECTS['air_drift'](shift_down_m=shift),),
+    )
+    path = tmp_path_factory.mktemp('model') / 'model.yaml'
+    write_model(path, model)
+    assert read_model(path) == model
+
+
+def test_the_text_is_plain_yaml_with_a_comment_on_every_number(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    model = DepositionModel(effects=(EFFECTS['edge_build'].typical(),))
+    write_model(path, model, header_comment='Door 7.\nFitted on Monday.')
+    lines = path.read_text().splitlines()
+    assert lines[:2] == ['# Door 7.', '# Fitted on Monday.']
+    assert all('#' in line for line in lines if ': ' in line)
+    content = yaml.safe_load(path.read_text())
+    assert content['planar'] == DepositionModel().planar.model_dump()
+    assert content['effects'] == [{'id': 'edge_build', 'gain': 0.25, 'length_m': 0.025}]
+
+
+def test_name_uncertainty_and_history_read_back(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    uncertainty = {'planar': {'K2': np.float64(0.01)}, 'effects': {'sag': {'run_m': 1e-7}}}
+    history = [{'added': 'sag', 'p_value': np.float32(0.5), 'rmse_um': np.array([2.0, 0.75])}]
+    write_model(path, DepositionModel(), history=history, uncertainty=uncertainty, name='yes: no')
+    file = read_model_file(path)
+    assert file.name == 'yes: no'
+    assert file.uncertainty == {'planar': {'K2': 0.01}, 'effects': {'sag': {'run_m': 1e-7}}}
+    assert file.history == [{'added': 'sag', 'p_value': 0.5, 'rmse_um': [2.0, 0.75]}]
+
+
+def test_a_users_effect_is_found_beside_the_model_file(tmp_path: Path):
+    (tmp_path / 'effects').mkdir()
+    (tmp_path / 'effects' / 'my_effect.py').write_text((SAMPLES / 'my_effect.py').read_text())
+    own = load_effect_file(tmp_path / 'effects' / 'my_effect.py')
+    model = DepositionModel(effects=(own.typical(), EFFECTS['sag'].typical()))
+    path = tmp_path / 'models' / 'model.yaml'
+    write_model(path, model)
+    assert yaml.safe_load(path.read_text())['effects'][0]['file'] == '../effects/my_effect.py'
+    assert read_model(path) == model
+
+
+def test_what_is_left_out_has_its_default(written):
+    assert read_model(written('planar: {K2: 0.3}')) == DepositionModel(
+        planar=PlanarPattern(K2=0.3)
+    )
+    assert read_model(written('effects:')).effects == ()
+    assert read_model(written('planar: {K2: 1e-2}')).planar.K2 == 0.01
+    assert read_model(written('effects: [{id: air_drift}]')).effects[0].is_neutral
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('planar: {K2: 2}', 'planar: K2 is 2; expected a number 0 to 1: K2, weight'),
+        ('planar: {K1_cm3_per_s: 0}', 'K1_cm3_per_s is 0; expected a number above 0 and up to'),
+        ('planar: {K2: some}', "K2 is 'some'; expected a number 0 to 1"),
+        ('planar: {K2: true}', 'K2 is True; expected a number'),
+        ('planar: {K2: .nan}', 'K2 is nan; expected a number'),
+        ('planar: {K2: null}', 'K2 is None; expected a number'),
+        ('planar: {K2: 3, K3: 4}', 'K2 is 3; expected a number 0 to 1: K2, weight of the centred '
+         'Gaussian [1] (and 1 more)'),
+        ('planar: {K1: 2}', "planar: unknown key 'K1'; the nearest known key is 'K1_cm3_per_s'"),
+        ('planar: {sigma_1_m: 2}', "the nearest known key is 'sigma1_m'"),
+        ('planar: {1: 2}', 'planar: unknown key 1; expected names of parameters'),
+        ('planar: [1]', 'planar is [1]; expected a mapping (key: value)'),
+        ('planr: {}', "unknown key 'planr'; the nearest known key is 'planar'"),
+        ('projection: {occlusion: maybe}', "occlusion is 'maybe'; expected true or false"),
+        ('effects: {id: sag}', "effects is {'id': 'sag'}; expected a list"),
+        ('effects: [sag]', "effects, entry 1 is 'sag'; expected a mapping"),
+        ('effects: [{run_m: 0.1}]', 'effects, entry 1: has no id; give one of id, file'),
+        ('effects: [{id: sag, file: x.py}]', 'entry 1: has id and file; give one of id, file'),
+        ('effects: [{id: 7}]', 'effects, entry 1: id is 7; expected text'),
+        ('effects: [{id: air_drfit}]', "'air_drfit'; did you mean 'air_drift'"),
+        ('effects: [{id: sag}, {id: sag}]', "effects: 'sag' is there twice; keep one"),
+        ('effects: [{id: sag, run: 0.1}]', "sag: unknown key 'run'; the nearest known key is"),
+        ('effects: [{id: sag, run_m: -1}]', 'sag: run_m is -1; expected a number 0 to 0.03'),
+        ('effects: [{file: none.py}]', 'none.py: cannot be read (No such file or directory)'),
+        ('name: 3', 'name is 3; expected text'),
+        ('history: {}', 'history is {}; expected a list'),
+        ('history: [{}, 3]', 'history, entry 2 is 3; expected a mapping'),
+        ('', 'holds no model; expected the keys planar and projection'),
+        ('planar: {K2: .1, K2: .2}', "cannot be read as YAML (line 1: 'K2' is given twice)"),
+        ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_in_one_line(written, text: str, message: str):
+    assert message in refusal(written(text))
+
+
+def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):
+    assert 'no such file; give a model YAML' in refusal(tmp_path / 'model.yaml')
+    assert 'cannot be read' in refusal(tmp_path)
+    (tmp_path / 'model.yaml').write_bytes(b'\xff\xfe\x00')
+    assert 'cannot be read as YAML' in refusal(tmp_path / 'model.yaml')
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    write_model(path, DepositionModel())
+    before = path.read_text()
+    with pytest.raises(yaml.YAMLError):
+        write_model(path, DepositionModel(), history=[{'what': object()}])
+    assert path.read_text() == before
+    assert list(tmp_path.iterdir()) == [path]

@@ -1,0 +1,67 @@
+"""Colours of film and residual."""
+
+import numpy as np
+import pytest
+from matplotlib import colormaps
+
+from paint_deposition.film.colour_scales import (
+    BARE_RGB,
+    FILM_PALETTE,
+    OVER_RGB,
+    RESIDUAL_PALETTE,
+    UNDER_RGB,
+    film_scale,
+    residual_scale,
+    round_up,
+)
+
+
+@pytest.mark.parametrize(
+    ('palette', 'name'), [(FILM_PALETTE, 'viridis'), (RESIDUAL_PALETTE, 'coolwarm')]
+)
+def test_the_tables_are_the_published_maps(palette, name):
+    published = colormaps[name](np.arange(256))[:, :3] * 255
+    assert np.abs(palette[:256, :3] - published).max() <= 0.5
+
+
+def test_lightness_rises_along_the_film_map():
+    rgb = FILM_PALETTE[:256, :3] / 255.0
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    lightness = 116 * np.cbrt(linear @ [0.2126, 0.7152, 0.0722]) - 16
+    # Even steps, up to the rounding of 8-bit colours.
+    assert np.all(np.diff(lightness) > -0.3)
+    assert np.abs(np.diff(lightness[::16])).std() < 0.1 * np.diff(lightness[::16]).mean()
+
+
+def test_under_over_and_bare_stand_out():
+    scale = film_scale(np.empty(0), 20.0, 50.0)
+    values = np.array([19.9, 20.0, 50.0, 50.1, 35.0, np.nan])
+    shown = np.array([True, True, True, True, False, True])
+    rgba = scale.rgba(values, shown)
+    assert tuple(rgba[0, :3]) == UNDER_RGB
+    assert np.array_equal(rgba[1], FILM_PALETTE[0])
+    assert np.array_equal(rgba[2], FILM_PALETTE[255])
+    assert tuple(rgba[3, :3]) == OVER_RGB
+    assert tuple(rgba[4, :3]) == tuple(rgba[5, :3]) == BARE_RGB
+    assert np.all(rgba[:, 3] == 255)
+
+
+def test_the_map_is_spread_evenly():
+    scale = film_scale(np.empty(0), 0.0, 256.0)
+    values = np.arange(256) + 0.5
+    assert np.array_equal(scale.rows(values, values > -1), np.arange(256))
+
+
+@pytest.mark.parametrize(
+    ('value', 'rounded'), [(0, 1), (0.97, 1), (1, 1), (33, 40), (100, 100), (101, 150), (6.1, 8)]
+)
+def test_automatic_ends_are_round_figures(value, rounded):
+    assert round_up(value) == pytest.approx(rounded)
+    assert film_scale(np.array([0.0, value])).high == pytest.approx(rounded)
+
+
+def test_residual_scale_is_even_about_zero():
+    scale = residual_scale(np.array([-7.0, 3.0]))
+    assert (scale.low, scale.high) == (-8.0, 8.0)
+    grey = scale.rgba(np.array([0.0]), np.array([True]))[0, :3]
+    assert np.ptp(grey.astype(int)) < 5

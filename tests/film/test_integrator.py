@@ -1,0 +1,430 @@
+"""The integral: no paint is lost or invented, and the film does not depend on how it was cut."""
+
+from itertools import pairwise
+from runpy import run_path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation, Slerp
+
+from booth import LOOKING_ALONG_Y, SAMPLES
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection, flux_um_per_s
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from scenes import (
+    LOOKING_DOWN,
+    START_NS,
+    lying_plane,
+    rotation_matrix,
+    stamps_ns,
+    straight_pass,
+    weaving,
+)
+from skins import triangulated
+
+MODEL = DepositionModel()
+# All of it lands within 0.3 m of the axis at the standoffs used here.
+NARROW = DepositionModel(
+    planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
+)
+SHADED = DepositionModel(projection=Projection(occlusion=True))
+
+
+def painted(points, motion, model=MODEL, precision='double', occluder=None):
+    path = motion if isinstance(motion, SprayPath) else spray_path(motion, 0.25)[0]
+    integrator = FilmIntegrator(points, model, precision, occluder)
+    integrator.add(path)
+    return integrator
+
+
+def largest_error(film, expected):
+    return np.abs(film - expected).max() / expected.max()
+
+
+class Screen:
+    """A vertical wall in the plane x = 0: what is left of it is not seen from its right."""
+
+    def visible(self, origins_m, points_m):
+        return origins_m[:, :1] * points_m[:, 0] >= 0.0
+
+
+def test_a_gun_at_rest_lays_flux_times_time():
+    times = np.arange(0.0, 2.001, 0.02)
+    trajectory = straight_pass(times, (0.05, 0.1, 0.25), (0.05, 0.1, 0.25))
+    points = lying_plane(0.3, 20)
+    flux = flux_um_per_s(
+        MODEL.planar,
+        MODEL.projection,
+        points.positions_m,
+        points.normals,
+        trajectory.positions_m[0],
+        rotation_matrix(),
+    )
+    assert largest_error(painted(points, trajectory).film_um, 2.0 * flux) < 1e-12
+
+
+@pytest.mark.parametrize('tilt_rad', [0.0, 0.3])
+def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
+    """1 um m^2 is 1 cm^3: the film summed over the plane is K1 times the time sprayed."""
+    turned = Rotation.from_quat(LOOKING_DOWN) * Rotation.from_euler('y', tilt_rad)
+    trajectory = straight_pass(
+        np.arange(0.0, 2.0, 0.02),
+        (-0.3, 0.0, 0.25),
+        (0.3, 0.0, 0.3),
+        turned.as_quat(),
+        trigger_stamps_ns=stamps_ns([0.3337, 1.5]),
+        trigger_flow=np.array([0.8, 0.0]),
+    )
+    points = lying_plane(1.0, 201)
+    film = painted(points, trajectory, NARROW)
+    emitted = 1.3 * 0.8 * (1.5 - 0.3337)
+    assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
+    assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
+
+
+def test_a_long_pass_is_the_flux_integrated_along_it():
+    """Every line across the pass has the same film: the flux summed along the direction."""
+    speed = 1.2 / 4.0 / 4.0
+    trajectory = straight_pass(np.arange(0.0, 16.001, 0.01), (-0.6, 0, 0.25), (0.6, 0, 0.25))
+    y = np.linspace(-0.2, 0.2, 21)
+    points = SurfacePoints(
+        np.stack([0 * y, y, 0 * y], axis=1), np.tile([0.0, 0.0, 1.0], (len(y), 1))
+    )
+    film = painted(points, trajectory, NARROW).film_um
+    x = np.linspace(-0.5, 0.5, 100_001)
+    flux = NARROW.planar.flux_um_per_s(x, y[:, np.newaxis])
+    expected = np.trapezoid(flux, x, axis=1)[::-1] / speed  # tool y is the world's -y
+    assert largest_error(film, expected) < 2e-5
+
+
+@settings(max_examples=25)
+@given(cuts=st.lists(st.integers(0, 200), max_size=8), shaded=st.booleans())
+def test_batches_change_no_bit(cuts, shaded):
+    model, occluder = (SHADED, Screen()) if shaded else (MODEL, None)
+    points = lying_plane(0.5, 30)
+    path, _ = spray_path(weaving(np.arange(0.0, 3.0, 0.02)))
+    whole = painted(points, path, model, 'single', occluder)
+    pieces = FilmIntegrator(points, model, 'single', occluder)
+    edges = [0, *sorted(min(cut, len(path)) for cut in cuts), len(path)]
+    for start, stop in pairwise(edges):
+        pieces.add(path.select(slice(start, stop)))
+    assert np.array_equal(pieces.film_um, whole.film_um)
+    assert pieces.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
+
+
+@settings(max_examples=25)
+@given(sizes=st.lists(st.integers(1, 40), min_size=1, max_size=5))
+def test_a_stream_gives_the_recordings_film_to_the_bit(sizes):
+    points = lying_plane(0.5, 30)
+    trajectory = weaving(np.arange(0.0, 3.0, 0.02))
+    builder, live = PathBuilder(), FilmIntegrator(points, MODEL)
+    start, turn = 0, 0
+    while start < len(trajectory):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        start, turn = rows.stop, turn + 1
+        builder.add_poses(
+            trajectory.stamps_ns[rows],
+            trajectory.positions_m[rows],
+            trajectory.quaternions_xyzw[rows],
+        )
+        live.add(builder.take())
+    live.add(builder.take(finish=True))
+    offline = painted(points, spray_path(trajectory, whole_strokes=False)[0], precision='single')
+    assert np.array_equal(live.film_um, offline.film_um)
+
+
+# The weaving way at 0.3 m/s with a tool that sways, as a robot's log may show it.
+DURATION_S = 4.0
+
+
+def sampled_evenly(period_s):
+    return weaving(np.linspace(0.0, DURATION_S, round(DURATION_S / period_s) + 1))
+
+
+def sampled_unevenly():
+    """Intervals from 1 to 24 ms; now and then the last pose comes again under a new stamp."""
+    rng = np.random.default_rng(11)
+    times = np.cumsum(rng.uniform(0.001, 0.024, 1000))
+    times = np.concatenate([[0.0], times[times < DURATION_S], [DURATION_S]])
+    log = weaving(times)
+    early = np.append(np.diff(times, prepend=-1.0)[1:-1] < 0.004, False)
+    again = 1 + np.flatnonzero(early & (rng.random(len(times) - 1) < 0.3))
+    positions, quaternions = log.positions_m.copy(), log.quaternions_xyzw.copy()
+    positions[again], quaternions[again] = positions[again - 1], quaternions[again - 1]
+    assert len(again) > 5
+    return Trajectory(log.stamps_ns, positions, quaternions)
+
+
+@pytest.fixture(scope='module')
+def exact():
+    """The film of the weaving way, integrated 80 times finer, and where."""
+    points = lying_plane(0.6, 25)
+    path, _ = spray_path(sampled_evenly(0.0005), max_step_m=0.0001)
+    return points, painted(points, path).film_um
+
+
+@pytest.mark.parametrize(
+    ('trajectory', 'limit'),
+    [
+        (sampled_evenly(0.02), 1e-3),
+        (sampled_evenly(0.001), 1e-4),
+        (sampled_unevenly(), 1e-3),
+    ],
+    ids=['50 Hz', '1 kHz', '1 to 24 ms with repeats'],
+)
+@pytest.mark.parametrize('precision', ['single', 'double'])
+def test_the_film_does_not_depend_on_the_sampling(trajectory, limit, precision, exact):
+    points, expected = exact
+    path, _ = spray_path(trajectory, max_step_m=MODEL.max_step_m)
+    assert largest_error(painted(points, path, precision=precision).film_um, expected) < limit
+
+
+@pytest.mark.parametrize(
+    'planar',
+    [
+        PlanarPattern(),
+        PlanarPattern(r_m=0.05, sigma1_m=0.02, sigma2_m=0.03),
+        PlanarPattern(r_m=0.1, sigma1_m=0.04, sigma2_m=0.2, K3=1.0, K2=0.0),
+    ],
+)
+@pytest.mark.parametrize('standoff_m', [0.25, 0.4])
+def test_sub_steps_are_fine_enough(planar, standoff_m):
+    """One segment of a whole pass with the gun opening and closing on it, cut by itself."""
+    model = DepositionModel(planar=planar)
+    trigger = {
+        'trigger_stamps_ns': stamps_ns([0.0, 0.6101, 1.4]),
+        'trigger_flow': np.array([0.0, 1.0, 0.0]),
+    }
+    pass_ = straight_pass([0.0, 2.0], (-0.3, 0, standoff_m), (0.3, 0, standoff_m), **trigger)
+    coarse, fine = (
+        spray_path(pass_, 5.0, step)[0] for step in (model.max_step_m, model.max_step_m / 40)
+    )
+    # The middle row lies on the line that the axis draws, where eq. (1) jumps at the centre.
+    points = lying_plane(0.4, 31)
+    expected = painted(points, fine, model).film_um
+    assert largest_error(painted(points, coarse, model).film_um, expected) < 1e-3
+
+
+def test_flow_scales_the_film():
+    path, _ = spray_path(straight_pass(np.arange(0.0, 2.0, 0.02)))
+    points = lying_plane(count=21)
+    full = painted(points, path).film_um
+    less = painted(points, path.with_(flow=0.37 * path.flow)).film_um
+    assert np.allclose(less, 0.37 * full, rtol=1e-12, atol=0)
+
+
+def test_paint_scales_with_k1_and_with_nothing_else_changed():
+    path, _ = spray_path(straight_pass(np.arange(0.0, 2.0, 0.02)))
+    points = lying_plane(count=21)
+    more = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=3 * MODEL.planar.K1_cm3_per_s))
+    assert np.allclose(
+        painted(points, path, more).film_um, 3.0 * painted(points, path).film_um, rtol=1e-12
+    )
+
+
+def test_half_the_speed_lays_twice_the_film():
+    points = lying_plane(count=21)
+    slow = painted(points, straight_pass(np.linspace(0.0, 4.0, 401))).film_um
+    fast = painted(points, straight_pass(np.linspace(0.0, 2.0, 401))).film_um
+    assert largest_error(slow, 2.0 * fast) < 1e-12
+
+
+def test_a_symmetric_pattern_lays_a_symmetric_film():
+    round_ = DepositionModel(planar=PlanarPattern(K3=0.0))
+    count = 31
+    film = painted(lying_plane(count=count), straight_pass(np.linspace(0, 2, 101)), round_).film_um
+    film = film.reshape(count, count)  # rows y, columns x
+    # What lies beyond the reach is left out by blocks, which are not symmetric.
+    assert np.allclose(film, film[::-1], rtol=1e-10, atol=1e-7 * film.max())
+    assert np.allclose(film, film[:, ::-1], rtol=1e-10, atol=1e-7 * film.max())
+
+
+def test_an_asymmetric_pattern_does_not():
+    count = 31
+    film = painted(lying_plane(count=count), straight_pass(np.linspace(0, 2, 101))).film_um
+    film = film.reshape(count, count)
+    assert np.abs(film - film[::-1]).max() > 0.05 * film.max()
+
+
+def test_the_way_back_lays_the_same_film():
+    points, times = lying_plane(count=25), np.linspace(0, 2, 101)
+    there = painted(points, straight_pass(times)).film_um
+    back = painted(points, straight_pass(times, (0.6, 0, 0.25), (-0.6, 0, 0.25))).film_um
+    assert largest_error(back, there) < 1e-9
+
+
+def test_films_add_up():
+    points = lying_plane(count=25)
+    first, second = (spray_path(weaving(t0 + np.arange(0, 1, 0.02)))[0] for t0 in (0.0, 3.0))
+    both = painted(points, first)
+    both.add(second)
+    separate = painted(points, first).film_um + painted(points, second).film_um
+    assert np.allclose(both.film_um, separate, rtol=1e-12)
+
+
+def test_moving_part_and_gun_together_changes_nothing():
+    points = lying_plane(count=25)
+    log = weaving(np.arange(0.0, 2.0, 0.02))
+    turn, shift = Rotation.from_euler('xyz', [0.5, -1.2, 2.8]), np.array([4.0, -3.0, 1.5])
+    moved = SurfacePoints(turn.apply(points.positions_m) + shift, turn.apply(points.normals))
+    moved_log = Trajectory(
+        log.stamps_ns,
+        turn.apply(log.positions_m) + shift,
+        (turn * Rotation.from_quat(log.quaternions_xyzw)).as_quat(),
+    )
+    still = painted(points, log).film_um
+    assert largest_error(painted(moved, moved_log).film_um, still) < 1e-9
+    single = painted(moved, moved_log, precision='single').film_um
+    assert largest_error(single, still) < 2e-6
+
+
+@pytest.mark.parametrize(('spacing_m', 'limit'), [(0.03, 0.01), (0.012, 0.002)])
+def test_the_film_does_not_depend_on_the_triangulation(spacing_m, limit):
+    """The sample door, cut into triangles in two ways: the same film where it is read."""
+    middle_m = 0.42
+
+    def depth(x, z):
+        return run_path(str(SAMPLES / 'make_door.py'))['door_depth'](x, z + middle_m)
+
+    def film_at(places, jitter, edge_m):
+        door = Surface.from_triangles(
+            *triangulated(depth, spacing_m, 0.55, 0.4, jitter=jitter), edge_m
+        )
+        return painted(door.at(places), log).film_um
+
+    log = straight_pass(
+        np.linspace(0, 3, 151), (-0.6, -0.25, 0.06), (0.6, -0.2, -0.2), LOOKING_ALONG_Y
+    )
+    rng = np.random.default_rng(4)
+    x, z = rng.uniform(-0.5, 0.5, 100), rng.uniform(-0.35, 0.35, 100)
+    places = np.stack([x, depth(x, z), z], axis=1)
+    regular, irregular = film_at(places, 0.0, 0.02), film_at(places, 0.3, 0.011)
+    # Apart by the facets' lean: of second order in the spacing.
+    assert largest_error(irregular, regular) < limit
+
+
+def test_a_screen_takes_the_paint_from_behind_it():
+    points = lying_plane(0.5, 30)
+    right = straight_pass(np.linspace(0, 1, 51), (0.1, -0.2, 0.25), (0.1, 0.2, 0.25))
+    open_, shaded = painted(points, right), painted(points, right, SHADED, occluder=Screen())
+    left = points.positions_m[:, 0] < 0.0
+    assert np.all(shaded.film_um[left] == 0.0)
+    assert np.allclose(shaded.film_um[~left], open_.film_um[~left], rtol=1e-12)
+
+
+@pytest.mark.parametrize('count', [1, 2])
+def test_shadows_reach_over_batches_on_few_points(count):
+    """What was seen last holds for the next batch until the gun has moved on."""
+    points = SurfacePoints(
+        np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])[:count], np.tile([0, 0, 1.0], (count, 1))
+    )
+    path, _ = spray_path(
+        straight_pass(np.linspace(0, 1, 51), (0.1, 0.0, 0.25), (0.1, 0.009, 0.25))
+    )
+    film = FilmIntegrator(points, SHADED, occluder=Screen())
+    for row in range(len(path)):
+        film.add(path.select(slice(row, row + 1)))
+    assert film.film_um[0] == 0.0
+    assert np.all(film.film_um[1:] > 0.0)
+
+
+def test_a_fork_goes_its_own_way():
+    path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
+    film = painted(lying_plane(count=21), path)
+    before = film.film_um
+    fork = film.fork()
+    fork.add(path)
+    assert np.array_equal(film.film_um, before)
+    assert np.allclose(fork.film_um, 2.0 * before, rtol=1e-12)
+    assert fork.emitted_cm3 == pytest.approx(2.0 * film.emitted_cm3)
+
+
+def test_another_model_paints_from_there_on():
+    path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
+    points = lying_plane(count=21)
+    film = painted(points, path)
+    film.use(NARROW)
+    film.add(path)
+    separate = painted(points, path).film_um + painted(points, path, NARROW).film_um
+    assert np.allclose(film.film_um, separate, rtol=1e-12)
+    film.reset()
+    assert np.all(film.film_um == 0.0)
+    assert film.emitted_cm3 == 0.0
+
+
+def test_progress_names_the_sub_steps_done():
+    path, _ = spray_path(straight_pass(np.arange(0.0, 50.0, 0.01)))
+    seen = []
+    FilmIntegrator(lying_plane(count=5), MODEL).add(path, seen.append)
+    assert len(seen) > 1
+    assert seen == sorted(seen)
+    assert seen[-1] == len(path)
+
+
+def test_the_gun_is_off_in_a_gap():
+    """Nothing is known of the way in a gap: the film is that of both ends apart."""
+    times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.5, 2.5, 0.02)])
+    whole = straight_pass(times)
+    points = lying_plane(0.6, 25)
+    film = painted(points, whole, NARROW).film_um
+    halves = [np.flatnonzero(times < 1.2), np.flatnonzero(times > 1.2)]
+    apart = sum(
+        painted(
+            points,
+            Trajectory(whole.stamps_ns[h], whole.positions_m[h], whole.quaternions_xyzw[h]),
+            NARROW,
+        ).film_um
+        for h in halves
+    )
+    assert np.allclose(film, apart, rtol=1e-12)
+
+
+@pytest.mark.parametrize('precision', ['single', 'double'])
+def test_a_pose_far_off_takes_its_own_paint_with_it_and_no_more(precision):
+    log = straight_pass(np.arange(0.0, 2.0, 0.02))
+    positions = log.positions_m.copy()
+    positions[50] = [-3e5, 7e5, 2e5]
+    points = lying_plane(0.6, 25)
+    film = painted(
+        points,
+        Trajectory(log.stamps_ns, positions, log.quaternions_xyzw),
+        precision=precision,
+    ).film_um
+    clean = painted(points, log).film_um
+    assert np.isfinite(film).all()
+    assert film.min() >= 0.0
+    lost = painted(
+        points,
+        Trajectory(*(a[49:52] for a in (log.stamps_ns, log.positions_m, log.quaternions_xyzw))),
+    ).film_um
+    assert largest_error(film, clean - lost) < 1e-3
+
+
+def test_orientation_between_poses_is_an_even_turn():
+    """Two poses a quarter second and half a radian apart against the same turn sampled finely."""
+    ends = Rotation.from_quat(LOOKING_DOWN) * Rotation.from_euler('y', [-0.25, 0.25])
+    positions = np.array([[-0.03, 0.0, 0.25], [0.03, 0.02, 0.27]])
+    two = Trajectory(stamps_ns([0.0, 0.25]), positions, ends.as_quat())
+    t = np.linspace(0.0, 0.25, 200)
+    fine = Trajectory(
+        stamps_ns(t),
+        positions[0] + (t / 0.25)[:, np.newaxis] * (positions[1] - positions[0]),
+        Slerp([0.0, 0.25], ends)(t).as_quat(),
+    )
+    points = lying_plane(0.5, 24)
+    assert largest_error(painted(points, two).film_um, painted(points, fine).film_um) < 1e-3
+
+
+def test_stamps_may_start_anywhere():
+    points = lying_plane(count=21)
+    log = weaving(np.arange(0.0, 1.0, 0.02))
+    early = Trajectory(log.stamps_ns - START_NS, log.positions_m, log.quaternions_xyzw)
+    assert np.array_equal(painted(points, log).film_um, painted(points, early).film_um)

@@ -1,0 +1,188 @@
+"""The fit: a known pattern from readings without noise, and uncertainties as wide as they are."""
+
+import numpy as np
+import pytest
+
+from fitting.panels import PANEL, painted_by, passes
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.fitting.forward import Forward
+from paint_deposition.fitting.least_squares import derivatives, fit_readings
+from paint_deposition.fitting.parameters import PATTERN, Unknowns
+from paint_deposition.fitting.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.readings.campaign import Campaign, Experiment
+from paint_deposition.readings.readings import Readings
+
+TRUTH = DepositionModel(
+    planar=PlanarPattern(
+        K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
+    )
+)
+SIGMA_UM = 0.15
+
+
+def grid_m(columns: int = 5, rows: int = 14) -> np.ndarray:
+    """(N, 3) points over the panel."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.1, 1.9, rows))
+    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+
+
+@pytest.fixture(scope='module')
+def spotted() -> Campaign:
+    """Two short strokes that do not meet, so that the whole pattern shows, not its collapse."""
+    path, _ = spray_path(passes([0.55, 1.35]))
+    path = path.with_(flow=np.where(np.abs(path.position_m[:, 0]) < 0.1, 8.0 * path.flow, 0.0))
+    bare = Readings.of(grid_m(), np.zeros(len(grid_m())))
+    return Campaign((Experiment.of('panel', PANEL, path, bare),))
+
+
+@pytest.fixture(scope='module')
+def forward(spotted):
+    return Forward(spotted, (OversprayFog(),))
+
+
+@pytest.fixture(scope='module')
+def exact(forward):
+    """What the true model predicts there."""
+    return forward.predict_um(TRUTH)
+
+
+def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
+    integrator = FilmIntegrator(PANEL.at(grid_m()), TRUTH, 'double')
+    integrator.add(spotted.experiments[0].path)
+    assert exact == pytest.approx(integrator.film_um, rel=1e-9)
+    assert 5.0 < exact.max() < 100.0
+
+
+def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
+    fit = fit_readings(
+        forward, exact, np.full(len(exact), 0.003), Unknowns.of(DepositionModel()), starts=6
+    )
+    assert fit.converged
+    assert fit.chi_square < 1.0
+    for name, value in TRUTH.planar:
+        assert getattr(fit.model.planar, name) == pytest.approx(value, rel=0.01), name
+
+
+def test_a_known_amplitude_comes_back_beside_the_pattern(forward):
+    fogged = TRUTH.with_effect(OversprayFog(fog_um=1.7))
+    measured = forward.predict_um(fogged)
+    unknowns = Unknowns.of(TRUTH, OversprayFog())
+    fit = fit_readings(forward, measured, np.full(len(measured), 0.01), unknowns, starts=3)
+    assert fit.model.effect('overspray_fog').fog_um == pytest.approx(1.7, rel=0.01)
+    assert unknowns.names[-1] == 'overspray_fog.fog_um'
+
+
+def test_derivatives_are_those_of_the_prediction(forward, exact):
+    unknowns = Unknowns.of(TRUTH, OversprayFog(fog_um=0.5))
+    vector = unknowns.encode(unknowns.start)
+    found = derivatives(forward, unknowns, vector, np.full(len(exact), SIGMA_UM))
+    for k in range(len(vector)):
+        ends = []
+        for step in (-1e-4, 1e-4):
+            moved = vector.copy()
+            moved[k] += step
+            ends.append(forward.predict_um(unknowns.decode(moved)))
+        slope = (ends[1] - ends[0]) / 2e-4 / SIGMA_UM
+        assert found[:, k] == pytest.approx(slope, abs=0.01 * np.abs(slope).max()), k
+
+
+def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
+    random = np.random.default_rng(4)
+    unknowns = Unknowns.of(TRUTH)
+    sigma = np.full(len(exact), SIGMA_UM)
+    vectors = []
+    for _ in range(50):
+        measured = exact + SIGMA_UM * random.normal(size=len(exact))
+        vectors.append(fit_readings(forward, measured, sigma, unknowns).vector)
+    reference = fit_readings(forward, exact, sigma, unknowns)
+    # With fixed truth the estimates scatter by C J'J C, a little less than C for the priors.
+    covariance = reference.covariance
+    information = reference.jacobian.T @ reference.jacobian
+    expected = np.sqrt(np.diag(covariance @ information @ covariance))
+    # The standard error of a deviation from 50 draws is 10 %.
+    assert np.std(vectors, axis=0, ddof=1) / expected == pytest.approx(np.ones(7), abs=0.35)
+    assert (np.sqrt(np.diag(covariance)) >= expected).all()
+    shift = np.mean(vectors, axis=0) - reference.vector
+    assert (np.abs(shift) < 4.0 * expected / np.sqrt(50.0)).all()
+
+
+def test_readings_that_say_nothing_leave_the_priors(forward, exact):
+    unknowns = Unknowns.of(DepositionModel())
+    fit = fit_readings(forward, exact, np.full(len(exact), 1e9), unknowns)
+    centre, width = unknowns.prior
+    assert fit.vector == pytest.approx(centre, abs=1e-3)
+    assert np.sqrt(np.diag(fit.covariance)) == pytest.approx(width, rel=1e-3)
+
+
+def test_further_deviations_are_allowed_for(forward, exact):
+    """A common error of all readings, allowed for, moves the fit by no more than it may."""
+    unknowns = Unknowns.of(TRUTH)
+    sigma = np.full(len(exact), SIGMA_UM)
+    wrong = exact + 1.5
+    extra = np.full((len(exact), 1), 2.0 / SIGMA_UM)
+    strict = fit_readings(forward, wrong, sigma, unknowns)
+    lenient = fit_readings(forward, wrong, sigma, unknowns, extra=extra)
+    truth = unknowns.encode(TRUTH)
+    assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
+    assert lenient.chi_square < 0.2 * strict.chi_square
+    assert lenient.extra_log_det == pytest.approx(np.log(1.0 + len(exact) * (2.0 / SIGMA_UM) ** 2))
+
+
+def test_the_same_seed_gives_the_same_fit(forward, exact):
+    noisy = exact + SIGMA_UM * np.random.default_rng(2).normal(size=len(exact))
+    sigma = np.full(len(exact), SIGMA_UM)
+    first, second = (
+        fit_readings(forward, noisy, sigma, Unknowns.of(DepositionModel()), starts=3, seed=5)
+        for _ in range(2)
+    )
+    assert np.array_equal(first.vector, second.vector)
+
+
+def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
+    experiment = painted_by(TRUTH, passes([0.55, 1.35]), grid_m(), repeats=4, noise_um=0.6)
+    study = Study.of(Campaign((experiment,)))
+    assert study.noise.source == 'repeats'
+    assert study.noise.degrees_of_freedom == 3 * len(study)
+    gauge = study.noise.sigma_um[: len(study)]
+    assert study.sigma_um == pytest.approx(
+        np.sqrt(gauge**2 / 4 + (TEXTURE_SHARE * study.measured_um) ** 2), rel=0.02
+    )
+    assert study.levels is None
+
+
+def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
+    parts = tuple(
+        painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)) for height in (0.4, 0.6)
+    )
+    study = Study.of(Campaign(parts))
+    sigma = study.sigma_um[:18]
+    level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
+    here = np.column_stack([level, -level, zero, -zero]) / 2.0
+    assert study.levels[:18] == pytest.approx(here)
+    film = study.measured_um * study.sigma_um
+    assert (film @ study.levels[:, :2]).sum() == pytest.approx(0.0)
+    patches, bands = study.patches(), study.bands(TRUTH)
+    for blocks in (patches, bands):
+        assert set(blocks[:18]).isdisjoint(blocks[18:])
+    assert len(np.unique(bands)) == 4
+    assert len(np.unique(patches)) >= 6
+
+
+def test_points_at_few_places_are_patches_by_place(spotted):
+    places = np.repeat(grid_m()[[3, 20, 41]], 10, axis=0)
+    one = spotted.experiments[0]
+    experiment = Experiment.of('panel', PANEL, one.path, Readings.of(places, np.full(30, 20.0)))
+    patches = Study.of(Campaign((experiment,))).patches()
+    assert len(np.unique(patches)) == 3
+    assert (patches.reshape(3, 10) == patches.reshape(3, 10)[:, :1]).all()
+
+
+def test_absent_effects_change_no_prediction(forward, exact):
+    both = Forward(forward.campaign, (OversprayFog(), AirDrift()))
+    assert np.array_equal(both.predict_um(TRUTH), exact)
+    assert len(PATTERN) == 7

@@ -1,0 +1,227 @@
+"""The compiled loop against eqs. (1) and (2) in double precision NumPy."""
+
+import numba
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.layout import model_constants, step_rows
+from paint_deposition.kernel.accumulation import within_reach
+from paint_deposition.kernel.blocks import LANES, LARGEST_BLOCK, SMALLEST_BLOCK, Blocks
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection, flux_um_per_s
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.points import SurfacePoints
+from scenes import lying_plane, straight_pass, weaving
+
+PATTERNS = {
+    'default': PlanarPattern(),
+    'ring only': PlanarPattern(K2=0.0, K3=1.0),
+    'centre only': PlanarPattern(K2=1.0),
+    'spot': PlanarPattern(r_m=0.0, K3=0.0, sigma1_m=0.02, sigma2_m=0.02),
+    'thin ring': PlanarPattern(r_m=0.3, sigma1_m=0.01, K3=0.5, phi_rad=-2.0),
+}
+PROJECTIONS = {
+    'default': Projection(),
+    'at the bell': Projection(emission_offset_m=0.0),
+    'before the bell': Projection(emission_offset_m=-0.04, model_plane_m=0.2),
+    'far behind': Projection(emission_offset_m=0.4, model_plane_m=0.7),
+}
+# Of the peak. Single precision: a coordinate's last bit against a ring of 10 mm; double: what lies
+# beyond the reach, which is left out.
+TOLERANCE = {'single': 1e-5, 'double': 1e-6}
+
+
+def rough_skin(seed=3, count=900):
+    """Points scattered about a plane that look anywhere, mostly up."""
+    rng = np.random.default_rng(seed)
+    positions = rng.uniform(-1.0, 1.0, (count, 3)) * [0.7, 0.7, 0.08]
+    normals = Rotation.from_rotvec(rng.normal(0.0, 0.6, (count, 3))).apply([0.0, 0.0, 1.0])
+    return SurfacePoints(positions, normals)
+
+
+def reference_um(points, path, model):
+    film = np.zeros(len(points))
+    for row in range(len(path)):
+        film += path.dwell_s[row] * path.flow[row] * flux_um_per_s(
+            model.planar,
+            model.projection,
+            points.positions_m,
+            points.normals,
+            path.position_m[row],
+            path.rotation[row],
+        )  # fmt: skip
+    return film
+
+
+def film_um(points, path, model, precision='single'):
+    integrator = FilmIntegrator(points, model, precision)
+    integrator.add(path)
+    return integrator.raw_um
+
+
+@pytest.mark.parametrize('precision', ['single', 'double'])
+@pytest.mark.parametrize('projection', PROJECTIONS.values(), ids=PROJECTIONS)
+@pytest.mark.parametrize('planar', PATTERNS.values(), ids=PATTERNS)
+def test_it_computes_eqs_1_and_2(planar, projection, precision):
+    model = DepositionModel(planar=planar, projection=projection)
+    points = rough_skin()
+    path, _ = spray_path(weaving(np.arange(0.0, 3.0, 0.05)))
+    expected = reference_um(points, path, model)
+    assert np.count_nonzero(expected) > 100
+    error = np.abs(film_um(points, path, model, precision) - expected)
+    assert error.max() <= TOLERANCE[precision] * expected.max()
+
+
+@pytest.mark.parametrize('precision', ['single', 'double'])
+def test_within_reach_it_is_exact_to_rounding(precision):
+    """One block around the axis: nothing is left out, what remains is rounding."""
+    rng = np.random.default_rng(2)
+    positions = rng.uniform(-0.15, 0.15, (30, 3)) * [1, 1, 0.1]
+    points = SurfacePoints(positions, np.tile([0.0, 0.0, 1.0], (30, 1)))
+    path, _ = spray_path(straight_pass(np.linspace(0, 1, 51), (-0.1, 0, 0.25), (0.1, 0, 0.25)))
+    model = DepositionModel()
+    expected = reference_um(points, path, model)
+    error = np.abs(film_um(points, path, model, precision) - expected).max() / expected.max()
+    assert error < {'single': 1e-6, 'double': 1e-13}[precision]
+
+
+def test_the_pattern_shift_moves_the_pattern_over_the_model_plane():
+    path, _ = spray_path(straight_pass(np.linspace(0, 1, 51)))
+    shift = np.array([0.03, -0.05])
+    model = DepositionModel()
+    shifted = film_um(
+        lying_plane(), path.with_(pattern_shift_m=np.tile(shift, (len(path), 1))), model
+    )
+    # On the model plane a shift by (x, y) in tool axes is a move of the gun by (x, -y).
+    moved = film_um(
+        lying_plane(),
+        path.with_(position_m=path.position_m + np.array([0.03, 0.05, 0.0])),
+        model,
+    )
+    assert np.allclose(shifted, moved, rtol=0, atol=2e-6 * moved.max())
+
+
+@settings(max_examples=60)
+@given(
+    seed=st.integers(0, 10_000),
+    precision=st.sampled_from(['single', 'double']),
+    K3=st.floats(0.0, 1.0),
+    offset=st.floats(-0.2, 0.5),
+)
+def test_no_point_ever_gets_negative_paint(seed, precision, K3, offset):
+    rng = np.random.default_rng(seed)
+    points = SurfacePoints(
+        rng.uniform(-1.0, 1.0, (200, 3)), Rotation.random(200, rng=rng).apply([0.0, 0.0, 1.0])
+    )
+    path, _ = spray_path(weaving(rng.uniform(0.0, 9.0) + np.linspace(0.0, 0.4, 5)))
+    model = DepositionModel(
+        planar=PlanarPattern(K3=K3), projection=Projection(emission_offset_m=offset)
+    )
+    film = film_um(points, path, model, precision)
+    assert np.isfinite(film).all()
+    assert film.min() >= 0.0
+
+
+def test_no_paint_behind_the_bell_or_on_the_back():
+    path, _ = spray_path(straight_pass(np.linspace(0, 1, 51)))
+    plane = lying_plane(count=15)
+    back = SurfacePoints(plane.positions_m, -plane.normals)
+    behind = SurfacePoints(plane.positions_m + np.array([0, 0, 0.2501]), plane.normals)
+    for points in (back, behind):
+        assert np.all(film_um(points, path, DepositionModel()) == 0.0)
+
+
+@pytest.mark.parametrize('precision', ['single', 'double'])
+def test_what_is_left_out_of_reach_is_nothing(precision):
+    """A small pattern on a large plane: most blocks are skipped most of the time."""
+    model = DepositionModel(
+        planar=PlanarPattern(r_m=0.05, sigma1_m=0.02, sigma2_m=0.03),
+        projection=Projection(model_plane_m=0.3),
+    )
+    points = lying_plane(0.7, 201)
+    path, _ = spray_path(straight_pass(np.linspace(0, 4, 41), (-0.4, -0.2, 0.25), (0.4, 0.3, 0.3)))
+    expected = reference_um(points, path, model)
+    error = np.abs(film_um(points, path, model, precision) - expected)
+    assert error.max() < 1e-6 * expected.max()
+
+
+@settings(max_examples=200)
+@given(seed=st.integers(0, 100_000), share=st.floats(0.0, 0.9999))
+def test_no_block_with_a_lit_point_is_skipped(seed, share):
+    """A point within the cone, and any sphere that has it on its surface."""
+    rng = np.random.default_rng(seed)
+    path, _ = spray_path(weaving(rng.uniform(0.0, 9.0) + np.linspace(0.0, 0.02, 2)))
+    model = DepositionModel(
+        planar=PlanarPattern(r_m=rng.uniform(0, 0.2), sigma1_m=0.03, sigma2_m=0.04)
+    )
+    row, constants = step_rows(model, path, np.zeros(3))[0], model_constants(model)
+    along = rng.uniform(1.001 * model.projection.nearest_m, 1.0)
+    aside = share * model.reach_m * along / model.projection.model_plane_m
+    angle = rng.uniform(-np.pi, np.pi)
+    in_tool = np.array([aside * np.cos(angle), aside * np.sin(angle), along])
+    lit = row[:3] + path.rotation[0] @ in_tool
+    for radius in (0.0, 0.01, 0.3):
+        centre = lit + radius * Rotation.random(rng=rng).apply([0.0, 0.0, 1.0])
+        assert within_reach(np.append(centre, radius), row, constants)
+        # The worst place: at right angles to the cone.
+        slope = model.reach_m / model.projection.model_plane_m
+        out = path.rotation[0] @ np.array([np.cos(angle), np.sin(angle), -slope])
+        out /= np.linalg.norm(out)
+        assert within_reach(np.append(lit + radius * out, radius), row, constants)
+
+
+def test_a_thousand_small_sums_stay_accurate():
+    """A long time in one place, single precision: the newest sums join the film in time."""
+    path, _ = spray_path(straight_pass(np.arange(0.0, 40.0, 0.01), (0, 0, 0.25), (0.01, 0, 0.25)))
+    assert len(path) > 3900
+    points, model = lying_plane(count=21), DepositionModel()
+    single, double = (film_um(points, path, model, p) for p in ('single', 'double'))
+    assert np.abs(single - double).max() < 1e-6 * double.max()
+
+
+def test_the_number_of_threads_changes_no_bit():
+    path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
+    points, model = lying_plane(count=60), DepositionModel()
+    threads = numba.get_num_threads()
+    films = []
+    try:
+        for count in {1, threads}:
+            numba.set_num_threads(count)
+            films.append(film_um(points, path, model))
+    finally:
+        numba.set_num_threads(threads)
+    assert all(np.array_equal(film, films[0]) for film in films)
+
+
+@pytest.mark.parametrize('count', [1, 2, 31, 33, 1000, 5000])
+def test_blocks_hold_every_point_once_within_their_spheres(count):
+    rng = np.random.default_rng(count)
+    positions = rng.normal(0.0, 1.0, (count, 3)) + 7.0
+    normals = Rotation.random(count, rng=rng).apply([0.0, 0.0, 1.0])
+    blocks = Blocks.of(positions, normals, np.float64)
+    assert sorted(blocks.order.tolist()) == list(range(count))
+    assert np.allclose(blocks.points.T + blocks.origin_m, positions[blocks.order], atol=1e-14)
+    assert np.array_equal(blocks.normals.T, normals[blocks.order])
+    sizes = np.diff(blocks.bounds)
+    assert sizes.sum() == count
+    assert np.all((sizes > 0) & (sizes <= LARGEST_BLOCK))
+    full = sizes.max()
+    assert np.count_nonzero(sizes != full) <= 1
+    if count > SMALLEST_BLOCK:
+        assert full % LANES == 0
+    for block, (start, stop) in enumerate(zip(blocks.bounds, blocks.bounds[1:], strict=False)):
+        away = np.linalg.norm(blocks.points[:, start:stop].T - blocks.spheres[block, :3], axis=1)
+        assert away.max() <= blocks.spheres[block, 3] * (1 + 1e-12) + 1e-15
+
+
+def test_blocks_of_a_plane_are_nearly_square():
+    plane = lying_plane(0.5, 128)
+    blocks = Blocks.of(plane.positions_m, plane.normals, np.float32)
+    assert len(blocks.spheres) == 64
+    # An eighth of a metre square: half its diagonal.
+    assert blocks.spheres[:, 3].max() < 1.05 * 0.125 * np.sqrt(0.5)

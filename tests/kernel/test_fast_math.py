@@ -1,0 +1,106 @@
+"""Compiled exponential and logarithm against the C library's."""
+
+import math
+
+import numpy as np
+import pytest
+from numba import njit
+
+from paint_deposition.kernel.fast_math import exp, exp2, log, power
+
+
+@njit
+def exp2_all(x):
+    out = np.empty_like(x)
+    for i in range(len(x)):
+        out[i] = exp2(x[i])
+    return out
+
+
+@njit
+def exp_all(x):
+    out = np.empty_like(x)
+    for i in range(len(x)):
+        out[i] = exp(x[i])
+    return out
+
+
+@njit
+def log_all(x):
+    out = np.empty_like(x)
+    for i in range(len(x)):
+        out[i] = log(x[i])
+    return out
+
+
+@njit
+def power_all(x, exponent):
+    out = np.empty_like(x)
+    for i in range(len(x)):
+        out[i] = power(x[i], exponent)
+    return out
+
+
+# Precision, and an error of a few units in the last place.
+REALS = [(np.float32, 2.5e-7), (np.float64, 5e-16)]
+FLOORS = {np.float32: -120.0, np.float64: -1000.0}
+
+
+@pytest.mark.parametrize(('real', 'error'), REALS)
+def test_exp2(real, error):
+    x = np.linspace(FLOORS[real], 120.0, 100_003).astype(real)
+    expected = np.exp2(x.astype(np.longdouble))
+    assert np.max(np.abs(exp2_all(x) / expected - 1.0)) < error
+
+
+@pytest.mark.parametrize(('real', 'error'), REALS)
+def test_exp(real, error):
+    x = np.linspace(-80.0, 80.0, 100_003).astype(real)
+    relative = np.abs(exp_all(x) / np.exp(x.astype(np.longdouble)) - 1.0)
+    # The rounding of the exponent itself counts as much as the exponent is large.
+    assert np.max(relative / (1.0 + np.abs(x))) < error
+
+
+@pytest.mark.parametrize(('real', 'error'), REALS)
+def test_log(real, error):
+    x = np.logspace(-20, 20, 100_003).astype(real)
+    expected = np.log(x.astype(np.longdouble))
+    assert np.max(np.abs(log_all(x) - expected) / np.maximum(np.abs(expected), 0.1)) < 3 * error
+    assert log_all(np.ones(1, real))[0] == 0.0
+
+
+@pytest.mark.parametrize(('real', 'error'), REALS)
+@pytest.mark.parametrize('exponent', [-2.0, -0.5, 0.3, 1.0, 2.0])
+def test_power(real, error, exponent):
+    x = np.logspace(-2, 2, 10_001).astype(real)
+    expected = x.astype(np.longdouble) ** real(exponent)
+    assert np.max(np.abs(power_all(x, real(exponent)) / expected - 1.0)) < 40 * error
+
+
+@pytest.mark.parametrize('real', FLOORS)
+def test_exact_where_effects_rely_on_it(real):
+    """An absent effect is a power 0 or an exponent 0; it must change no bit."""
+    x = np.array([0.2, 1.0, 3.7], real)
+    assert power_all(x, real(0.0)).tolist() == [1.0, 1.0, 1.0]
+    assert exp_all(np.zeros(1, real))[0] == 1.0
+    whole = np.arange(-100, 101).astype(real)
+    assert np.array_equal(exp2_all(whole), 2.0 ** whole.astype(float))
+
+
+@pytest.mark.parametrize(('real', 'floor'), FLOORS.items())
+def test_below_the_floor_it_stays_there(real, floor):
+    far = np.array([floor, 2 * floor, -1e6, -1e30], real)
+    assert exp2_all(far).tolist() == [2.0**floor] * 4
+
+
+@pytest.mark.parametrize('real', FLOORS)
+def test_the_precision_is_kept(real):
+    x = np.ones(3, real)
+    assert exp_all(x).dtype == exp2_all(x).dtype == log_all(x).dtype == real
+
+
+def test_outside_compiled_code_they_are_the_c_librarys():
+    assert exp(-1.3) == math.exp(-1.3)
+    assert exp2(-1.3) == 2.0**-1.3
+    assert log(1.3) == math.log(1.3)
+    assert power(1.3, 0.7) == pytest.approx(1.3**0.7, rel=1e-15)

@@ -1,0 +1,283 @@
+"""The report: complete for every verdict, self-contained, and drawn by a real browser."""
+
+import re
+import shutil
+import subprocess
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from paint_deposition.comparison.comparison import compare
+from paint_deposition.diagnosis.next_experiment import Place, Spray
+from paint_deposition.diagnosis.procedure import ALPHA
+from paint_deposition.diagnosis.refit import refit
+from paint_deposition.diagnosis.verdict import EffectClass, Interval
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.report.page.report import write_report
+from small_campaign import small_campaign
+
+VOID = {'meta', 'link', 'br', 'img', 'input', 'hr'}
+CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
+
+
+@pytest.fixture(scope='module')
+def diagnosis(tmp_path_factory):
+    campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
+    return refit(campaign, DepositionModel(), AirDrift)
+
+
+@pytest.fixture(scope='module')
+def models(diagnosis):
+    return [(step.model, compare(diagnosis.study, step.model)) for step in diagnosis.history]
+
+
+@pytest.fixture(scope='module')
+def proposals(diagnosis):
+    door = diagnosis.study.campaign.experiments[1]
+    places = [Place(door.points.positions_m[k], door.name, 'tells them apart') for k in (3, 20)]
+    sprays = [Spray('the same passes at half the flow', ('air_drift', 'tcp_tilt'), 4.2, 0.6)]
+    return places, sprays
+
+
+@pytest.fixture(scope='module')
+def report(tmp_path_factory, diagnosis, models, proposals):
+    path = tmp_path_factory.mktemp('report') / 'report.html'
+    write_report(path, diagnosis.study, models, diagnosis, *proposals)
+    return path
+
+
+class Page(HTMLParser):
+    """Elements with their attributes, what is left open, and the text outside scripts."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.elements, self.open, self.clashes, self.words = [], [], [], []
+        self.feed(text)
+        self.close()
+
+    def handle_starttag(self, tag, attributes):
+        self.elements.append((tag, dict(attributes)))
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        if not self.open or self.open.pop() != tag:
+            self.clashes.append(tag)
+
+    def handle_data(self, data):
+        if self.open and self.open[-1] not in ('script', 'style'):
+            self.words.append(data)
+
+    @property
+    def text(self) -> str:
+        return ' '.join(' '.join(self.words).split())
+
+
+def page_of(path: Path) -> Page:
+    return Page(path.read_text(encoding='utf-8'))
+
+
+def test_elements_are_closed_in_order_and_ids_are_unique(report):
+    page = page_of(report)
+    assert page.open == page.clashes == []
+    ids = [attributes['id'] for _, attributes in page.elements if 'id' in attributes]
+    assert len(ids) == len(set(ids))
+    links = [a['href'] for _, a in page.elements if 'href' in a]
+    assert links
+    assert {link.removeprefix('#') for link in links} <= set(ids)
+
+
+def test_nothing_is_loaded_from_anywhere(report):
+    page = page_of(report)
+    for tag, attributes in page.elements:
+        assert not {'src', 'srcset', 'data', 'action', 'poster'} & set(attributes), tag
+        assert attributes.get('href', '#').startswith('#'), tag
+    policy = next(a['content'] for t, a in page.elements if t == 'meta' and 'http-equiv' in a)
+    assert "default-src 'none'" in policy
+    assert 'http' not in policy
+    style = re.search(r'<style>(.*?)</style>', report.read_text(), re.DOTALL).group(1)
+    assert 'url(' not in style
+    assert '@import' not in style
+    assert report.stat().st_size < 8e6
+
+
+def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
+    text = page_of(report).text
+    first, last = diagnosis.history[0], diagnosis.history[-1]
+    for figure in (first.rmse_um, last.rmse_um, first.holdout_rmse_um, last.holdout_rmse_um):
+        assert f'{figure:.2f}' in text
+    assert 'The model lacked air drift' in text
+    assert f'{diagnosis.noise_floor_um:.2f}' in text
+    assert 'the same passes at half the flow' in text
+    shift = next(iter(diagnosis.classes[0].parameters.values())).value
+    assert f'{1e3 * shift:.3g}'.replace('-', '−') in text
+
+
+def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, models):
+    first, *others = diagnosis.study.campaign.experiments
+    name = '</script><b>panel'
+    renamed = replace(first, name=name)
+    campaign = replace(diagnosis.study.campaign, experiments=(renamed, *others))
+    study = replace(diagnosis.study, campaign=campaign)
+    write_report(tmp_path / 'report.html', study, models)
+    page = page_of(tmp_path / 'report.html')
+    assert page.clashes == []
+    assert name in page.text
+
+
+def other_verdicts(diagnosis):
+    base = {'accepted': (), 'classes': (), 'history': diagnosis.history[:1]}
+    two = tuple(
+        EffectClass((key,), 0.4, key, {name: Interval(0.01, 0.0, 0.02)})
+        for key, name in (('air_drift', 'shift_down_m'), ('fog_gradient', 'fog_um'))
+    )
+    yield 'agrees with the readings', replace(diagnosis, verdict='none_missing', **base)
+    yield (
+        'cannot be trusted',
+        replace(
+            diagnosis, verdict='fit_broken', reason='the fit did not converge', p_value=1.0, **base
+        ),
+    )
+    yield 'do not say which', replace(
+        diagnosis, verdict='undecided', **base | {'classes': two}
+    )  # fmt: skip
+    yield 'no known effect explains', replace(diagnosis, verdict='unknown_effect', **base)
+    # A diagnosis that added what it was sure of, and is left with more.
+    left = replace(two[1], members=('fog_gradient', 'tcp_tilt'))
+    yield 'Something more is, most likely fog gradient (or TCP tilt) (40 %).', replace(
+        diagnosis, verdict='undecided', classes=(diagnosis.classes[0], left)
+    )  # fmt: skip
+    yield 'no known effect explains', replace(diagnosis, verdict='unknown_effect')
+
+
+@pytest.mark.parametrize('which', range(6))
+def test_every_verdict_has_its_report(tmp_path, diagnosis, models, which):
+    words, other = list(other_verdicts(diagnosis))[which]
+    chosen = models if len(other.history) > 1 else models[:1]
+    write_report(tmp_path / 'report.html', other.study, chosen, other)
+    page = page_of(tmp_path / 'report.html')
+    assert words in page.text
+    assert page.open == page.clashes == []
+    assert ('Air drift was added with' in page.text) == ('air_drift' in other.accepted)
+    assert ('no effect was added' in page.text) == (not other.accepted)
+
+
+@pytest.mark.parametrize('verdict', ['none_missing', 'undecided', 'unknown_effect'])
+@pytest.mark.parametrize(
+    ('probability', 'title'),
+    [
+        (0.02, 'The readings do not call for air drift'),
+        (0.7, 'The readings do not settle whether air drift was missing'),
+    ],
+)
+def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
+    tmp_path, diagnosis, models, verdict, probability, title
+):
+    asked = replace(diagnosis.classes[0], probability=probability)
+    write_report(
+        tmp_path / 'report.html', diagnosis.study, models,
+        replace(diagnosis, verdict=verdict, classes=(asked,), p_value=0.001),
+    )  # fmt: skip
+    text = page_of(tmp_path / 'report.html').text
+    assert 'run the diagnosis to find the cause' in text
+    assert title in text
+    assert 'Air drift was added with' in text
+    assert 'no effect was added' not in text
+
+
+def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnosis, models):
+    older = [
+        {'added': 'pattern', 'rmse_um': 7.77, 'holdout_rmse_um': 8.88, 'noise_floor_um': 0.66,
+         'campaign': 'panel.yaml'},
+        {'added': 'tcp_tilt', 'rmse_um': 6.66, 'campaign': 'panel.yaml'},
+    ]  # fmt: skip
+    campaign = replace(diagnosis.study.campaign, name='door.yaml')
+    done = replace(diagnosis, study=replace(diagnosis.study, campaign=campaign))
+    write_report(tmp_path / 'report.html', done.study, models, done, older=older)
+    errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in done.history]
+    floor = f'{done.noise_floor_um:.2f}'
+    assert (
+        'pattern of eq. (1) alone panel.yaml 7.77 8.88 0.66 + TCP tilt panel.yaml 6.66 '
+        f'model as given, fitted anew door.yaml {errors[0]} {floor} '
+        f'+ air drift door.yaml {errors[1]} {floor}'
+    ) in page_of(tmp_path / 'report.html').text
+
+
+def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_path):
+    campaign = small_campaign(tmp_path, truth=None, amplitude=None)
+    done = refit(campaign, DepositionModel(), AirDrift)
+    models = [(step.model, compare(done.study, step.model)) for step in done.history]
+    write_report(tmp_path / 'report.html', done.study, models, done)
+    assert [effect.id for effect in done.model.effects] == ['air_drift']
+    text = page_of(tmp_path / 'report.html').text
+    assert 'Added as asked' in text
+    assert ('run the diagnosis' in text) == (done.p_value < ALPHA)
+    assert 'Air drift was added with' in text
+    assert 'no effect was added' not in text
+
+
+def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, models):
+    write_report(tmp_path / 'report.html', diagnosis.study, models[:1])
+    page = page_of(tmp_path / 'report.html')
+    assert 'Comparison' in page.text
+    assert 'Run the diagnosis' in page.text
+
+
+# A visitor: turns the part, then presses every button and unticks the passes.
+VISITOR = """<script>
+(async () => {
+  const root = document.documentElement, rest = ms => new Promise(done => setTimeout(done, ms));
+  while (!('ready' in root.dataset)) await rest(50);
+  const plot = document.getElementById('part');
+  const camera = {eye: {x: 0.3, y: 1.9, z: 0.4}};
+  await Plotly.relayout(plot, {'scene.camera.eye': camera.eye});
+  await rest(200);
+  const eyes = ['scene', 'scene2'].map(key => plot.layout[key].camera.eye.y);
+  root.dataset.eyes = JSON.stringify(eyes);
+  document.getElementById('part-passes').click();
+  const count = document.querySelectorAll('.switch button').length;
+  for (let k = 0; k < count; ++k) {
+    document.querySelectorAll('.switch button')[k].click();
+    await rest(200);
+  }
+  root.dataset.pressed = count;
+  root.dataset.titles = document.getElementById('part-titles').textContent;
+})();
+</script>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason='draws the page in Chromium, which is not installed')
+def test_a_browser_draws_every_chart_without_errors(report, tmp_path):
+    picture, visited = tmp_path / 'page.png', tmp_path / 'visited.html'
+    visited.write_text(report.read_text().replace('</body>', f'{VISITOR}</body>'))
+    command = [
+        CHROMIUM, '--headless', '--no-sandbox', '--enable-unsafe-swiftshader', '--use-gl=angle',
+        '--use-angle=swiftshader', '--disable-background-networking', '--hide-scrollbars',
+        f'--user-data-dir={tmp_path / "profile"}', '--virtual-time-budget=120000',
+        '--window-size=1400,1400', f'--screenshot={picture}', '--dump-dom', visited.as_uri(),
+    ]  # fmt: skip
+    done = subprocess.run(command, capture_output=True, text=True, timeout=100, check=True)
+    page = Page(done.stdout)
+    root = next(attributes for tag, attributes in page.elements if tag == 'html')
+    assert root.get('data-errors') is None
+    assert 'data-ready' in root
+    charts = [a for _, a in page.elements if 'chart' in (a.get('class') or '').split()]
+    assert len(charts) >= 7
+    assert all('data-drawn' in chart for chart in charts), charts
+    assert root['data-pressed'] == '5'
+    assert root['data-titles'] == 'Residual beforeWhat the model gained'
+    assert root['data-eyes'] == '[1.9,1.9]'
+    assert 'Uncaught' not in done.stderr
+    assert 'Content Security Policy' not in done.stderr
+    assert colourful_share(picture) > 0.02
+
+
+def colourful_share(picture: Path) -> float:
+    """Share of pixels that are clearly red or blue: the residual on the part."""
+    rgb = np.asarray(Image.open(picture).convert('RGB'), dtype=int)[600:]
+    return float(np.mean(np.abs(rgb[:, :, 0] - rgb[:, :, 2]) > 40))
