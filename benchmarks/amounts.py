@@ -36,7 +36,7 @@ def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
         angle = hidden['axis_rad']
         return {'tilt_x_rad': amplitude * np.cos(angle), 'tilt_y_rad': amplitude * np.sin(angle)}
     if truth == 'air_drift':
-        # The skin faces +y, so that its right side, seen by the gun, is -x.
+        # The surface faces +y, so that its right side, seen by the gun, is -x.
         x, _, z = hidden['direction']
         return {'shift_down_m': -amplitude * z, 'shift_across_m': -amplitude * x}
     if truth == 'sag':

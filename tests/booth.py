@@ -18,7 +18,7 @@ from paint_deposition.part.surface import Surface
 from scenes import stamps_ns
 
 SAMPLES = Path(__file__).resolve().parent.parent / 'ros2_ws/src/paint_deposition/samples'
-# Tool x along the world's x, tool y down, tool z along +y, into the skin.
+# Tool x along the world's x, tool y down, tool z along +y, into the surface.
 LOOKING_ALONG_Y = Rotation.from_matrix([[1, 0, 0], [0, 0, 1], [0, -1, 0]]).as_quat()
 STANDOFF_M = 0.25
 # A pattern that fits on the panel whole.

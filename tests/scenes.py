@@ -1,4 +1,4 @@
-"""Small worlds for tests: a gun, a way for it, and skin to paint."""
+"""Small worlds for tests: a gun, a way for it, and surface to paint."""
 
 import numpy as np
 from scipy.spatial.transform import Rotation

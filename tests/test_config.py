@@ -7,10 +7,10 @@ import re
 
 import pytest
 import yaml
-from paint_deposition.files.gauge_readings import REQUIRED, read_readings
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import EXPERIMENT_KEYS, TOP_KEYS, read_campaign
+from paint_deposition.files.gauge_readings import REQUIRED, read_readings
 from paint_deposition.files.model_file import read_model
 
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')

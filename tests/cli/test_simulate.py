@@ -315,7 +315,7 @@ def test_readings_off_the_part_are_refused_before_anything_is_written(panel, one
         tmp_path, '--mesh', panel, '--trajectory', one_pass, *COARSE,
         '--at', tmp_path / 'readings.csv',
     )  # fmt: skip
-    assert_refused(done, 'readings.csv', "off the part's skin", '0.5')
+    assert_refused(done, 'readings.csv', "off the part's surface", '0.5')
 
 
 def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):

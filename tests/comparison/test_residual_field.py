@@ -1,4 +1,4 @@
-"""Residuals spread over the skin around the readings."""
+"""Residuals spread over the surface around the readings."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from paint_deposition.comparison.residual_field import (
     radius_of_readings_m,
     reached,
-    spread_over_skin,
+    spread_over_surface,
     spreading,
 )
 from paint_deposition.part.surface import Surface
@@ -44,10 +44,10 @@ def test_neighbours_count_the_nearer_the_more(plate):
 
 
 @pytest.mark.parametrize(('angle_deg', 'same_side'), [(59.0, True), (61.0, False)])
-def test_skin_turned_by_more_than_60_deg_is_another_side(plate, angle_deg, same_side):
+def test_surface_turned_by_more_than_60_deg_is_another_side(plate, angle_deg, same_side):
     angle = np.radians(angle_deg)
     normal = np.array([[np.sin(angle), -np.cos(angle), 0.0]])
-    field = spread_over_skin(plate, np.array([[0.5, 0.0, 0.5]]), normal, np.array([2.0]))
+    field = spread_over_surface(plate, np.array([[0.5, 0.0, 0.5]]), normal, np.array([2.0]))
     front = plate.normals[:, 1] < 0
     assert np.isfinite(field[front]).any() == same_side
     assert np.isnan(field[~front]).all()

@@ -70,7 +70,7 @@ def test_an_effect_differs_from_another_by_no_more_than_it_does(study, fit):
     assert 0.0 < sprays[0].now < np.linalg.norm(change / study.sigma_um)
 
 
-def test_places_lie_on_the_skin_apart_and_off_the_edge(study, fit):
+def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit):
     places, _ = propose(study, Rivals(fit, AirDrift(shift_down_m=0.03), TcpOffset()))
     assert places
     positions = np.array([place.position_m for place in places])

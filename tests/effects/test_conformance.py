@@ -173,17 +173,17 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect], poses: in
 
 
 @EFFECT
-def test_readings_are_predicted_as_the_skin_they_lie_on(effect: type[Effect], passes):
-    skin = painted(door(), passes, effect.typical()).gauge_um
+def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect], passes):
+    sheet = painted(door(), passes, effect.typical()).gauge_um
     some = slice(11, None, 97)
     stencil_m = 0.01 if effect.needs_slope else None
     at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
     integrator = FilmIntegrator(at, MODEL.with_effect(effect.typical()), 'double', door().occluder)
     integrator.add(passes)
-    readings = integrator.gauge_um[: len(skin[some])]
+    readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.
     tolerance = 0.02 if effect.needs_slope else 1e-6
-    np.testing.assert_allclose(readings, skin[some], rtol=0, atol=tolerance * skin.max())
+    np.testing.assert_allclose(readings, sheet[some], rtol=0, atol=tolerance * sheet.max())
 
 
 def test_two_effects_with_laws_multiply():

@@ -19,8 +19,8 @@ from paint_deposition.part.points import SurfacePoints
 RADIUS_M = 0.25
 
 
-def skin(curvature_per_m: float) -> SurfacePoints:
-    """A point on skin of that curvature."""
+def make_surface(curvature_per_m: float) -> SurfacePoints:
+    """A point on surface of that curvature."""
     return SurfacePoints(
         np.zeros((1, 3)), np.array([[0.0, -1.0, 0.0]]), curvature_per_m=np.array([curvature_per_m])
     )
@@ -33,20 +33,24 @@ def skin(curvature_per_m: float) -> SurfacePoints:
         (FaradayShielding(shielding=0.2), 20.0, 20.0, 20.0 * np.exp(-0.2)),
     ],
 )
-def test_film_on_skin_of_250_mm_radius(effect, convex_um, flat_um, concave_um):
+def test_film_on_surface_of_250_mm_radius(effect, convex_um, flat_um, concave_um):
     film = np.array([20.0])
     curvatures = (-1.0 / RADIUS_M, 0.0, 1.0 / RADIUS_M)
-    films = [effect.on_film(film, skin(curvature))[0] for curvature in curvatures]
+    films = [effect.on_film(film, make_surface(curvature))[0] for curvature in curvatures]
     assert films == pytest.approx([convex_um, flat_um, concave_um])
 
 
-def test_the_gauge_reads_high_on_convex_skin_whatever_the_film():
+def test_the_gauge_reads_high_on_convex_surface_whatever_the_film():
     gauge = GaugeCurvatureBias(bias_um=1.5)
     for film_um in (0.0, 40.0):
         film = np.array([film_um])
-        assert gauge.on_gauge(film, skin(-1.0 / RADIUS_M))[0] == pytest.approx(film_um + 1.5)
-        assert gauge.on_gauge(film, skin(1.0 / RADIUS_M))[0] == pytest.approx(film_um - 1.5)
-        assert gauge.on_film(film, skin(1.0 / RADIUS_M))[0] == film_um
+        assert gauge.on_gauge(film, make_surface(-1.0 / RADIUS_M))[0] == pytest.approx(
+            film_um + 1.5
+        )
+        assert gauge.on_gauge(film, make_surface(1.0 / RADIUS_M))[0] == pytest.approx(
+            film_um - 1.5
+        )
+        assert gauge.on_film(film, make_surface(1.0 / RADIUS_M))[0] == film_um
 
 
 def test_gauges_change_readings_and_not_the_film():

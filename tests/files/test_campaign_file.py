@@ -51,7 +51,7 @@ def test_the_sample_arrives_whole(repository):
     assert told[0] == 'reading panel'
     door = campaign.experiments[1]
     assert len(door.readings) == campaign.reading_count - len(campaign.experiments[0].readings)
-    assert len(door.points) == 3 * len(door)  # each with a neighbour up and one down the skin
+    assert len(door.points) == 3 * len(door)  # each with a neighbour up and one down the surface
     assert door.files['mesh'].endswith('measured_door/door.stl')
     assert set(door.groups) - {''}
 
@@ -141,11 +141,11 @@ def test_readings_in_millimetres_are_refused_with_the_remedy(campaign, folder):
         return [str(1e3 * float(v)) if k in ('x_m', 'y_m', 'z_m') else v for k, v in row.items()]
 
     path = campaign(measurements=changed_readings(folder, in_millimetres))
-    with pytest.raises(PaintError, match=r"lie off the part's skin.*mesh frame, in metres"):
+    with pytest.raises(PaintError, match=r"lie off the part's surface.*mesh frame, in metres"):
         read_campaign(path)
 
 
-def test_readings_off_the_skin_are_counted_and_the_worst_named(campaign, folder):
+def test_readings_off_the_surface_are_counted_and_the_worst_named(campaign, folder):
     def off(row):
         moved = float(row['y_m']) - (0.06 if row['point'] == 'P003' else 0.0)
         return [str(moved) if key == 'y_m' else value for key, value in row.items()]
@@ -162,6 +162,6 @@ def test_normals_pointing_into_the_part_are_refused(campaign, folder):
     inward = [f'{rows[0]},nx,ny,nz', *(f'{row},0,-1,0' for row in rows[1:])]
     (folder / 'inward.csv').write_text('\n'.join(inward) + '\n')
     with pytest.raises(
-        PaintError, match=r'normals point away from the skin.*give outward normals'
+        PaintError, match=r'normals point away from the surface.*give outward normals'
     ):
         read_campaign(campaign(measurements='inward.csv'))

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from paint_deposition.files.gauge_readings import read_readings, write_predictions
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.gauge_readings import read_readings, write_predictions
 
 HEADER = 'x_m,y_m,z_m,thickness_um'
 

@@ -7,7 +7,7 @@ from trimesh.creation import box, icosphere
 
 from paint_deposition.errors import MeshError
 from paint_deposition.files.meshes import read_mesh, write_mesh_ply
-from skins import triangulated
+from surfaces import triangulated
 
 
 def sheet(size_m=0.4) -> trimesh.Trimesh:
@@ -47,7 +47,7 @@ def test_millimetres_with_scale(tmp_path):
     assert read_mesh(path, scale=0.001).area_m2 == pytest.approx(0.16)
 
 
-def test_an_open_skin_faces_as_it_is_wound(tmp_path):
+def test_an_open_surface_faces_as_it_is_wound(tmp_path):
     mesh = sheet()
     front = read_mesh(saved(mesh, tmp_path / 'front.stl'))
     mesh.invert()

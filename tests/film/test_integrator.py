@@ -28,7 +28,7 @@ from scenes import (
     straight_pass,
     weaving,
 )
-from skins import triangulated
+from surfaces import triangulated
 
 MODEL = DepositionModel()
 # All of it lands within 0.3 m of the axis at the standoffs used here.

@@ -117,7 +117,7 @@ class Inclined:
 
 
 def inclined(folder: Path) -> Inclined:
-    """Read the coating's thicknesses and project the axis onto skin inclined as much."""
+    """Read the coating's thicknesses and project the axis onto surface inclined as much."""
     rows = table(folder / 'hvof_wc17co_thickness_angle_standoff.csv')
     lean = np.radians(90.0 - rows[:, 0])
     normals = np.stack([np.sin(lean), np.zeros(len(lean)), -np.cos(lean)], axis=1)

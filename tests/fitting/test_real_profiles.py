@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fitting.real_profiles import LANE_SPACING_FT, aicc, inclined, spot, table, transect
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 
 
 def test_eq3_follows_a_moving_sprinkler_but_one_gaussian_would_do(shared_data):
@@ -26,7 +26,7 @@ def test_overlapped_lanes_are_as_uneven_as_the_transect_itself(shared_data):
         for k in range(-2, 3)
     ]
     total = np.sum(lanes, axis=0)
-    predicted = Raster.one_way(measured.three.collapse).sigma_n(LANE_SPACING_FT)
+    predicted = ParallelPasses.one_way(measured.three.collapse).sigma_n(LANE_SPACING_FT)
     assert predicted == pytest.approx(total.std() / total.mean(), abs=0.01)
     assert 0.10 < predicted < 0.13
 

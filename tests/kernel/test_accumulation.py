@@ -36,7 +36,7 @@ PROJECTIONS = {
 TOLERANCE = {'single': 1e-5, 'double': 1e-6}
 
 
-def rough_skin(seed=3, count=900):
+def rough_surface(seed=3, count=900):
     """Points scattered about a plane that look anywhere, mostly up."""
     rng = np.random.default_rng(seed)
     positions = rng.uniform(-1.0, 1.0, (count, 3)) * [0.7, 0.7, 0.08]
@@ -69,7 +69,7 @@ def film_um(points, path, model, precision='single'):
 @pytest.mark.parametrize('planar', PATTERNS.values(), ids=PATTERNS)
 def test_it_computes_eqs_1_and_2(planar, projection, precision):
     model = DepositionModel(planar=planar, projection=projection)
-    points = rough_skin()
+    points = rough_surface()
     path, _ = spray_path(weaving(np.arange(0.0, 3.0, 0.05)))
     expected = reference_um(points, path, model)
     assert np.count_nonzero(expected) > 100

@@ -150,7 +150,7 @@ def test_no_negative_or_infinite_flux_from_anywhere(position, seed, offset, K3):
     assert got[0] >= 0.0
 
 
-def test_skin_that_looks_away_gets_none():
+def test_surface_that_looks_away_gets_none():
     away = [[0, 0, -1], [0.6, 0, -0.8], [1, 0, -1e-9]]
     assert flux(np.zeros((3, 3)), away, [0, 0, 0.25]).tolist() == [0, 0, 0]
 

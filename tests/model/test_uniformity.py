@@ -12,7 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.collapse import ThreeGaussianCollapse
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.uniformity import Raster, sigma_n_closed_form, variation
+from paint_deposition.model.uniformity import ParallelPasses, sigma_n_closed_form, variation
 
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,
@@ -47,13 +47,13 @@ def sigma_n_by_quadrature(collapse, index_m):
 def test_closed_form_matches_adaptive_quadrature(index_m):
     expected = sigma_n_by_quadrature(EQ3, index_m)
     assert sigma_n_closed_form(EQ3, index_m) == pytest.approx(expected, abs=1e-9)
-    assert Raster.one_way(EQ3).sigma_n(index_m) == pytest.approx(expected, abs=1e-9)
+    assert ParallelPasses.one_way(EQ3).sigma_n(index_m) == pytest.approx(expected, abs=1e-9)
 
 
 @given(collapse=collapses, index_m=st.floats(0.1, 1.0))
 def test_closed_form_and_quadrature_agree_for_any_three_gaussians(collapse, index_m):
     closed = sigma_n_closed_form(collapse, index_m)
-    assert Raster.one_way(collapse).sigma_n(index_m) == pytest.approx(closed, abs=1e-8)
+    assert ParallelPasses.one_way(collapse).sigma_n(index_m) == pytest.approx(closed, abs=1e-8)
 
 
 @pytest.mark.parametrize('index_m', INDICES_M)
@@ -78,11 +78,11 @@ def test_single_gaussian_has_its_known_sigma_n():
 
 
 def test_sigma_n_ignores_level_shift_and_mirroring():
-    raster = Raster.one_way(EQ3)
+    raster = ParallelPasses.one_way(EQ3)
     for index in INDICES_M:
-        level = Raster.one_way(EQ3.scaled(7.0)).sigma_n(index)
+        level = ParallelPasses.one_way(EQ3.scaled(7.0)).sigma_n(index)
         assert level == pytest.approx(raster.sigma_n(index), rel=1e-10)
-        mirrored = Raster.one_way(EQ3.mirrored()).sigma_n(index)
+        mirrored = ParallelPasses.one_way(EQ3.mirrored()).sigma_n(index)
         assert mirrored == pytest.approx(raster.sigma_n(index), rel=1e-10)
 
 
@@ -97,21 +97,21 @@ def test_dense_passes_are_even_and_distant_ones_are_not():
 def test_ring_pattern_is_most_even_near_its_half_width(index_m, percent):
     """Figures computed apart from this code for (K2, r, s1, s2) = (0.15, 220, 90, 150 mm)."""
     planar = PlanarPattern(K2=0.15, K3=0.0, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15)
-    raster = Raster.one_way(sampled_collapse(DepositionModel(planar=planar), 0.2))
+    raster = ParallelPasses.one_way(sampled_collapse(DepositionModel(planar=planar), 0.2))
     assert 100.0 * raster.sigma_n(index_m) == pytest.approx(percent, abs=0.06)
 
 
 @pytest.mark.parametrize('index_m', INDICES_M)
 def test_sigma_n_of_the_2d_model_matches_dense_quadrature(index_m):
     pass_ = sampled_collapse(DepositionModel(), 0.2)
-    dense = Raster.one_way(pass_).thickness_um(index_m, np.arange(20000) / 20000 * index_m)
+    dense = ParallelPasses.one_way(pass_).thickness_um(index_m, np.arange(20000) / 20000 * index_m)
     expected = dense.std() / dense.mean()
-    assert Raster.one_way(pass_).sigma_n(index_m) == pytest.approx(expected, abs=1e-6)
-    assert dense.mean() == pytest.approx(Raster.one_way(pass_).mean_um(index_m), rel=1e-6)
+    assert ParallelPasses.one_way(pass_).sigma_n(index_m) == pytest.approx(expected, abs=1e-6)
+    assert dense.mean() == pytest.approx(ParallelPasses.one_way(pass_).mean_um(index_m), rel=1e-6)
 
 
 def test_alternating_mirrored_passes():
-    raster = Raster(EQ3, EQ3.mirrored())
+    raster = ParallelPasses(EQ3, EQ3.mirrored())
     index = 0.5
     x = np.linspace(0.0, 2.0 * index, 4001)[:-1]
     by_hand = sum(
@@ -119,7 +119,7 @@ def test_alternating_mirrored_passes():
     )
     np.testing.assert_allclose(raster.thickness_um(index, x), by_hand, rtol=1e-12)
     assert raster.sigma_n(index) == pytest.approx(by_hand.std() / by_hand.mean(), rel=1e-9)
-    assert raster.sigma_n(index) > 1.01 * Raster.one_way(EQ3).sigma_n(index)
+    assert raster.sigma_n(index) > 1.01 * ParallelPasses.one_way(EQ3).sigma_n(index)
 
 
 def test_mirroring_a_symmetric_pass_changes_nothing():
@@ -128,8 +128,10 @@ def test_mirroring_a_symmetric_pass_changes_nothing():
         sigma1_m=0.09, sigma2_m=0.09, sigma3_m=0.15,
     )  # fmt: skip
     for index in INDICES_M:
-        alternating = Raster(symmetric, symmetric.mirrored()).sigma_n(index)
-        assert alternating == pytest.approx(Raster.one_way(symmetric).sigma_n(index), abs=1e-10)
+        alternating = ParallelPasses(symmetric, symmetric.mirrored()).sigma_n(index)
+        assert alternating == pytest.approx(
+            ParallelPasses.one_way(symmetric).sigma_n(index), abs=1e-10
+        )
 
 
 def test_finite_passes_by_quadrature_match_the_closed_form():
@@ -151,5 +153,5 @@ def test_three_passes_are_even_inside_and_not_to_their_ends():
     pass_ = sampled_collapse(DepositionModel(), 0.2)
     passes = [(pass_, k * index) for k in (-1, 0, 1)]
     inside = variation(passes, -0.5 * index, 0.5 * index)
-    assert inside.sigma_n == pytest.approx(Raster.one_way(pass_).sigma_n(index), rel=0.05)
+    assert inside.sigma_n == pytest.approx(ParallelPasses.one_way(pass_).sigma_n(index), rel=0.05)
     assert variation(passes, -2.0 * index, 2.0 * index).sigma_n > 3.0 * inside.sigma_n

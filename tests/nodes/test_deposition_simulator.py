@@ -88,7 +88,7 @@ def test_a_state_that_comes_after_poses_of_its_time_still_cuts_there(simulator, 
     assert node.film.counts.late_triggers == 0
 
 
-def test_a_skin_turned_inside_out_is_painted_all_the_same(simulator, robot, painted, tmp_path):
+def test_a_surface_turned_inside_out_is_painted_all_the_same(simulator, robot, painted, tmp_path):
     right = simulator()
     wrong = simulator(mesh_file=str(write_panel(tmp_path / 'reversed.stl', reverse=True)))
     robot(right, wrong).send(MOTION)

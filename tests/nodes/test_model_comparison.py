@@ -9,7 +9,6 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from paint_deposition.files.gauge_readings import write_table
 from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -18,6 +17,7 @@ from nodes.cell import Onlooker, offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.film.colour_scales import BARE_RGB
@@ -155,7 +155,7 @@ def test_predictions_are_those_of_an_offline_run_in_double_precision(
     )
 
 
-def test_the_skin_is_coloured_around_readings_and_grey_elsewhere(
+def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     comparison, robot, viewer, wait_until
 ):
     node = comparison(color_radius_m=0.06, color_max_um=5.0)
@@ -209,7 +209,7 @@ def test_unknown_noise_is_said_to_be_unknown(comparison, viewer, wait_until, tmp
         ({'measurements_file': ''}, 'measurements_file is empty'),
         ({'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
         ({'mesh_file': ''}, 'mesh_file is empty'),
-        ({'mesh_scale': 0.01}, "lie off the part's skin"),
+        ({'mesh_scale': 0.01}, "lie off the part's surface"),
     ],
 )
 def test_bad_input_is_one_line(comparison, values, words):

@@ -1,4 +1,4 @@
-"""Skins of known shape as fixtures."""
+"""Surfaces of known shape as fixtures."""
 
 from collections.abc import Callable
 
@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from paint_deposition.part.surface import Surface
-from skins import Depth, triangulated
+from surfaces import Depth, triangulated
 
 
 @pytest.fixture
-def skin() -> Callable[..., Surface]:
-    """Builder of refined skins y = depth(x, z); see ``triangulated``."""
+def make_surface() -> Callable[..., Surface]:
+    """Builder of refined surfaces y = depth(x, z); see ``triangulated``."""
 
     def build(depth: Depth, spacing_m: float, max_edge_length_m: float = 0.01, **shape) -> Surface:
         return Surface.from_triangles(*triangulated(depth, spacing_m, **shape), max_edge_length_m)

@@ -1,4 +1,4 @@
-"""A sheet drawn as a solid, with thickness, inner skin and rim, is the same part to the gun."""
+"""A sheet drawn as a solid, with thickness, inner surface and rim, is the same part to the gun."""
 
 from functools import cache
 
@@ -11,7 +11,7 @@ from paint_deposition.model.projection import Projection
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from skins import hemmed, solid, triangulated
+from surfaces import hemmed, solid, triangulated
 
 STANDOFF_M = 0.25
 SIDES = {'-y': 0.0, '+x': 90.0, '+y': 180.0, '-x': 270.0, 'askew': 205.0}
@@ -28,7 +28,7 @@ def door_depth(x, z):
 
 @cache
 def parts(side: str, thickness_m: float, drawn_along: str = 'normals') -> tuple[Surface, Surface]:
-    """The outer skin alone and the solid, both seen by the gun; see ``solid``."""
+    """The outer surface alone and the solid, both seen by the gun; see ``solid``."""
     open_sheet = triangulated(door_depth, 0.015, 0.5 * WIDTH_M, 0.5 * HEIGHT_M, jitter=0.2)
     turn = Rotation.from_euler('z', SIDES[side], degrees=True)
     looking = turn.apply([0.0, 1.0, 0.0])
@@ -48,7 +48,7 @@ def on_both(sheet: Surface, shell: Surface) -> tuple[SurfacePoints, SurfacePoint
 
 
 def assert_same_edge(there: SurfacePoints, alone: SurfacePoints) -> None:
-    """Far from the edge that of the inner skin can be a little nearer than one's own."""
+    """Far from the edge that of the inner surface can be a little nearer than one's own."""
     near = alone.edge_distance_m < 0.05
     np.testing.assert_allclose(there.edge_distance_m[near], alone.edge_distance_m[near], atol=1e-9)
     assert (there.edge_distance_m[~near] > 0.05).all()
@@ -60,7 +60,7 @@ def context(surface: Surface) -> PathContext:
 
 @pytest.mark.parametrize('thickness_m', [0.003, 0.012, 0.04])
 @pytest.mark.parametrize('side', SIDES)
-def test_the_outer_skin_of_the_solid_is_the_sheet(side, thickness_m):
+def test_the_outer_surface_of_the_solid_is_the_sheet(side, thickness_m):
     sheet, shell = parts(side, thickness_m)
     alone, there = on_both(sheet, shell)
     np.testing.assert_allclose(there.positions_m, alone.positions_m, atol=1e-9)
@@ -112,7 +112,7 @@ def test_any_motion_in_front_tells_the_same_side_to_the_last_bit(tilt_deg, poses
     assert toward_the_gun(shell, eyes, axes) is shell
 
 
-def test_a_rim_cut_straight_through_a_leaning_skin_is_an_edge():
+def test_a_rim_cut_straight_through_a_leaning_surface_is_an_edge():
     sheet, shell = parts('-y', 0.012, drawn_along='y')
     alone, there = on_both(sheet, shell)
     np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)

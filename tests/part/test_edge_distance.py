@@ -7,15 +7,15 @@ from trimesh.creation import box, icosphere
 from paint_deposition.part.surface import Surface
 
 
-def test_a_sheet_has_its_rim(skin, flat):
-    points = skin(flat, 0.05, jitter=0.3).points()
+def test_a_sheet_has_its_rim(make_surface, flat):
+    points = make_surface(flat, 0.05, jitter=0.3).points()
     expected = 0.2 - np.abs(points.positions_m[:, [0, 2]]).max(axis=1)
     np.testing.assert_allclose(points.edge_distance_m, expected, atol=1e-9)
 
 
-def test_refinement_leaves_the_rim_alone(skin, cylinder):
-    coarse = skin(cylinder(0.5), 0.02, max_edge_length_m=0.02)
-    fine = skin(cylinder(0.5), 0.02, max_edge_length_m=0.005)
+def test_refinement_leaves_the_rim_alone(make_surface, cylinder):
+    coarse = make_surface(cylinder(0.5), 0.02, max_edge_length_m=0.02)
+    fine = make_surface(cylinder(0.5), 0.02, max_edge_length_m=0.005)
     places = coarse.vertices_m[::7]
     np.testing.assert_allclose(
         coarse.at(places).edge_distance_m, fine.at(places).edge_distance_m, atol=1e-9
@@ -35,8 +35,8 @@ def test_a_closed_plate_ends_where_it_folds_back():
     assert middle.edge_distance_m[0] == pytest.approx(0.15)
 
 
-def test_a_concave_corner_is_no_edge(skin, fold):
-    surface = skin(fold(np.radians(-50)), 0.05)
+def test_a_concave_corner_is_no_edge(make_surface, fold):
+    surface = make_surface(fold(np.radians(-50)), 0.05)
     assert surface.at([[0.0, 0.0, 0.0]]).edge_distance_m[0] == pytest.approx(0.2, abs=1e-6)
 
 

@@ -1,4 +1,4 @@
-"""Normals are those of the curved skin, whatever its triangulation."""
+"""Normals are those of the curved surface, whatever its triangulation."""
 
 import numpy as np
 import pytest
@@ -23,24 +23,24 @@ def ball_normals(radius_m):
     return exact
 
 
-def test_a_plane_is_exact(skin, flat):
-    surface = skin(flat, 0.05, jitter=0.35)
+def test_a_plane_is_exact(make_surface, flat):
+    surface = make_surface(flat, 0.05, jitter=0.35)
     np.testing.assert_allclose(surface.normals, np.tile([0.0, -1, 0], (len(surface.normals), 1)))
 
 
 @pytest.mark.parametrize(
     ('spacing_m', 'jitter', 'rms_deg'), [(0.01, 0.0, 0.001), (0.04, 0.35, 0.02), (0.1, 0.35, 0.2)]
 )
-def test_a_ball_up_to_the_rim(skin, ball, spacing_m, jitter, rms_deg):
-    surface = skin(ball(0.8), spacing_m, half_width_m=0.4, jitter=jitter)
+def test_a_ball_up_to_the_rim(make_surface, ball, spacing_m, jitter, rms_deg):
+    surface = make_surface(ball(0.8), spacing_m, half_width_m=0.4, jitter=jitter)
     off = np.degrees(normals_off_rad(surface, ball_normals(0.8)))
     assert np.sqrt(np.mean(off**2)) < rms_deg
     assert off.max() < 5 * rms_deg
 
 
-def test_closer_triangles_are_closer_to_the_curve(skin, ball):
+def test_closer_triangles_are_closer_to_the_curve(make_surface, ball):
     coarse, fine = (
-        normals_off_rad(skin(ball(0.8), h, half_width_m=0.4), ball_normals(0.8)).max()
+        normals_off_rad(make_surface(ball(0.8), h, half_width_m=0.4), ball_normals(0.8)).max()
         for h in (0.08, 0.04)
     )
     assert fine < 0.6 * coarse
@@ -55,8 +55,11 @@ def test_a_box_keeps_its_edges_sharp():
     assert (outward > 0.0).all()
 
 
-def test_a_coarse_round_bar_is_smooth_and_a_square_one_is_not(skin, fold):
-    slight, sharp = skin(fold(np.radians(12)), 0.05), skin(fold(np.radians(20)), 0.05)
+def test_a_coarse_round_bar_is_smooth_and_a_square_one_is_not(make_surface, fold):
+    slight, sharp = (
+        make_surface(fold(np.radians(12)), 0.05),
+        make_surface(fold(np.radians(20)), 0.05),
+    )
     on_line = [np.abs(s.vertices_m[:, 2]) < 1e-9 for s in (slight, sharp)]
     np.testing.assert_allclose(slight.normals[on_line[0]][:, 2], 0.0, atol=1e-9)
     tilt = np.degrees(np.arcsin(np.abs(sharp.normals[on_line[1]][:, 2])))

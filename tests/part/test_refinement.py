@@ -22,8 +22,8 @@ def test_area_is_kept_and_edges_are_short(triangles, ball, max_edge_length_m):
     assert surface.longest_edge_m <= max_edge_length_m
 
 
-def test_no_cracks(skin, ball):
-    surface = skin(ball(0.5), 0.06, max_edge_length_m=0.013, jitter=0.35)
+def test_no_cracks(make_surface, ball):
+    surface = make_surface(ball(0.5), 0.06, max_edge_length_m=0.013, jitter=0.35)
     edges = np.sort(np.concatenate([surface.faces[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1)
     uses = Counter(map(tuple, edges.tolist()))
     ends = np.array([edge for edge, count in uses.items() if count == 1])
@@ -33,7 +33,7 @@ def test_no_cracks(skin, ball):
 
 
 @pytest.mark.parametrize('seed', range(8))
-def test_slivers_and_all_stay_one_skin(seed):
+def test_slivers_and_all_stay_one_surface(seed):
     rng = np.random.default_rng(seed)
     flat = rng.random((60, 2)) * [1.0, 0.05 + rng.random()]
     flat[:20, 1] *= 0.01

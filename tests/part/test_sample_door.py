@@ -16,7 +16,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from skins import triangulated
+from surfaces import triangulated
 
 
 @pytest.fixture(scope='module')

@@ -1,4 +1,4 @@
-"""The slope operator is the derivative along gravity's component in the skin."""
+"""The slope operator is the derivative along gravity's component in the surface."""
 
 import numpy as np
 import pytest
@@ -10,33 +10,33 @@ def linear(points_m):
     return points_m @ np.array([3.0, -2.0, 5.0]) + 1.0
 
 
-def test_exact_for_linear_fields_on_a_standing_plane(skin, flat):
-    points = skin(flat, 0.03, jitter=0.3).points()
+def test_exact_for_linear_fields_on_a_standing_plane(make_surface, flat):
+    points = make_surface(flat, 0.03, jitter=0.3).points()
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), -5.0)
 
 
-def test_constant_fields_have_none(skin, ball):
-    points = skin(ball(0.5), 0.03, jitter=0.3).points()
+def test_constant_fields_have_none(make_surface, ball):
+    points = make_surface(ball(0.5), 0.03, jitter=0.3).points()
     np.testing.assert_allclose(points.slope_per_m @ np.ones(len(points)), 0.0, atol=1e-9)
 
 
-def test_leaning_skin_has_the_sine_of_its_lean(skin):
+def test_leaning_surface_has_the_sine_of_its_lean(make_surface):
     lean = np.radians(30)
-    points = skin(lambda x, z: z * np.tan(lean), 0.03).points()
-    down_the_skin = np.array([0.0, -np.sin(lean), -np.cos(lean)])
-    expected = np.cos(lean) * np.array([3.0, -2.0, 5.0]) @ down_the_skin
+    points = make_surface(lambda x, z: z * np.tan(lean), 0.03).points()
+    down_the_surface = np.array([0.0, -np.sin(lean), -np.cos(lean)])
+    expected = np.cos(lean) * np.array([3.0, -2.0, 5.0]) @ down_the_surface
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), expected)
 
 
-def test_level_skin_has_none(triangles, flat):
+def test_level_surface_has_none(triangles, flat):
     vertices, faces = triangles(flat, 0.05)
     lying = vertices[:, [0, 2, 1]] * [1, 1, -1]
     points = Surface.from_triangles(lying, faces, 0.02, down=[0, 0, -1]).points()
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), 0.0, atol=1e-9)
 
 
-def test_second_order_on_a_curved_skin(skin, cylinder):
-    points = skin(cylinder(0.5), 0.01).points()
+def test_second_order_on_a_curved_surface(make_surface, cylinder):
+    points = make_surface(cylinder(0.5), 0.01).points()
     inside = np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < 0.18
     angle = np.arcsin(points.positions_m[:, 2] / 0.5)
     slope = points.slope_per_m @ np.sin(6.0 * angle)
@@ -44,8 +44,8 @@ def test_second_order_on_a_curved_skin(skin, cylinder):
     np.testing.assert_allclose(slope[inside], exact[inside], atol=0.02 * 12.0)
 
 
-def test_readings_get_the_slope_from_their_neighbours(skin, cylinder):
-    surface = skin(cylinder(0.5), 0.01)
+def test_readings_get_the_slope_from_their_neighbours(make_surface, cylinder):
+    surface = make_surface(cylinder(0.5), 0.01)
     readings = np.array([[0.0, 0.0, 0.02], [0.05, 0.01, -0.1], [-0.1, 0.0, 0.1]])
     points = surface.at(readings, stencil_m=0.006)
     assert len(points) == 9
@@ -58,13 +58,13 @@ def test_readings_get_the_slope_from_their_neighbours(skin, cylinder):
 
 
 @pytest.mark.parametrize('z_m', [0.2, -0.2])
-def test_readings_on_the_rim_get_the_one_sided_slope(skin, flat, z_m):
-    points = skin(flat, 0.05).at(np.array([[0.0, 0.0, z_m]]), stencil_m=0.006)
+def test_readings_on_the_rim_get_the_one_sided_slope(make_surface, flat, z_m):
+    points = make_surface(flat, 0.05).at(np.array([[0.0, 0.0, z_m]]), stencil_m=0.006)
     assert (points.slope_per_m @ linear(points.positions_m))[0] == pytest.approx(-5.0)
 
 
-def test_selecting_readings_keeps_slopes_only_with_their_neighbours(skin, flat):
-    points = skin(flat, 0.05).at(np.array([[0.0, 0, 0], [0.1, 0, 0.1]]), stencil_m=0.006)
+def test_selecting_readings_keeps_slopes_only_with_their_neighbours(make_surface, flat):
+    points = make_surface(flat, 0.05).at(np.array([[0.0, 0, 0], [0.1, 0, 0.1]]), stencil_m=0.006)
     chosen = points.select([1, 3, 5])
     assert (chosen.slope_per_m @ linear(chosen.positions_m))[0] == pytest.approx(-5.0)
     alone = points.select([0, 1, 3])

@@ -1,4 +1,4 @@
-"""Where points lie on the skin, and which way is down."""
+"""Where points lie on the surface, and which way is down."""
 
 import pickle
 
@@ -14,8 +14,8 @@ def thin_plate(thickness_m=0.002):
     return Surface.from_triangles(plate.vertices, np.asarray(plate.faces), 0.02)
 
 
-def test_locates_on_a_ball(skin, ball):
-    surface = skin(ball(0.5), 0.01, half_width_m=0.3)
+def test_locates_on_a_ball(make_surface, ball):
+    surface = make_surface(ball(0.5), 0.01, half_width_m=0.3)
     rng = np.random.default_rng(0)
     foot = np.stack([rng.uniform(-0.2, 0.2, 300), np.zeros(300), rng.uniform(-0.2, 0.2, 300)], 1)
     foot[:, 1] = 0.5 - np.sqrt(0.25 - foot[:, 0] ** 2 - foot[:, 2] ** 2)
@@ -30,8 +30,8 @@ def test_locates_on_a_ball(skin, ball):
     np.testing.assert_allclose(again, place.positions_m, atol=1e-9)
 
 
-def test_agrees_with_every_triangle_tried(skin):
-    surface = skin(lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.03, jitter=0.3)
+def test_agrees_with_every_triangle_tried(make_surface):
+    surface = make_surface(lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.03, jitter=0.3)
     points = np.random.default_rng(1).uniform([-0.3, -0.2, -0.3], [0.3, 0.2, 0.3], (40, 3))
     found = surface.locate(points).distance_m
     from trimesh.triangles import closest_point
@@ -52,19 +52,19 @@ def test_the_side_that_the_normal_agrees_with_wins():
     np.testing.assert_allclose(back.normals, [[0.0, 1.0, 0.0]], atol=1e-12)
 
 
-def test_a_normal_that_nothing_agrees_with_shows_in_the_angle(skin, flat):
-    place = skin(flat, 0.05).locate([[0.0, 0.01, 0.0]], normals=[[0.0, 1.0, 0.0]])
+def test_a_normal_that_nothing_agrees_with_shows_in_the_angle(make_surface, flat):
+    place = make_surface(flat, 0.05).locate([[0.0, 0.01, 0.0]], normals=[[0.0, 1.0, 0.0]])
     assert place.angle_rad[0] == pytest.approx(np.pi)
     assert place.distance_m[0] == pytest.approx(0.01)
 
 
-def test_readings_in_another_frame_are_found_far(skin, flat):
-    place = skin(flat, 0.05).locate([[12.0, 0.0, 0.0]])
+def test_readings_in_another_frame_are_found_far(make_surface, flat):
+    place = make_surface(flat, 0.05).locate([[12.0, 0.0, 0.0]])
     assert place.distance_m[0] == pytest.approx(11.8, rel=1e-3)
 
 
-def test_no_points_are_no_trouble(skin, flat):
-    surface = skin(flat, 0.05)
+def test_no_points_are_no_trouble(make_surface, flat):
+    surface = make_surface(flat, 0.05)
     assert len(surface.at(np.empty((0, 3)), stencil_m=0.006)) == 0
 
 
@@ -78,41 +78,41 @@ def test_a_standing_part_has_z_up_and_a_lying_one_y(triangles, flat):
     np.testing.assert_array_equal(told.down, [0, 1, 0])
 
 
-def test_height_runs_from_the_lowest_to_the_highest_point(skin, flat):
-    surface = skin(flat, 0.05)
+def test_height_runs_from_the_lowest_to_the_highest_point(make_surface, flat):
+    surface = make_surface(flat, 0.05)
     readings = surface.at([[0.0, 0.0, -0.2], [0.1, 0.0, 0.0], [0.0, 0.0, 0.2]])
     np.testing.assert_allclose(readings.height_fraction, [0.0, 0.5, 1.0], atol=1e-12)
 
 
-def test_readings_see_the_covariates_of_the_vertices_they_lie_on(skin, cylinder):
-    points = skin(cylinder(-0.3), 0.02).points()
-    surface = skin(cylinder(-0.3), 0.02)
+def test_readings_see_the_covariates_of_the_vertices_they_lie_on(make_surface, cylinder):
+    points = make_surface(cylinder(-0.3), 0.02).points()
+    surface = make_surface(cylinder(-0.3), 0.02)
     some = slice(None, None, 50)
     at = surface.at(points.positions_m[some], points.normals[some])
-    for name in ('curvature_per_m', 'edge_distance_m', 'openness', 'height_fraction'):
+    for name in ('curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction'):
         np.testing.assert_allclose(getattr(at, name), getattr(points, name)[some], atol=1e-6)
 
 
-def test_readings_know_the_whole_part(skin, cylinder):
-    surface = skin(cylinder(0.3), 0.05)
+def test_readings_know_the_whole_part(make_surface, cylinder):
+    surface = make_surface(cylinder(0.3), 0.05)
     readings = surface.at([[0.1, 0.0, 0.15]])
     for name in ('down', 'outward', 'centre_m'):
         np.testing.assert_array_equal(getattr(readings, name), getattr(surface.points(), name))
 
 
-def test_a_selection_keeps_what_belongs_to_its_points(skin, cylinder):
-    points = skin(cylinder(-0.3), 0.05).points()
+def test_a_selection_keeps_what_belongs_to_its_points(make_surface, cylinder):
+    points = make_surface(cylinder(-0.3), 0.05).points()
     chosen = points.select(points.positions_m[:, 2] > 0.1)
     rows = np.flatnonzero(points.positions_m[:, 2] > 0.1)
-    for name in ('positions_m', 'normals', 'area_m2', 'curvature_per_m', 'openness',
+    for name in ('positions_m', 'normals', 'area_m2', 'curvature_per_m', 'sky_view_factor',
                  'edge_distance_m', 'height_fraction'):  # fmt: skip
         np.testing.assert_array_equal(getattr(chosen, name), getattr(points, name)[rows])
 
 
-def test_surface_and_points_go_to_other_processes(skin, cylinder):
-    surface = skin(cylinder(0.5), 0.05)
+def test_surface_and_points_go_to_other_processes(make_surface, cylinder):
+    surface = make_surface(cylinder(0.5), 0.05)
     points = surface.points()
     again = pickle.loads(pickle.dumps(surface)).points()
     copied = pickle.loads(pickle.dumps(points))
-    np.testing.assert_array_equal(copied.openness, points.openness)
+    np.testing.assert_array_equal(copied.sky_view_factor, points.sky_view_factor)
     np.testing.assert_array_equal(again.curvature_per_m, points.curvature_per_m)

@@ -8,16 +8,16 @@ from trimesh.util import concatenate
 from paint_deposition.part.surface import Surface
 
 
-def test_all_of_an_open_skin_is_seen(skin, ball):
-    surface = skin(ball(0.5), 0.02, jitter=0.3)
+def test_all_of_an_open_surface_is_seen(make_surface, ball):
+    surface = make_surface(ball(0.5), 0.02, jitter=0.3)
     eyes = np.array([[0.0, -0.3, 0.0], [0.3, -0.4, 0.2]])
     seen = surface.occluder.visible(eyes, surface.vertices_m)
     assert seen.shape == (2, len(surface.vertices_m))
     assert seen.all()
 
 
-def test_concave_skin_sees_its_eye(skin, ball):
-    surface = skin(ball(-0.3), 0.02)
+def test_concave_surface_sees_its_eye(make_surface, ball):
+    surface = make_surface(ball(-0.3), 0.02)
     assert surface.occluder.visible([[0.0, -0.3, 0.0]], surface.vertices_m).all()
 
 
@@ -42,18 +42,22 @@ def test_far_from_the_origin_nothing_is_lost(triangles, ball):
     assert surface.occluder.visible([offset - np.array([0.0, 0.3, 0.0])], surface.vertices_m).all()
 
 
-def test_openness_of_a_plane_and_of_convex_skin_is_one(skin, flat, ball):
-    np.testing.assert_array_equal(skin(flat, 0.05).points().openness, 1.0)
-    np.testing.assert_allclose(skin(ball(0.4), 0.01).points().openness, 1.0, atol=2e-3)
+def test_sky_view_factor_of_a_plane_and_of_convex_surface_is_one(make_surface, flat, ball):
+    np.testing.assert_array_equal(make_surface(flat, 0.05).points().sky_view_factor, 1.0)
+    np.testing.assert_allclose(
+        make_surface(ball(0.4), 0.01).points().sky_view_factor, 1.0, atol=2e-3
+    )
 
 
 @pytest.mark.parametrize('opening_deg', [60.0, 90.0, 140.0])
 @pytest.mark.parametrize('share', [0.2, 0.5, 0.9])
-def test_openness_in_a_groove(skin, fold, opening_deg, share):
+def test_sky_view_factor_in_a_groove(make_surface, fold, opening_deg, share):
     half = np.radians(opening_deg) / 2
     slant_m, length_m = 0.1, 3.0
     depth_m = slant_m * np.sin(half)
-    groove = skin(fold(half - np.pi / 2), 0.1, 0.1, half_width_m=length_m, half_height_m=depth_m)
+    groove = make_surface(
+        fold(half - np.pi / 2), 0.1, 0.1, half_width_m=length_m, half_height_m=depth_m
+    )
     s = share * slant_m
     point = np.array([[0.0, -s * np.cos(half), s * np.sin(half)]])
     # The other wall hides what lies between this wall and its own lip: (1 - sin) / 2, with the
@@ -61,7 +65,7 @@ def test_openness_in_a_groove(skin, fold, opening_deg, share):
     to_lip = np.array([-slant_m * np.cos(half), -slant_m * np.sin(half)]) - point[0, 1:]
     sine = to_lip @ [np.cos(half), -np.sin(half)] / np.linalg.norm(to_lip)
     hidden = 0.5 * (1.0 - sine)
-    assert groove.at(point).openness[0] == pytest.approx(1.0 - hidden, abs=0.02)
+    assert groove.at(point).sky_view_factor[0] == pytest.approx(1.0 - hidden, abs=0.02)
 
 
 def translation(y: float) -> np.ndarray:

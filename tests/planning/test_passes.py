@@ -8,21 +8,21 @@ from paint_deposition.errors import PlanError
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.pass_motion import planned_moves, trajectory_of
 from paint_deposition.planning.passes import (
-    RasterStyle,
+    PassStyle,
     plan_pass,
     plan_passes,
 )
-from paint_deposition.planning.surface_map import SkinMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, part_axes
 from planning.test_surface_map import sheet
 
-STYLE = RasterStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
+STYLE = PassStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
 LINES_M = np.array([0.3, 0.0, -0.3])
 
 
 @pytest.fixture(scope='module')
 def bowed():
     surface = sheet(lambda x, z: 0.3 * x**2 + 0.2 * z**2)
-    return SkinMap(surface, part_axes(surface), 0.1)
+    return SurfaceMap(surface, part_axes(surface), 0.1)
 
 
 @pytest.fixture(scope='module')
@@ -30,11 +30,11 @@ def motion(bowed):
     return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part', start_ns=7)
 
 
-def test_pass_keeps_standoff_and_is_square_to_the_skin(bowed):
+def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
     planned = plan_pass(bowed, 0.1, STYLE)
     tool_z = planned.rotations[:, :, 2]
-    on_skin = planned.positions_m + STYLE.standoff_m * tool_z
-    u, v, height = bowed.axes.coordinates_m(on_skin).T
+    on_surface = planned.positions_m + STYLE.standoff_m * tool_z
+    u, v, height = bowed.axes.coordinates_m(on_surface).T
     np.testing.assert_allclose(v, 0.1, atol=1e-9)
     np.testing.assert_allclose(height, bowed.height_m(u, v), atol=1e-9)
     np.testing.assert_allclose(tool_z, -bowed.normals(u, v), atol=1e-9)
@@ -46,7 +46,7 @@ def test_pass_keeps_standoff_and_is_square_to_the_skin(bowed):
 def test_gun_is_on_from_before_the_part_to_behind_it(bowed):
     planned = plan_pass(bowed, 0.0, STYLE)
     path, _ = spray_path(trajectory_of((planned,), STYLE))
-    # Where the gun's axis meets the skin: the TCP leans out over the bow.
+    # Where the gun's axis meets the surface: the TCP leans out over the bow.
     aimed_at = path.position_m + STYLE.standoff_m * path.rotation[:, :, 2]
     on = bowed.axes.coordinates_m(aimed_at[path.flow > 0.0])[:, 0]
     assert on.min() == pytest.approx(-0.5 - STYLE.overspray_m, abs=0.02)
@@ -81,7 +81,7 @@ def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
     assert ways[0] @ ways[1] < 0.0 < ways[0] @ ways[2]
     tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
     assert tool_x[0] @ tool_x[1] > 0.9
-    one_way = RasterStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
+    one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
     path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way), one_way))
     on = path.select(path.flow > 0.0)
     ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
@@ -97,7 +97,7 @@ def test_gun_is_off_between_passes(motion):
 
 
 def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
-    style = RasterStyle(0.25, 0.3, travel_rad=0.7)
+    style = PassStyle(0.25, 0.3, travel_rad=0.7)
     planned = plan_pass(bowed, 0.0, style)
     ahead = np.gradient(planned.positions_m, axis=0)[100]
     ahead /= np.linalg.norm(ahead)
@@ -106,7 +106,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 
 def test_short_passes_are_triangles_in_speed(bowed):
-    style = RasterStyle(0.25, 2.0, acceleration_m_per_s2=1.0, overspray_m=0.0)
+    style = PassStyle(0.25, 2.0, acceleration_m_per_s2=1.0, overspray_m=0.0)
     motion = trajectory_of((plan_pass(bowed, 0.0, style),), style)
     path, _ = spray_path(motion)
     assert path.speed_m_per_s.max() <= 2.001
@@ -131,4 +131,4 @@ def test_moves_of_the_robot_follow_the_same_way(bowed):
 def test_impossible_styles_are_refused(name):
     values = {'standoff_m': 0.25, 'speed_m_per_s': 0.3} | {name: 0.0}
     with pytest.raises(PlanError, match=name):
-        RasterStyle(**values)
+        PassStyle(**values)

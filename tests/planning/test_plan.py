@@ -24,7 +24,7 @@ NARROW = DepositionModel(
 
 @pytest.fixture(scope='module')
 def bowed():
-    """A skin that falls away toward its top and comes forward at its foot."""
+    """A surface that falls away toward its top and comes forward at its foot."""
     return sheet(lambda x, z: 0.2 * x**2 + 0.5 * np.maximum(z, 0.0) ** 2 + 0.15 * z, half_m=0.4)
 
 

@@ -14,7 +14,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.planning.index_request import Request
@@ -29,7 +29,7 @@ def asked(model=SYMMETRIC, **what):
 
 
 def sigma_n(model, index_m, **options):
-    return Raster.one_way(sampled_collapse(model, 0.2, **options)).sigma_n(index_m)
+    return ParallelPasses.one_way(sampled_collapse(model, 0.2, **options)).sigma_n(index_m)
 
 
 def test_every_local_minimum_is_found_and_refined():
@@ -152,7 +152,7 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
     assert 'keeps its orientation' in kept.setup.assumption
     assert 'turns' in turned.setup.assumption
     told = next(note for note in kept.notes if 'turned by 180 deg' in note)
-    mirrored = Raster(kept.collapse, kept.collapse.mirrored()).sigma_n(kept.index_m)
+    mirrored = ParallelPasses(kept.collapse, kept.collapse.mirrored()).sigma_n(kept.index_m)
     assert float(told.split()[-1]) == pytest.approx(mirrored, abs=1e-4)
 
 

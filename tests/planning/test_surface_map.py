@@ -1,15 +1,15 @@
-"""The smoothed skin that passes follow."""
+"""The smoothed surface that passes follow."""
 
 import numpy as np
 import pytest
 
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.surface_map import SkinMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, part_axes
 
 
 def sheet(height, half_m=0.5, count=41) -> Surface:
-    """A skin y = height(x, z) that stands and looks to -y."""
+    """A surface y = height(x, z) that stands and looks to -y."""
     line = np.linspace(-half_m, half_m, count)
     x, z = (grid.ravel() for grid in np.meshgrid(line, line, indexing='ij'))
     i = (np.arange(count - 1)[:, None] * count + np.arange(count - 1)).ravel()
@@ -42,13 +42,13 @@ def test_coordinates_go_there_and_back():
 
 def test_a_plane_keeps_its_place_and_normal_to_its_edges():
     surface = sheet(lambda x, z: 0.2 * x - 0.1 * z)
-    skin = SkinMap(surface, part_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)
+    surface_map = SurfaceMap(surface, part_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)
     u, v = (grid.ravel() for grid in np.meshgrid(*2 * [np.linspace(-0.45, 0.45, 15)]))
-    places = skin.axes.points_m(np.stack([u, v, skin.height_m(u, v)], axis=1))
+    places = surface_map.axes.points_m(np.stack([u, v, surface_map.height_m(u, v)], axis=1))
     deviation = places[:, 1] - (0.2 * places[:, 0] - 0.1 * places[:, 2])
     assert np.abs(deviation).max() < 1.5e-3
     expected = np.array([0.2, -1.0, -0.1]) / np.linalg.norm([0.2, -1.0, -0.1])
-    cosine = skin.normals(u, v) @ expected
+    cosine = surface_map.normals(u, v) @ expected
     assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 1.0
 
 
@@ -56,43 +56,45 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
     ripple = sheet(lambda x, z: 0.004 * np.sin(2.0 * np.pi * x / 0.06), count=121)
     bow = sheet(lambda x, z: 0.5 * x**2)
     u = np.linspace(-0.35, 0.35, 200)
-    flat = SkinMap(ripple, part_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(u, 0.0 * u)
+    flat = SurfaceMap(ripple, part_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(
+        u, 0.0 * u
+    )
     assert np.ptp(flat) < 0.0015
-    skin = SkinMap(bow, part_axes(bow), 0.15)
-    height = skin.height_m(u, 0.0 * u)
+    surface_map = SurfaceMap(bow, part_axes(bow), 0.15)
+    height = surface_map.height_m(u, 0.0 * u)
     # Curved by 1/m toward the gun's far side; a Gaussian of half the radius lowers it evenly.
     assert height[0] - height[100] == pytest.approx(-0.5 * 0.35**2, rel=0.05)
 
 
 def test_past_the_edge_height_and_normal_are_held():
     surface = sheet(lambda x, z: 0.3 * np.abs(x))
-    skin = SkinMap(surface, part_axes(surface), 0.08)
+    surface_map = SurfaceMap(surface, part_axes(surface), 0.08)
     out = np.linspace(0.6, 2.0, 30)
-    heights, normals = skin.height_m(out, 0.0 * out), skin.normals(out, 0.0 * out)
+    heights, normals = surface_map.height_m(out, 0.0 * out), surface_map.normals(out, 0.0 * out)
     assert np.ptp(heights) < 1e-3
     np.testing.assert_allclose(normals, np.broadcast_to(normals[0], normals.shape), atol=1e-3)
     assert np.isfinite(heights).all()
 
 
-def test_hidden_and_averted_skin_is_not_painted():
+def test_hidden_and_averted_surface_is_not_painted():
     front, back = sheet(lambda x, z: 0.0 * x), sheet(lambda x, z: 0.0 * x + 0.2, half_m=0.2)
     both = Surface.from_triangles(
         np.concatenate([front.vertices_m, back.vertices_m]),
         np.concatenate([front.faces, back.faces + len(front.vertices_m)]),
         0.1,
     )
-    skin = SkinMap(both, part_axes(both), 0.1)
+    surface_map = SurfaceMap(both, part_axes(both), 0.1)
     y = both.vertices_m[:, 1]
-    assert skin.painted[y < 0.1].all()
-    assert not skin.painted[y > 0.1].any()
+    assert surface_map.painted[y < 0.1].all()
+    assert not surface_map.painted[y > 0.1].any()
 
 
 def test_ends_of_a_slanted_part_follow_the_pass():
     surface = sheet(lambda x, z: 0.0 * x)
     cut = surface.faces[surface.vertices_m[surface.faces].mean(axis=1) @ [1.0, 0.0, 1.0] < 0.0]
     part = Surface.from_triangles(surface.vertices_m, cut, 0.05)
-    skin = SkinMap(part, part_axes(part), 0.05)
-    low, high = (np.ptp(skin.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
+    surface_map = SurfaceMap(part, part_axes(part), 0.05)
+    low, high = (np.ptp(surface_map.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
     assert low > high + 0.4
 
 
@@ -104,10 +106,10 @@ def test_impossible_parts_are_refused():
         part_axes(surface, outward=(0.0, 0.0, 0.0))
     with pytest.raises(PlanError, match='gravity points along the gun'):
         part_axes(surface, outward=(0.0, 0.0, 1.0))
-    with pytest.raises(PlanError, match='no skin faces the gun'):
-        SkinMap(surface, part_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
+    with pytest.raises(PlanError, match='no surface faces the gun'):
+        SurfaceMap(surface, part_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
     with pytest.raises(PlanError, match='smoothing_radius_m is 0'):
-        SkinMap(surface, part_axes(surface), 0.0)
+        SurfaceMap(surface, part_axes(surface), 0.0)
     box = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip

@@ -1,4 +1,4 @@
-"""Parts as analytic skins y = f(x, z), z up, the gun on the +y side, and their meshes."""
+"""Parts as analytic surfaces y = f(x, z), z up, the gun on the +y side, and their meshes."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ OUTLINE_MARGIN_M = 0.15
 
 @dataclass(frozen=True)
 class Bend:
-    """A line along which the skin's slope changes by `slope`, spread over about 4 x `soft_m`.
+    """A line along which the surface's slope changes by `slope`, spread over about 4 x `soft_m`.
 
-    The skin moves by slope x distance on the side where direction x (coordinate - at) > 0;
+    The surface moves by slope x distance on the side where direction x (coordinate - at) > 0;
     slope < 0 falls away from the gun (convex), > 0 comes back to it (concave).
     """
 
@@ -38,7 +38,7 @@ class Bend:
 
 @dataclass(frozen=True)
 class Part:
-    """A skin over -width/2 <= x <= width/2 (left side slanted by `taper_m`), 0 <= z <= height."""
+    """A sheet over -width/2 <= x <= width/2 (left side slanted by `taper_m`), 0 <= z <= height."""
 
     kind: str
     width_m: float
@@ -51,7 +51,7 @@ class Part:
     obstacle: tuple[np.ndarray, np.ndarray] | None = field(default=None, compare=False)
 
     def height(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        """y of the skin (metres)."""
+        """y of the surface (metres)."""
         zc = z - 0.5 * self.height_m
         y = -(x**2) / (2 * self.crown_x_m) - zc**2 / (2 * self.crown_z_m) + self.twist * x * zc
         for bend in self.bends:
@@ -81,7 +81,7 @@ class Part:
         return n / np.linalg.norm(n, axis=-1, keepdims=True)
 
     def curvature(self, x: np.ndarray, z: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Principal curvatures (low, high) in 1/m, positive where the skin is concave to the gun.
+        """Principal curvatures (low, high) in 1/m, positive where concave to the gun.
 
         Exact, from the second fundamental form of the graph.
         """
@@ -128,8 +128,8 @@ class Part:
             ]
         )
 
-    def skin_mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices (v, 3) and faces (f, 3) of the skin alone, normals toward the gun."""
+    def surface_mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (v, 3) and faces (f, 3) of the surface alone, normals toward the gun."""
         columns = int(np.ceil(self.width_m / edge_m)) + 1
         rows = int(np.ceil(self.height_m / (0.6 * edge_m))) + 1
         z = np.linspace(0.0, self.height_m, rows)[:, None]
@@ -146,8 +146,8 @@ class Part:
         return vertices, faces
 
     def mesh(self) -> tuple[np.ndarray, np.ndarray]:
-        """The skin and whatever stands in front of it, as one mesh."""
-        vertices, faces = self.skin_mesh()
+        """The surface and whatever stands in front of it, as one mesh."""
+        vertices, faces = self.surface_mesh()
         if self.obstacle is None:
             return vertices, faces
         more, extra = self.obstacle

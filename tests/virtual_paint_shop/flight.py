@@ -1,4 +1,4 @@
-"""Parcels fly from the emission point to the skin; those that land under a gauge probe count."""
+"""Parcels fly from the emission point to the part; those that land under a gauge probe count."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class Landings:
 
 
 @_compiled
-def _skin(x, z, x0, z0, step, fields):
+def _surface(x, z, x0, z0, step, fields):
     i = min(max((x - x0) / step, 0.0), fields.shape[1] - 1.001)
     j = min(max((z - z0) / step, 0.0), fields.shape[0] - 1.001)
     a, b = int(i), int(j)
@@ -136,8 +136,8 @@ def _fly(
             gx = o[0] + (c[0, 0] * qx + c[0, 1] * qy) * (1.0 - wide)
             gy = o[1] + (c[1, 0] * qx + c[1, 1] * qy) * (1.0 - wide)
             gz = o[2] + (c[2, 0] * qx + c[2, 1] * qy) * (1.0 - wide)
-            skin, slope_x, slope_z = _skin(o[0], o[2], x0, z0, step, fields)
-            axial, landed = (skin - gy) / fy, False
+            make_surface, slope_x, slope_z = _surface(o[0], o[2], x0, z0, step, fields)
+            axial, landed = (make_surface - gy) / fy, False
             x = y = z = slope_x = slope_z = 0.0
             ex, ey, ez = fx, fy, fz
             for _step in range(_NEWTON_STEPS):
@@ -153,8 +153,8 @@ def _fly(
                     gz + axial * fz + bz * bent,
                 )
                 ex, ey, ez = fx + bx * bending, fy + by * bending, fz + bz * bending
-                skin, slope_x, slope_z = _skin(x, z, x0, z0, step, fields)
-                miss = y - skin
+                make_surface, slope_x, slope_z = _surface(x, z, x0, z0, step, fields)
+                miss = y - make_surface
                 if abs(miss) < 2e-6:
                     landed = True
                     break
@@ -221,7 +221,7 @@ def fly(
     """
     duration = slices.time_1_s - slices.time_0_s
     count = np.maximum(np.rint(duration * parcels_total / duration.sum() / 64), 4).astype(int) * 64
-    x0, z0, fields = _skin_grid(part)
+    x0, z0, fields = _surface_grid(part)
     cells = _probe_cells(points_m)
     capacity = max(int(0.02 * parcels_total), 1000)
     while True:
@@ -269,7 +269,7 @@ def film_um(landings: Landings, points: int, kept: np.ndarray | float = 1.0) -> 
     return np.bincount(landings.point, landings.film_um * kept, minlength=points)
 
 
-def _skin_grid(part: Part) -> tuple[float, float, np.ndarray]:
+def _surface_grid(part: Part) -> tuple[float, float, np.ndarray]:
     x0, z0 = -0.5 * part.width_m - OUTLINE_MARGIN_M, -OUTLINE_MARGIN_M
     x = np.arange(x0, 0.5 * part.width_m + OUTLINE_MARGIN_M + GRID_M, GRID_M)[None, :]
     z = np.arange(z0, part.height_m + OUTLINE_MARGIN_M + GRID_M, GRID_M)[:, None]

@@ -88,7 +88,7 @@ def layout(
 def scatter(
     part: Part, count: int, rng: np.random.Generator, keep_off_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Quasi-random points on the skin, away from free edges."""
+    """Quasi-random points on the surface, away from free edges."""
     cube = qmc.Sobol(2, scramble=True, seed=int(rng.integers(2**31))).random(1024)
     x, z = (cube[:, 0] - 0.5) * part.width_m, cube[:, 1] * part.height_m
     free = part.edge_distance(x, z) > keep_off_m
@@ -125,15 +125,15 @@ def tabulate(
 
 
 def keep_clear(part: Part, spots: Spots) -> Spots:
-    """Where a body on the skin is nearer than 18 mm the gauge cannot stand; leave these out."""
+    """Where a body on the surface is nearer than 18 mm the gauge cannot stand; leave these out."""
     if part.obstacle is None:
         return spots
     body = part.obstacle[0]
-    on_skin = body[np.abs(body[:, 1] - part.height(body[:, 0], body[:, 2])) < 0.02]
-    if not on_skin.size:
+    on_surface = body[np.abs(body[:, 1] - part.height(body[:, 0], body[:, 2])) < 0.02]
+    if not on_surface.size:
         return spots
     foot = np.hypot(
-        spots.x_m[:, None] - on_skin[None, :, 0], spots.z_m[:, None] - on_skin[None, :, 2]
+        spots.x_m[:, None] - on_surface[None, :, 0], spots.z_m[:, None] - on_surface[None, :, 2]
     )
     free = foot.min(axis=1) > 0.018
     return Spots(spots.x_m[free], spots.z_m[free], spots.group[free], spots.repeats[free])

@@ -64,7 +64,7 @@ def generate(
 
     truth: None, an effect id, 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a list.
     style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
-    follow: how much the tool axis follows the skin, 0 fixed to 1 normal; None for U(0.3, 0.9).
+    follow: how much the tool axis follows the surface, 0 fixed to 1 normal; None for U(0.3, 0.9).
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
     a drawn one. Raises ValueError for a name that does not exist.
     """

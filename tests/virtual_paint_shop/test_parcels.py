@@ -89,7 +89,7 @@ def test_clean_film_on_a_door_is_equation_2():
     assert np.std(film - theory) < 0.3
 
 
-def test_parcels_land_where_embree_finds_the_skin():
+def test_parcels_land_where_embree_finds_the_surface():
     rng = np.random.default_rng(2)
     door = draw_door(rng)
     motion = drive(door, Plan(index_m=0.3, passes=3), rng)
@@ -99,7 +99,7 @@ def test_parcels_land_where_embree_finds_the_skin():
     landed = fly(door, cut, plume, still_air(cut, plume), door.point(x, z), 0.30, 0.05, 200_000)
     tcp, turn = motion.pose(landed.time_s)
     start = tcp - 0.05 * turn[:, :, 2]
-    mesh = trimesh.Trimesh(*door.skin_mesh(0.006), process=False)
+    mesh = trimesh.Trimesh(*door.surface_mesh(0.006), process=False)
     found, ray, _ = mesh.ray.intersects_location(start, landed.position_m - start, False)
     assert ray.size > 0.999 * start.shape[0]
     assert np.linalg.norm(found - landed.position_m[ray], axis=1).max() < 5e-4

@@ -48,7 +48,7 @@ def test_jobs_are_believable(seed):
     assert 0.15 < away[over].min() < away[over].max() < 0.40
 
 
-def test_a_fixed_tool_axis_meets_the_skin_at_larger_angles():
+def test_a_fixed_tool_axis_meets_the_surface_at_larger_angles():
     angles = []
     for follow in (0.0, 1.0):
         _, (job,) = draw_jobs(8, [], ('door',), 0.05, 'outside', follow)

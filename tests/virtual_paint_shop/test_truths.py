@@ -139,7 +139,7 @@ def test_flow_drift_grows_from_pass_to_pass():
 
 
 @pytest.mark.parametrize(('amplitude', 'sign'), [(1.0, 1), (-1.0, -1)])
-def test_incidence_acts_where_skin_turns_away(amplitude, sign):
+def test_incidence_acts_where_surface_turns_away(amplitude, sign):
     tilted = Part('door', 1.0, 1.0, bends=(Bend('z', 0.5, -1.0, -0.4, 0.005),))
     clean, film = change('incidence_attraction', COLUMN, amplitude, tilted)
     gain = relative(clean, film)

@@ -81,7 +81,7 @@ class GaugeZero(Truth):
 
 
 class GaugeCurvatureBias(Truth):
-    """The probe rocks on convex skin and reads high, low in hollows.
+    """The probe rocks on convex surface and reads high, low in hollows.
 
     2a tanh(k / 2), k = -(sum of the principal curvatures over the 5 mm probe) x 250 mm.
     """

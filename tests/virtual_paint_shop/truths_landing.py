@@ -14,7 +14,7 @@ from .truths import KAPPA_REF_PER_M, Scene, Truth
 
 
 class IncidenceAttraction(Truth):
-    """Charged droplets are drawn to skin that turns away (a > 0), or bounce off it (a < 0).
+    """Charged droplets are drawn to surface that turns away (a > 0), or bounce off it (a < 0).
 
     With u = 1/cos - 1 of each parcel's own incidence: gain 1 + a u / (1 + u / 0.8), saturating;
     bounce 1 / (1 + |a| u).
@@ -101,9 +101,9 @@ class PatternSpread(Truth):
 class Occlusion(Truth):
     """Something in the part's mesh stands in the parcels' way.
 
-    A ledge along the lower edge or a trim on the skin (stands out by `amplitude`), or a hanger
-    bar in front of the skin (half as wide). Parcels leave the bell's edge; one whose straight way
-    to its landing meets the mesh (Embree) never arrives.
+    A ledge along the lower edge or a trim on the surface (stands out by `amplitude`), or a hanger
+    bar in front of the surface (half as wide). Parcels leave the bell's edge; one whose straight
+    way to its landing meets the mesh (Embree) never arrives.
     """
 
     id, family, typical, unit = 'occlusion', 'visibility', 0.06, 'm'
@@ -119,7 +119,7 @@ class Occlusion(Truth):
         }
 
     def obstacle(self, part: Part) -> tuple[np.ndarray, np.ndarray]:
-        """Vertices and faces of the body: a box section swept along the skin."""
+        """Vertices and faces of the body: a box section swept along the surface."""
         size, at = min(self.amplitude, 0.11), self.drawn['at']
         span = np.linspace(self.drawn['from'], self.drawn['to'], 60)
         if self.drawn['kind'] == 'bar':
@@ -149,14 +149,14 @@ class Occlusion(Truth):
 def _swept(
     part: Part, x: np.ndarray, z: np.ndarray, side: np.ndarray, near_m: float, far_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A closed body along the skin line (x, z), `near_m` to `far_m` in front, +- side wide."""
-    skin, out = part.point(x, z), np.array([0.0, 1.0, 0.0])
+    """A closed body along the surface line (x, z), `near_m` to `far_m` in front, +- side wide."""
+    surface, out = part.point(x, z), np.array([0.0, 1.0, 0.0])
     rings = np.stack(
         [
-            skin - side + near_m * out,
-            skin + side + near_m * out,
-            skin + side + far_m * out,
-            skin - side + far_m * out,
+            surface - side + near_m * out,
+            surface + side + near_m * out,
+            surface + side + far_m * out,
+            surface - side + far_m * out,
         ],
         axis=1,
     )

@@ -35,7 +35,7 @@ class MaskingTape(Truth):
 
 
 class ThermalStripe(Truth):
-    """Hot and cold stripes of the skin ripple the film along x."""
+    """Hot and cold stripes of the surface ripple the film along x."""
 
     id, family, typical, unit = 'unknown:thermal_stripe', 'unknown', 0.06, '1'
 

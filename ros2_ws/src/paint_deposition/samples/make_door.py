@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Draw the sample parts: ``door.stl``, the skin of a truck door, and ``panel.stl``, a flat panel.
+"""Draw the sample parts: ``door.stl``, the outside of a truck door, and ``panel.stl``, a flat one.
 
     python3 make_door.py [FOLDER]
 
@@ -42,7 +42,7 @@ def crown(x: np.ndarray) -> np.ndarray:
 
 
 def upper_lean(z: np.ndarray) -> np.ndarray:
-    """The skin leans inward to the window, a little more the higher."""
+    """The surface leans inward to the window, a little more the higher."""
     above = z - FEATURE_LINE_HEIGHT_M
     return LEAN * above + 0.5 * UPPER_CURVATURE_PER_M * above**2
 
@@ -52,7 +52,7 @@ def feature_line_height(x: np.ndarray) -> np.ndarray:
 
 
 def feature_line(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Below the feature line the skin turns away from the gun: the convex line."""
+    """Below the feature line the surface turns away from the gun: the convex line."""
     below = (feature_line_height(x) - z) / FEATURE_LINE_WIDTH_M
     return FEATURE_LINE_TURN * FEATURE_LINE_WIDTH_M * ramp(below)
 
@@ -64,7 +64,7 @@ def valley(x: np.ndarray, z: np.ndarray) -> np.ndarray:
 
 
 def door_depth(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Y of the skin [m], larger away from the gun."""
+    """Y of the surface [m], larger away from the gun."""
     return crown(x) + upper_lean(z) + feature_line(x, z) + valley(x, z)
 
 

@@ -21,7 +21,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
 
 STANDOFF_M = 0.25
-# The taught path sees the skin through a window this wide, and turns the bell this share of the
+# The taught path sees the surface through a window this wide, and turns the bell this share of the
 # way from straight ahead to square on it.
 SMOOTHING_M = 0.16
 FOLLOWING = 0.6
@@ -50,7 +50,7 @@ class Job:
         passes: (P, 2, 2) start and end of each pass in x-z; the gun is on between them.
         run_out_m: way before and after each pass, at full speed and gun off.
         speed_m_per_s: of the TCP while spraying.
-        skin_depth: y of the part over x and z.
+        surface_depth: y of the part over x and z.
         window: lowest and highest x, lowest and highest z of the part.
     """
 
@@ -58,7 +58,7 @@ class Job:
     passes: np.ndarray
     run_out_m: float
     speed_m_per_s: float
-    skin_depth: object
+    surface_depth: object
     window: tuple[float, float, float, float]
 
 
@@ -143,12 +143,12 @@ def timing(job: Job, points: np.ndarray) -> np.ndarray:
 
 
 def smoothed_depth(job: Job, x: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Mean depth of the skin in a window about each point; straight on past the part's edges."""
+    """Mean depth of the surface in a window about each point; straight on past the edges."""
     offsets = np.linspace(-0.5, 0.5, 9) * SMOOTHING_M
     lowest_x, highest_x, lowest_z, highest_z = job.window
     xs = held_within(x[:, None, None] + offsets[:, None], lowest_x, highest_x)
     zs = held_within(z[:, None, None] + offsets[None, :], lowest_z, highest_z)
-    return job.skin_depth(xs, zs).mean(axis=(1, 2))
+    return job.surface_depth(xs, zs).mean(axis=(1, 2))
 
 
 def held_within(value: np.ndarray, low: float, high: float) -> np.ndarray:
@@ -158,7 +158,7 @@ def held_within(value: np.ndarray, low: float, high: float) -> np.ndarray:
 
 
 def tool_poses(job: Job, points: np.ndarray) -> tuple[np.ndarray, Rotation]:
-    """TCP (N, 3) and orientation of the tool: z to the skin, x level along the vehicle."""
+    """TCP (N, 3) and orientation of the tool: z to the surface, x level along the vehicle."""
     x, z = points.T
     small = 1e-4
     slope_x = smoothed_depth(job, x + small, z) - smoothed_depth(job, x - small, z)
@@ -168,9 +168,9 @@ def tool_poses(job: Job, points: np.ndarray) -> tuple[np.ndarray, Rotation]:
                   * [FOLLOWING, 1.0, FOLLOWING])  # fmt: skip
     tool_y = unit(np.cross(tool_z, [1.0, 0.0, 0.0]))
     tool_x = np.cross(tool_y, tool_z)
-    skin = np.stack([x, smoothed_depth(job, x, z), z], axis=1)
+    surface = np.stack([x, smoothed_depth(job, x, z), z], axis=1)
     axes = np.stack([tool_x, tool_y, tool_z], axis=2)
-    return skin - STANDOFF_M * tool_z, Rotation.from_matrix(axes)
+    return surface - STANDOFF_M * tool_z, Rotation.from_matrix(axes)
 
 
 def trigger_times(job: Job, points: np.ndarray, times_s: np.ndarray) -> np.ndarray:

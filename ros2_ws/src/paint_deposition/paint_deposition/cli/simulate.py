@@ -103,11 +103,11 @@ def simulate_command(
         import numpy as np
 
         from paint_deposition.effects.deposition_model import DepositionModel
+        from paint_deposition.files.gauge_readings import read_readings, write_predictions
         from paint_deposition.files.json_files import json_text
         from paint_deposition.files.meshes import read_mesh
         from paint_deposition.files.model_file import read_model
         from paint_deposition.files.motion_files import read_motion
-        from paint_deposition.files.gauge_readings import read_readings, write_predictions
         from paint_deposition.film.statistics import film_statistics
         from paint_deposition.motion.path_builder import spray_path
         from paint_deposition.results.film import write_film

@@ -16,7 +16,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import STENCIL_M, Experiment
 
-# Model lines are drawn through points this close along the skin [m].
+# Model lines are drawn through points this close along the surface [m].
 LINE_STEP_M = 0.01
 FEWEST_ON_A_LINE = 3
 # Readings without groups are shown in strips of the part, about this many to a strip.
@@ -161,7 +161,7 @@ def _films_along(
 
 
 def _way(experiment: Experiment, line: _Line) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions along the axis, points near the skin and normals, through all readings."""
+    """Positions along the axis, points near the surface and normals, through all readings."""
     members = line.members
     at = line.position_m
     steps = max(2, int(np.ceil((at[-1] - at[0]) / LINE_STEP_M)) + 1)

@@ -1,4 +1,4 @@
-"""Residuals of single readings spread over the skin around them, for pictures."""
+"""Residuals of single readings spread over the surface around them, for pictures."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
@@ -10,7 +10,7 @@ from paint_deposition.part.surface import Surface
 
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 0.025, 0.09
 RADIUS_OVER_SPACING = 1.8
-# Skin whose normal differs by more than 60 degrees is another side of the part.
+# Surface whose normal differs by more than 60 degrees is another side of the part.
 SAME_SIDE_COSINE = 0.5
 
 
@@ -20,7 +20,7 @@ def spreading(
     normals: np.ndarray,
     radius_m: float | None = None,
 ) -> csr_matrix:
-    """Matrix (V, P) that spreads values at points over the skin around them.
+    """Matrix (V, P) that spreads values at points over the surface around them.
 
     Each vertex takes a mean of the points within the radius on its side of the part, weighted by
     a smooth kernel: single readings are noisy, and what matters is where neighbours agree. The
@@ -28,7 +28,7 @@ def spreading(
 
     Args:
         surface: the part.
-        positions_m, normals: (P, 3) points on its skin.
+        positions_m, normals: (P, 3) points on its surface.
         radius_m: default: ``radius_of_readings_m``.
     """
     radius_m = radius_m or radius_of_readings_m(positions_m)
@@ -45,18 +45,18 @@ def spreading(
 
 
 def reached(matrix: csr_matrix) -> np.ndarray:
-    """(V,) whether the skin there takes anything from any point."""
+    """(V,) whether the surface there takes anything from any point."""
     return np.diff(matrix.indptr) > 0
 
 
-def spread_over_skin(
+def spread_over_surface(
     surface: Surface, positions_m: np.ndarray, normals: np.ndarray, residual_um: np.ndarray
 ) -> np.ndarray:
     """Residual at each vertex (V,) [um], NaN where no reading is near.
 
     Args:
         surface: the part.
-        positions_m, normals: (P, 3) readings on its skin.
+        positions_m, normals: (P, 3) readings on its surface.
         residual_um: (P,) measured minus predicted.
     """
     matrix = spreading(surface, positions_m, normals)
@@ -64,7 +64,7 @@ def spread_over_skin(
 
 
 def radius_of_readings_m(positions_m: np.ndarray) -> float:
-    """How far a reading speaks for the skin around it [m].
+    """How far a reading speaks for the surface around it [m].
 
     Somewhat more than the usual distance between neighbouring readings.
     """

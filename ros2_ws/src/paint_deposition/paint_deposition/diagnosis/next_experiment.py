@@ -173,7 +173,7 @@ def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: i
 
 
 def _candidates(experiment: Experiment, count: int, seed: int) -> Experiment:
-    """The experiment with no readings yet at some points of its skin, clear of free edges."""
+    """The experiment with no readings yet at some points of its surface, clear of free edges."""
     surface = experiment.surface
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]

@@ -1,4 +1,4 @@
-"""Where the unexplained shows: against which covariate, and on which part of the skin."""
+"""Where the unexplained shows: against which covariate, and on which part of the surface."""
 
 import numpy as np
 

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.errors import PaintError, ReadingsError
-from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.refusals import nearest
 from paint_deposition.files.strict_yaml import read_yaml
@@ -21,7 +21,8 @@ TOP_KEYS = ('experiments', 'model')
 REQUIRED = ('mesh', 'trajectory', 'measurements')
 TOPICS = ('pose_topic', 'state_topic')
 EXPERIMENT_KEYS = (*REQUIRED, *TOPICS, 'name', 'mesh_scale', 'max_pose_gap_s', 'down')
-# Readings are matched to the skin; a finer mesh only helps where the skin is strongly curved.
+# Readings are matched to the surface; a finer mesh only helps where the surface is strongly
+# curved.
 MAX_EDGE_LENGTH_M = 0.02
 
 

@@ -28,7 +28,7 @@ def read_mesh(
 ) -> Surface:
     """Read a part and refine it.
 
-    The winding says which side is outward, toward the gun. An open skin is taken as it is; a
+    The winding says which side is outward, toward the gun. An open surface is taken as it is; a
     closed body that is inside out is turned round, and triangles wound against their neighbours
     are turned to the majority, both with a note in ``Surface.notes``.
 
@@ -110,7 +110,7 @@ def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
             f'{path}: not readable as a mesh ({_first_line(error)}); export it again'
         ) from error
     if not len(faces):
-        raise MeshError(f'{path}: holds no triangles; export the skin as a triangle mesh')
+        raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
         raise MeshError(
             f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
@@ -188,7 +188,7 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
 
 
 def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
-    """Wind each connected skin alike, as most of its area was."""
+    """Wind each connected surface alike, as most of its area was."""
     from trimesh import Trimesh
     from trimesh.repair import fix_winding
 
@@ -197,10 +197,10 @@ def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges)
     turned = (np.asarray(mesh.faces) != faces).any(axis=1)
     pairs = np.concatenate([edges.paired, edges.clashing]).T // 3
     links = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(len(faces), len(faces)))
-    _, skin = connected_components(links, directed=False)
+    _, sheet = connected_components(links, directed=False)
     areas = face_areas_m2(vertices_m, faces)
-    turned_share = np.bincount(skin, areas * turned) / np.bincount(skin, areas)
-    turned ^= (turned_share > 0.5)[skin]
+    turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
+    turned ^= (turned_share > 0.5)[sheet]
     return np.where(turned[:, None], faces[:, ::-1], faces)
 
 

@@ -15,7 +15,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 COMMENT_COLUMN = 33
 SECTION_COMMENTS = {
     'planar': 'eq. (1): flux on the model plane',
-    'projection': 'eq. (2): from the model plane to the skin',
+    'projection': 'eq. (2): from the model plane to the surface',
 }
 EXTRA_COMMENTS = {
     'uncertainty': 'standard deviations',

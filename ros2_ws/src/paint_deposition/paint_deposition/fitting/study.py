@@ -123,7 +123,7 @@ class Study:
 
     @cached_property
     def positions_m(self) -> np.ndarray:
-        """(P, 3) places on the skin [m]."""
+        """(P, 3) places on the surface [m]."""
         return np.concatenate([e.points.positions_m[: len(e)] for e in self.campaign.experiments])
 
     @cached_property

@@ -16,7 +16,7 @@ SPECTRUM_LIMIT = 1e-16
 
 
 @dataclass(frozen=True)
-class Raster:
+class ParallelPasses:
     """Endless parallel passes at an even index.
 
     Attributes:
@@ -28,9 +28,9 @@ class Raster:
     second: Collapse
 
     @staticmethod
-    def one_way(collapse: Collapse) -> 'Raster':
+    def one_way(collapse: Collapse) -> 'ParallelPasses':
         """All passes alike, as in eq. (4)."""
-        return Raster(collapse, collapse)
+        return ParallelPasses(collapse, collapse)
 
     @property
     def alike(self) -> bool:

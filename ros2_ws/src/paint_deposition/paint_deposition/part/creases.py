@@ -1,4 +1,4 @@
-"""Edges of a triangle mesh: creases, which split normals, and the rim, where the skin ends."""
+"""Edges of a triangle mesh: creases, which split normals, and the rim, where the surface ends."""
 
 from dataclasses import dataclass
 
@@ -12,8 +12,8 @@ from paint_deposition.part.refinement import face_areas_m2, face_normals
 
 # Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
 CREASE_RAD = np.radians(30.0)
-# A convex fold at least this sharp ends the skin as a free edge does: a hem, the rim of a plate.
-# Rims that are cut along one direction meet a crowned skin at less than a right angle.
+# A convex fold at least this sharp ends the surface as a free edge does: a hem, the rim of a
+# plate. Rims that are cut along one direction meet a crowned surface at less than a right angle.
 RIM_FOLD_RAD = np.radians(60.0)
 
 
@@ -63,7 +63,7 @@ def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.nda
 
 
 def rim_folds(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
-    """(E,) bool: paired edges at which the skin ends by folding back, at once or in a hem."""
+    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem."""
     folds = folds_rad(vertices_m, faces, edges)
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     half_edge = edges.paired[:, 0]
@@ -98,7 +98,7 @@ def split_at_creases(
 def rim_segments_m(
     vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, rim: np.ndarray
 ) -> np.ndarray:
-    """(B, 2, 3) ends of the segments where the skin ends or, at (E,) ``rim``, folds back [m]."""
+    """(B, 2, 3) ends of segments where the surface ends or, at (E,) ``rim``, folds back [m]."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
 
     def segments(half_edges: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Signed curvature of the skin, from how its normals turn within a physical radius."""
+"""Signed curvature of the surface, from how its normals turn within a physical radius."""
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -6,9 +6,9 @@ from scipy.spatial import cKDTree
 from paint_deposition.part.creases import RIM_FOLD_RAD
 
 RADIUS_M = 0.03
-# Skin whose normal points further away than this is another side of the part.
+# Surface whose normal points further away than this is another side of the part.
 OTHER_SIDE_COSINE = -0.25
-# Skin that has turned so far away from the gun within the radius lies round a rim.
+# Surface that has turned so far away from the gun within the radius lies round a rim.
 RIM_COSINE = np.cos(RIM_FOLD_RAD)
 SAME_PLACE_M = 1e-6
 BLOCK = 4096
@@ -17,29 +17,29 @@ BLOCK = 4096
 def curvature_per_m(
     points_m: np.ndarray,
     normals: np.ndarray,
-    skin_m: np.ndarray,
-    skin_normals: np.ndarray,
-    skin_areas_m2: np.ndarray,
+    surface_m: np.ndarray,
+    surface_normals: np.ndarray,
+    surface_areas_m2: np.ndarray,
     radius_m: float = RADIUS_M,
 ) -> np.ndarray:
     """Sum k1 + k2 of the principal curvatures, positive where concave toward the gun [1/m].
 
-    It is minus the divergence of the outward normal along the skin. The sum is what matters for
+    It is minus the divergence of the outward normal along the surface. The sum is what matters for
     the electric field E over a conductor, dE/dn = (k1 + k2) E in this sign: stronger toward convex
-    skin. A cylinder's ridge of radius R has -1/R, a ball -2/R, a valley +1/R.
+    surface. A cylinder's ridge of radius R has -1/R, a ball -2/R, a valley +1/R.
 
-    The divergence is that of a linear function fitted to the normals of the skin within the
+    The divergence is that of a linear function fitted to the normals of the surface within the
     radius, so a fold narrower than the radius appears smoothed, and the triangulation does not
     show. On cylinders and balls the tangential components of the normal are exactly linear.
-    Skin round a rim does not count: a sheet that is drawn with its thickness has the curvature of
-    one without.
+    Surface round a rim does not count: a sheet that is drawn with its thickness has the curvature
+    of one without.
 
     Args:
         points_m, normals: (N, 3) where it is wanted.
-        skin_m, skin_normals, skin_areas_m2: (S, 3), (S, 3), (S,) samples of the skin.
+        surface_m, surface_normals, surface_areas_m2: (S, 3), (S, 3), (S,) samples of the surface.
         radius_m: of the neighbourhood [m].
     """
-    tree = cKDTree(skin_m)
+    tree = cKDTree(surface_m)
     result = np.empty(len(points_m))
     for start in range(0, len(points_m), BLOCK):
         block = slice(start, start + BLOCK)
@@ -47,19 +47,19 @@ def curvature_per_m(
             tree, radius_m, output_type='ndarray'
         )
         i, j = near['i'], near['j']
-        offset = skin_m[j] - points_m[block][i]
-        same_side = _same_side(normals[block][i], skin_normals[j], offset)
+        offset = surface_m[j] - points_m[block][i]
+        same_side = _same_side(normals[block][i], surface_normals[j], offset)
         i, j, offset = i[same_side], j[same_side], offset[same_side]
-        weight = skin_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
+        weight = surface_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
         axes = tangents(normals[block])
         place = np.einsum('kni,ni->kn', axes[:, i], offset)
-        lean = np.einsum('kni,ni->kn', axes[:, i], skin_normals[j])
+        lean = np.einsum('kni,ni->kn', axes[:, i], surface_normals[j])
         result[block] = -_divergence(i, weight, place, lean, len(axes[0]))
     return result
 
 
 def _same_side(normals: np.ndarray, others: np.ndarray, offset_m: np.ndarray) -> np.ndarray:
-    """(K,) bool: whether skin is of the same side of the part; a hollow may turn further."""
+    """(K,) bool: whether surface is of the same side of the part; a hollow may turn further."""
     cosine = np.einsum('ij,ij->i', normals, others)
     # Copies of a vertex on both sides of a rim lie at one place, but for the last bits.
     convex = np.einsum('ij,ij->i', others - normals, offset_m) > -SAME_PLACE_M

@@ -1,11 +1,11 @@
-"""Distance to the free edges of the skin, and which edges are free."""
+"""Distance to the free edges of the surface, and which edges are free."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 PIECE_M = 0.002
 CANDIDATES = 4
-# Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the skin.
+# Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
 SEAM_M = 3e-4
 SEAM_COSINE = -0.9
 
@@ -21,7 +21,7 @@ def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
 
 
 def without_seams(segments_m: np.ndarray) -> np.ndarray:
-    """Leave out edges of triangles along which another patch of the skin goes on.
+    """Leave out edges of triangles along which another patch of the surface goes on.
 
     Args:
         segments_m: (B, 2, 3) unpaired edges, each in the sense in which its triangle runs [m]:

@@ -46,8 +46,8 @@ def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Fac
 def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
     """Turn a part round that is sprayed from behind, and tell a closed one its outward side.
 
-    Which side of an open skin is outward depends on the program that exported it, and a closed
-    body has a skin on every side; the gun knows.
+    Which side of an open surface is outward depends on the program that exported it, and a closed
+    body has a surface on every side; the gun knows.
 
     Args:
         surface, positions_m, z_axes: as for ``facing``.
@@ -83,7 +83,7 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
 def _met(
     surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, int]:
-    """Normals of the skin that poses look at, (M, 3), their tool z, (M, 3), and how many miss."""
+    """Normals (M, 3) where poses look at the surface, their tool z (M, 3), and how many miss."""
     some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
     positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
     face = surface.occluder.first_faces(positions_m, z_axes)

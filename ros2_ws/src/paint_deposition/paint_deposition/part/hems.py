@@ -1,4 +1,4 @@
-"""Hems and rounded rims: strips in which the skin turns away within the thickness of a sheet."""
+"""Hems and rounded rims: strips where the surface turns away within a sheet's thickness."""
 
 import numpy as np
 from scipy.sparse import coo_matrix
@@ -9,7 +9,7 @@ from paint_deposition.part.refinement import face_areas_m2
 
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
-# Folds that turn more slowly belong to a curved skin.
+# Folds that turn more slowly belong to a curved surface.
 LEAST_RATE_PER_M = 20.0
 WIDEST_STRIP_M = 0.02
 LEAST_FOLD_RAD = np.radians(4.0)
@@ -21,7 +21,7 @@ BLOCK = 4096
 def hem_folds(
     ends_m: np.ndarray, folds_rad: np.ndarray, width_m: np.ndarray, turn_rad: float
 ) -> np.ndarray:
-    """(E,) bool: folds of which several in a row turn the skin convexly by at least a rim's turn.
+    """(E,) bool: folds of which several in a row turn convexly by at least a rim's turn.
 
     Args:
         ends_m: (E, 2, 3) each fold's ends [m].

@@ -1,13 +1,13 @@
-"""Where points near the part lie on its skin."""
+"""Where points near the part lie on its surface."""
 
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-# How much further away than the nearest skin the side that a normal points out of may be.
+# How much further away than the nearest surface the side that a normal points out of may be.
 THICKNESS_M = 0.06
-# Skin that leans further than this from the side that is painted is its back.
+# Surface that leans further than this from the side that is painted is its back.
 BACK_COSINE = -0.5
 # Beyond this distance the place is only good to a triangle: nobody paints or measures there.
 FAR_M = 0.3
@@ -17,15 +17,15 @@ BLOCK = 2048
 
 @dataclass(frozen=True)
 class Location:
-    """Places on the skin closest to N points.
+    """Places on the surface closest to N points.
 
     Attributes:
         positions_m: (N, 3) the places [m].
-        normals: (N, 3) outward unit normals of the skin there.
+        normals: (N, 3) outward unit normals of the surface there.
         faces: (N,) triangle.
         weights: (N, 3) barycentric weights of its corners.
         distance_m: (N,) from the point to the place [m].
-        angle_rad: (N,) between the point's own normal and the skin's, NaN where none was given.
+        angle_rad: (N,) between the point's own normal and the surface's, NaN where none was given.
     """
 
     positions_m: np.ndarray
@@ -36,7 +36,7 @@ class Location:
     angle_rad: np.ndarray
 
 
-class SkinLocator:
+class SurfaceLocator:
     """Finds closest places on a refined mesh.
 
     Args:

@@ -1,4 +1,4 @@
-"""Vertex normals of the curved skin that a triangulation stands for."""
+"""Vertex normals of the curved surface that a triangulation stands for."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, eye_array
@@ -15,7 +15,7 @@ WORST_CONDITION = 1e8
 BLOCK = 8192
 
 
-def skin_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(V, 3) outward unit normals of the curve through the vertices of smooth patches.
 
     The normal of a parabola through each vertex, fitted to those around it (Cazals and Pouget,

@@ -4,14 +4,14 @@ import numpy as np
 
 # Mean normals shorter than this share cancel, as on a closed body: they name no side.
 CANCELLED = 0.1
-# Parts whose mean normal is longer have their skin on one side, give or take a flange.
+# Parts whose mean normal is longer have their surface on one side, give or take a flange.
 ONE_SIDED = 0.5
-# Skin of the side that the gun paints leans less than this from the side's mean.
+# Surface of the side that the gun paints leans less than this from the side's mean.
 SIDE_COSINE = 0.5
 MOST_ROUNDS = 32
 # A part whose mean normal leans less than this from the horizontal plane stands.
 STANDING_COSINE = 0.7
-# Share of a closed body's skin along one direction that makes it a plate.
+# Share of a closed body's surface along one direction that makes it a plate.
 PLATE_SHARE = 0.7
 
 
@@ -23,7 +23,7 @@ def outward_side(
 ) -> np.ndarray:
     """(3,) unit mean of the (V, 3) normals on the side of the part that is painted.
 
-    On a closed body it is the mean over the skin that faces the gun, found from roughly where
+    On a closed body it is the mean over the surface that faces the gun, found from roughly where
     the gun is: which motion told it makes no difference, to the last bit, on a part that has
     sides. Where the normals cancel and no gun is known, it is -y, or z.
 
@@ -43,7 +43,7 @@ def outward_side(
 
 
 def is_one_sided(normals: np.ndarray, areas_m2: np.ndarray | None) -> bool:
-    """Whether the skin has one outward side by itself, as an open sheet has."""
+    """Whether the surface has one outward side by itself, as an open sheet has."""
     return bool(np.linalg.norm(mean_normal(normals, areas_m2)) >= ONE_SIDED)
 
 
@@ -55,7 +55,7 @@ def mean_normal(normals: np.ndarray, areas_m2: np.ndarray | None) -> np.ndarray:
 def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
     """Guess which way is down: -z for a part that stands, -y for one drawn lying in x-y.
 
-    A closed body lies if most of its skin does: that of a plate, not that of a block.
+    A closed body lies if most of its surface does: that of a plate, not that of a block.
     """
     mean = mean_normal(normals, areas_m2)
     length = np.linalg.norm(mean)
@@ -71,7 +71,7 @@ def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
 def _facing_side(
     normals: np.ndarray, areas_m2: np.ndarray | None, gun_side: np.ndarray
 ) -> np.ndarray:
-    """Mean normal of the skin about it, from the nearest of 26 directions until it settles."""
+    """Mean normal of the surface about it, from the nearest of 26 directions until it settles."""
     direction = np.rint(1.2 * gun_side / np.abs(gun_side).max())
     direction /= np.linalg.norm(direction)
     chosen = None

@@ -15,7 +15,7 @@ Covariate = np.ndarray | Callable[[], np.ndarray]
 
 
 class SurfacePoints:
-    """Points of a part's skin and their covariates; those that cost time are computed when used.
+    """Points on a part's surface and their covariates; the costly ones are computed when used.
 
     Args:
         positions_m: (V, 3) [m].
@@ -23,14 +23,14 @@ class SurfacePoints:
         down: (3,) unit vector of gravity in the mesh frame.
         outward: (3,) mean outward unit normal of the part; default that of the points.
         centre_m: (3,) centre of the part's bounding box [m]; default that of the points.
-        area_m2: (V,) skin that each point stands for, or None for gauge readings.
+        area_m2: (V,) surface that each point stands for, or None for gauge readings.
         curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
         edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
-        openness: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
+        sky_view_factor: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
         height_fraction: (V,) 0 at the lowest point of the part to 1 at the highest; default over
             the points themselves.
         slope_per_m: (V, V) sparse, maps a field on the points to its derivative along gravity's
-            component in the skin [1/m]; default no neighbours, hence zero.
+            component in the surface [1/m]; default no neighbours, hence zero.
 
     Covariates are arrays or functions without arguments that return them.
     """
@@ -46,7 +46,7 @@ class SurfacePoints:
         area_m2: np.ndarray | None = None,
         curvature_per_m: Covariate | None = None,
         edge_distance_m: Covariate | None = None,
-        openness: Covariate | None = None,
+        sky_view_factor: Covariate | None = None,
         height_fraction: Covariate | None = None,
         slope_per_m: csr_matrix | Callable[[], csr_matrix] | None = None,
     ) -> None:
@@ -62,7 +62,7 @@ class SurfacePoints:
         self._covariates = {
             'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
             'edge_distance_m': _default(edge_distance_m, lambda: np.full(count, np.inf)),
-            'openness': _default(openness, lambda: np.ones(count)),
+            'sky_view_factor': _default(sky_view_factor, lambda: np.ones(count)),
             'height_fraction': _default(height_fraction, self._own_height_fraction),
             'slope_per_m': _default(slope_per_m, lambda: csr_matrix((count, count))),
         }
@@ -78,7 +78,7 @@ class SurfacePoints:
 
     @property
     def curvature_per_m(self) -> np.ndarray:
-        """(V,) k1 + k2 [1/m], positive where the skin is concave toward the gun."""
+        """(V,) k1 + k2 [1/m], positive where the surface is concave toward the gun."""
         return self._covariate('curvature_per_m')
 
     @property
@@ -87,9 +87,9 @@ class SurfacePoints:
         return self._covariate('edge_distance_m')
 
     @property
-    def openness(self) -> np.ndarray:
+    def sky_view_factor(self) -> np.ndarray:
         """(V,) cosine-weighted share of the hemisphere over the point that is not hidden."""
-        return self._covariate('openness')
+        return self._covariate('sky_view_factor')
 
     @property
     def height_fraction(self) -> np.ndarray:
@@ -98,10 +98,10 @@ class SurfacePoints:
 
     @property
     def slope_per_m(self) -> csr_matrix:
-        """(V, V) sparse derivative along gravity's component in the skin [1/m].
+        """(V, V) sparse derivative along gravity's component in the surface [1/m].
 
-        ``points.slope_per_m @ field``: on a vertical skin the change of the field per metre
-        downward; on skin that leans by an angle a from the horizontal sin(a) times the change
+        ``points.slope_per_m @ field``: on a vertical surface the change of the field per metre
+        downward; on surface that leans by an angle a from the horizontal sin(a) times the change
         per metre, zero on a horizontal one. Rows of points without neighbours are zero.
         """
         return self._covariate('slope_per_m')

@@ -60,7 +60,7 @@ def refine(
     together with its own longest edge, which keeps every angle above half the smallest one given
     (Rivara, Mesh refinement processes based on the generalized bisection of simplices, 1984);
     needles are cut across instead. Normals go along and are interpolated, so that a coarse
-    triangulation of a curved skin keeps the normals of the curve.
+    triangulation of a curved surface keeps the normals of the curve.
 
     Args:
         vertices_m: (V, 3) [m].

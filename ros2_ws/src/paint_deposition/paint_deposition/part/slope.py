@@ -1,4 +1,4 @@
-"""Derivative of a field on the skin along the pull of gravity in it."""
+"""Derivative of a field on the surface along the pull of gravity in it."""
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -7,7 +7,7 @@ from paint_deposition.part.refinement import face_areas_m2, face_normals
 
 
 def downhill(normals: np.ndarray, down: np.ndarray) -> np.ndarray:
-    """(N, 3) component of ``down`` in the skin: unit length on vertical skin, 0 on horizontal."""
+    """(N, 3) component of ``down`` along the surface: length 1 where vertical, 0 where level."""
     return down - (normals @ down)[:, None] * normals
 
 
@@ -40,7 +40,7 @@ def slope_at_stencil(
     """Slope at n points from a field on (points, neighbours above, neighbours below).
 
     Args:
-        centres_m, above_m, below_m: (n, 3) the points and their neighbours on the skin [m].
+        centres_m, above_m, below_m: (n, 3) the points and their neighbours on the surface [m].
         way: (n, 3) ``downhill`` at the points.
 
     Returns:

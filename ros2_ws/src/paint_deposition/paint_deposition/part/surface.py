@@ -1,4 +1,4 @@
-"""The part's skin as a refined triangle mesh, and where points lie on it."""
+"""The part's surface as a refined triangle mesh, and where points lie on it."""
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.part import creases, curvature, edge_distance, hems, slope
-from paint_deposition.part.locating import Location, SkinLocator
-from paint_deposition.part.normals import skin_normals
+from paint_deposition.part.locating import Location, SurfaceLocator
+from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
 from paint_deposition.part.points import SurfacePoints, box_centre_m
 from paint_deposition.part.refinement import face_areas_m2, refine
@@ -20,19 +20,19 @@ ONE_WAY = 0.9
 
 @dataclass(frozen=True)
 class Surface:
-    """A part's skin; its outward side, where paint lands, is the one its triangles turn out.
+    """A part's surface; its outward side, where paint lands, is the one its triangles turn out.
 
     Attributes:
         vertices_m: (V, 3) [m]; along creases and rims of the same place several times, once for
             each smooth patch.
         faces: (F, 3) int, right-handed about the outward normal.
-        normals: (V, 3) outward unit normals of the curved skin.
-        vertex_areas_m2: (V,) a third of the adjoining triangles [m^2]; sums to the skin's area.
+        normals: (V, 3) outward unit normals of the curved surface.
+        vertex_areas_m2: (V,) a third of the adjoining triangles [m^2]; sums to the surface's area.
         down: (3,) unit vector of gravity in the mesh frame.
         rim_m: (B, 2, 3) segments of the free edges [m].
         notes: what had to be put right in the file, for the user to read.
         gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
-            of a part whose skin has several, a closed body.
+            of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
     """
 
@@ -76,7 +76,7 @@ class Surface:
         strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         vertices, normals, fine = refine(
             vertices_m[origin],
-            skin_normals(vertices_m[origin], patches),
+            surface_normals(vertices_m[origin], patches),
             patches,
             max_edge_length_m,
         )
@@ -98,7 +98,7 @@ class Surface:
 
     @property
     def area_m2(self) -> float:
-        """Area of the skin [m^2]."""
+        """Area of the surface [m^2]."""
         return float(self.vertex_areas_m2.sum())
 
     @cached_property
@@ -129,7 +129,7 @@ class Surface:
         )
 
     def locate(self, points_m: np.ndarray, normals: np.ndarray | None = None) -> Location:
-        """The closest places on the skin; see ``Location``.
+        """The closest places on the surface; see ``Location``.
 
         Args:
             points_m: (N, 3) [m].
@@ -144,12 +144,12 @@ class Surface:
         normals: np.ndarray | None = None,
         stencil_m: float | None = None,
     ) -> SurfacePoints:
-        """The skin at points near it, gauge readings for instance.
+        """The surface at points near it, gauge readings for instance.
 
         Args:
-            points_m: (N, 3) [m]; each is moved to the closest place on the skin.
+            points_m: (N, 3) [m]; each is moved to the closest place on the surface.
             normals: as in ``locate``.
-            stencil_m: if given, the N points are followed by N neighbours this far up the skin
+            stencil_m: if given, the N points are followed by N neighbours this far up the surface
                 and N this far down, and the slope is defined on the first N.
         """
         place = self.locate(points_m, normals)
@@ -177,13 +177,13 @@ class Surface:
             'centre_m': self.centre_m,
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
             'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
-            'openness': lambda: self.occluder.openness(positions_m, normals),
+            'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),
             'height_fraction': lambda: self._height_fraction(positions_m),
         }
 
     @cached_property
-    def _locator(self) -> SkinLocator:
-        return SkinLocator(self.vertices_m, self.faces, self.normals)
+    def _locator(self) -> SurfaceLocator:
+        return SurfaceLocator(self.vertices_m, self.faces, self.normals)
 
     @property
     def _only_side(self) -> np.ndarray | None:

@@ -6,7 +6,8 @@ from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.part.curvature import tangents
 
-# The last bit of a ray before the point that it goes to, and how far above the skin a ray starts.
+# The last bit of a ray before the point that it goes to, and how far above the surface a ray
+# starts.
 CLEARANCE_M = 5e-4
 LIFT_M = 1e-4
 AZIMUTHS, ELEVATIONS = 32, 8
@@ -42,7 +43,7 @@ class Occluder:
 
         Returns:
             (M, V) bool. A point's own surroundings within CLEARANCE_M do not hide it, nor does
-            skin that is seen from behind: incidence is the projection's business.
+            surface that is seen from behind: incidence is the projection's business.
         """
         origins_m, points_m = np.atleast_2d(origins_m), np.atleast_2d(points_m)
         seen = np.empty((len(origins_m), len(points_m)), dtype=bool)
@@ -58,11 +59,11 @@ class Occluder:
             ).reshape(length.shape)
         return seen
 
-    def openness(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
 
-        1 on flat and convex skin. The fixed set of SKY_RAYS directions resolves 0.002 where only
-        the lowest sky is hidden, as in the shallow recesses of a door.
+        1 on flat and convex surface. The fixed set of SKY_RAYS directions resolves 0.002 where
+        only the lowest sky is hidden, as in the shallow recesses of a door.
         """
         sky, weights = _sky()
         open_share = np.empty(len(points_m))

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 from paint_deposition.planning.index_search import farthest_within
 from paint_deposition.planning.pass_setup import PassSetup
 
@@ -14,7 +14,7 @@ STEPS = 100
 STEPS_WITH_EFFECTS = 12
 
 
-def index_drift_m(raster: Raster, index_m: float, tolerance: float) -> tuple[float, float]:
+def index_drift_m(raster: ParallelPasses, index_m: float, tolerance: float) -> tuple[float, float]:
     """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
     return (
         farthest_within(raster.sigma_n, index_m, LEAST * index_m, tolerance, STEPS),

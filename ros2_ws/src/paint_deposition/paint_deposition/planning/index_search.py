@@ -9,7 +9,7 @@ import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from paint_deposition.errors import PlanError
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 
 FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
@@ -35,13 +35,13 @@ class IndexCurve:
         minima: refined local minima inside the range, by index.
     """
 
-    raster: Raster
+    raster: ParallelPasses
     index_m: np.ndarray
     sigma_n: np.ndarray
     minima: tuple[Minimum, ...]
 
     @staticmethod
-    def of(raster: Raster, low_m: float, high_m: float) -> 'IndexCurve':
+    def of(raster: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':
         """Sample a range finely enough to see every minimum, and refine those."""
         finest = min(raster.first.finest_m, raster.second.finest_m)
         count = math.ceil((high_m - low_m) / finest * POINTS_PER_SCALE)
@@ -77,7 +77,7 @@ class IndexCurve:
         return windows
 
 
-def _refined(raster: Raster, low_m: float, high_m: float) -> Minimum:
+def _refined(raster: ParallelPasses, low_m: float, high_m: float) -> Minimum:
     found = minimize_scalar(
         raster.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
     )

@@ -5,13 +5,13 @@ import math
 import numpy as np
 
 from paint_deposition.model.collapse import Collapse
-from paint_deposition.model.uniformity import Raster, Variation, variation
+from paint_deposition.model.uniformity import ParallelPasses, Variation, variation
 
 # Share by which the film at the part's edge may fall below the least film inside.
 EDGE_LOSS = 0.05
 
 
-def passes_to_cover(raster: Raster, index_m: float, width_m: float) -> int:
+def passes_to_cover(raster: ParallelPasses, index_m: float, width_m: float) -> int:
     """Fewest passes, set evenly about the middle, that cover a width to its edges.
 
     Covered is where the film is at most EDGE_LOSS below the least film of the endless raster.
@@ -30,12 +30,16 @@ def passes_to_cover(raster: Raster, index_m: float, width_m: float) -> int:
     return most
 
 
-def variation_over_width(raster: Raster, index_m: float, passes: int, width_m: float) -> Variation:
+def variation_over_width(
+    raster: ParallelPasses, index_m: float, passes: int, width_m: float
+) -> Variation:
     """Mean and sigma_n over the whole width, its edges included, of so many passes."""
     return variation(_laid_evenly(raster, index_m, passes), -0.5 * width_m, 0.5 * width_m)
 
 
-def _laid_evenly(raster: Raster, index_m: float, passes: int) -> list[tuple[Collapse, float]]:
+def _laid_evenly(
+    raster: ParallelPasses, index_m: float, passes: int
+) -> list[tuple[Collapse, float]]:
     """Collapse and line of each pass, about the middle."""
     lines = (np.arange(passes) - 0.5 * (passes - 1)) * index_m
     return [

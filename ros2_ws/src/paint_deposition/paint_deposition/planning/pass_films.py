@@ -12,8 +12,8 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.pass_motion import trajectory_of
-from paint_deposition.planning.passes import RasterStyle, plan_pass
-from paint_deposition.planning.surface_map import SkinMap
+from paint_deposition.planning.passes import PassStyle, plan_pass
+from paint_deposition.planning.surface_map import SurfaceMap
 
 MOST_POINTS = 1500
 LINES_PER_SCALE = 5.0
@@ -27,7 +27,7 @@ class LineFilms:
     """Film at points spread evenly over the painted side, for passes along many lines.
 
     Args:
-        surface: the part. skin: its smoothed skin.
+        surface: the part. surface: its smoothed surface.
         model: effects on the finished film are left out.
         style: how passes are run.
         finest_m: scale on which the film changes across a pass [m].
@@ -38,17 +38,17 @@ class LineFilms:
     def __init__(
         self,
         surface: Surface,
-        skin: SkinMap,
+        surface_map: SurfaceMap,
         model: DepositionModel,
-        style: RasterStyle,
+        style: PassStyle,
         finest_m: float,
         beyond_m: float,
         progress: Callable[[float], None] = lambda share: None,
     ) -> None:
-        chosen = _spread(surface.vertex_areas_m2[skin.painted])
-        rows = np.flatnonzero(skin.painted)[chosen]
+        chosen = _spread(surface.vertex_areas_m2[surface_map.painted])
+        rows = np.flatnonzero(surface_map.painted)[chosen]
         points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
-        low, high = skin.extent_m[1]
+        low, high = surface_map.extent_m[1]
         self.low_m, self.high_m = low - beyond_m, high + beyond_m
         step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
         self.lines_m = np.linspace(
@@ -63,7 +63,7 @@ class LineFilms:
         rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
         self.films_um = np.empty((len(self.lines_m), len(rows)))
         for k, across in enumerate(self.lines_m):
-            planned = plan_pass(skin, float(across), style)
+            planned = plan_pass(surface_map, float(across), style)
             motion = trajectory_of((planned,), style, rate_hz=rate)
             path, _ = spray_path(motion, max_step_m=longest)
             integrator.reset()

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.passes import PlannedPass, RasterStyle
+from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.planned_move import PlannedMove
 
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
@@ -20,7 +20,7 @@ TURN_RATE_RAD_PER_S = math.radians(90.0)
 
 def trajectory_of(
     passes: tuple[PlannedPass, ...],
-    style: RasterStyle,
+    style: PassStyle,
     frame_id: str = '',
     start_ns: int = 0,
     rate_hz: float = POSE_RATE_HZ,
@@ -57,7 +57,7 @@ def trajectory_of(
     )
 
 
-def planned_moves(passes: tuple[PlannedPass, ...], style: RasterStyle) -> list[PlannedMove]:
+def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[PlannedMove]:
     """Straight moves for a robot program: lead-in, waypoints with the gun on, lead-out."""
     moves = []
     for planned in passes:
@@ -86,7 +86,7 @@ class _Leg:
 class _Ramp:
     """Trapezoidal speed over a way, from rest to rest."""
 
-    def __init__(self, length_m: float, speed_m_per_s: float, style: RasterStyle) -> None:
+    def __init__(self, length_m: float, speed_m_per_s: float, style: PassStyle) -> None:
         self.length = length_m
         self.acceleration = style.acceleration_m_per_s2
         # A short way is a triangle.
@@ -120,7 +120,7 @@ def _followed(planned: PlannedPass, ramp: _Ramp, rate_hz: float) -> _Leg:
     return _Leg(times, positions, quaternions, ramp.duration_s)
 
 
-def _transfer(before: PlannedPass, after: PlannedPass, style: RasterStyle, rate_hz: float) -> _Leg:
+def _transfer(before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float) -> _Leg:
     """Straight from the end of a pass to the start of the next, turning evenly with the travel."""
     start, end = before.positions_m[-1], after.positions_m[0]
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
@@ -138,7 +138,7 @@ def _transfer(before: PlannedPass, after: PlannedPass, style: RasterStyle, rate_
     return _Leg(times, positions, Slerp([0.0, 1.0], turn)(share).as_quat(), duration)
 
 
-def _transfer_speed(style: RasterStyle) -> float:
+def _transfer_speed(style: PassStyle) -> float:
     return max(style.speed_m_per_s, LEAST_TRANSFER_SPEED_M_PER_S)
 
 

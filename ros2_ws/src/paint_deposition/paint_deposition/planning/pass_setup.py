@@ -6,7 +6,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
@@ -46,19 +46,23 @@ class PassSetup:
             return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
-    def raster(self, model: DepositionModel, speed_m_per_s: float) -> Raster:
+    def raster(self, model: DepositionModel, speed_m_per_s: float) -> ParallelPasses:
         """The endless raster of these passes at a speed [m/s]."""
         options = {'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad}
         first = sampled_collapse(model, speed_m_per_s, **options)
         if self.one_way:
-            return Raster.one_way(first)
+            return ParallelPasses.one_way(first)
         if not model.effects:
-            return Raster(first, first.mirrored()) if self.gun_turns else Raster.one_way(first)
+            return (
+                ParallelPasses(first, first.mirrored())
+                if self.gun_turns
+                else ParallelPasses.one_way(first)
+            )
         # An effect may tell forth from back, or up from down.
         second = sampled_collapse(
             model, speed_m_per_s, backwards=True, turned=self.gun_turns, **options
         )
         difference = np.abs(second.film_um - first.film_um).max()
         if difference <= ALIKE * first.film_um.max():
-            return Raster.one_way(first)
-        return Raster(first, second)
+            return ParallelPasses.one_way(first)
+        return ParallelPasses(first, second)

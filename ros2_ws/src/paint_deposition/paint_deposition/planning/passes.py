@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.surface_map import SkinMap
+from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
 # Travel at full speed before the gun opens and after it closes.
@@ -14,11 +14,11 @@ SETTLING_M = 0.02
 
 
 @dataclass(frozen=True)
-class RasterStyle:
+class PassStyle:
     """How passes are run.
 
     Attributes:
-        standoff_m: TCP to smoothed skin [m].
+        standoff_m: TCP to smoothed surface [m].
         speed_m_per_s: of the TCP while spraying [m/s].
         acceleration_m_per_s2: of the robot [m/s^2].
         overspray_m: the gun opens and closes this far outside the part [m].
@@ -79,17 +79,17 @@ class PlannedPass:
 
 
 def plan_pass(
-    skin: SkinMap, across_m: float, style: RasterStyle, backwards: bool = False
+    surface_map: SurfaceMap, across_m: float, style: PassStyle, backwards: bool = False
 ) -> PlannedPass:
-    """The pass along a line: standoff and orientation follow the smoothed skin.
+    """The pass along a line: standoff and orientation follow the smoothed surface.
 
     The tool keeps its orientation about its axis whichever way the pass runs.
     """
-    first, last = skin.extent_near_m(across_m, style.band_m)
+    first, last = surface_map.extent_near_m(across_m, style.band_m)
     beyond = style.overspray_m + style.lead_m
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
-    positions, rotations = tool_poses(skin, line, np.full(count, across_m), style)
+    positions, rotations = tool_poses(surface_map, line, np.full(count, across_m), style)
     if backwards:
         line, positions, rotations = line[::-1], positions[::-1], rotations[::-1]
     step = np.linalg.norm(np.diff(positions, axis=0), axis=1)
@@ -109,25 +109,29 @@ def plan_pass(
 
 
 def tool_poses(
-    skin: SkinMap, travel_m: np.ndarray, across_m: np.ndarray, style: RasterStyle
+    surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
 ) -> tuple[np.ndarray, np.ndarray]:
-    """TCP (N, 3) [m] and tool axes (N, 3, 3), square to the smoothed skin at the standoff."""
-    axes = skin.axes
-    normals = skin.normals(travel_m, across_m)
-    height = skin.height_m(travel_m, across_m)
-    on_skin = axes.points_m(np.stack([travel_m, across_m, height], axis=1))
+    """TCP (N, 3) [m] and tool axes (N, 3, 3), square to the smoothed surface at the standoff."""
+    axes = surface_map.axes
+    normals = surface_map.normals(travel_m, across_m)
+    height = surface_map.height_m(travel_m, across_m)
+    on_surface = axes.points_m(np.stack([travel_m, across_m, height], axis=1))
     tool_z = -normals
     way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)
     cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
     rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
-    return on_skin + style.standoff_m * normals, rotations
+    return on_surface + style.standoff_m * normals, rotations
 
 
-def plan_passes(skin: SkinMap, lines_m: np.ndarray, style: RasterStyle) -> tuple[PlannedPass, ...]:
+def plan_passes(
+    surface_map: SurfaceMap, lines_m: np.ndarray, style: PassStyle
+) -> tuple[PlannedPass, ...]:
     """Passes along lines in this order; every other one backwards unless all run one way."""
     return tuple(
-        plan_pass(skin, float(across), style, backwards=bool(number % 2) and not style.one_way)
+        plan_pass(
+            surface_map, float(across), style, backwards=bool(number % 2) and not style.one_way
+        )
         for number, across in enumerate(lines_m)
     )

@@ -20,12 +20,12 @@ from paint_deposition.planning.pass_films import LineFilms
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.pass_placement import Placing, centred, place_passes
 from paint_deposition.planning.passes import (
+    PassStyle,
     PlannedPass,
-    RasterStyle,
     plan_passes,
 )
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.surface_map import SkinMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, part_axes
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
@@ -46,7 +46,7 @@ class PlanRequest:
             chosen for if it is not given.
         index_m: fixes the index; or else index_min_m and index_max_m bound it.
         tolerance: largest sigma_n on the part accepted.
-        standoff_m: TCP to smoothed skin; default: the skin lies on the model plane.
+        standoff_m: TCP to smoothed surface; default: the surface lies on the model plane.
         smoothing_radius_m: what is finer on the part is not followed.
         overspray_m: the gun opens this far before the part; default: where 90 % of the
             pattern's volume reach it.
@@ -110,7 +110,7 @@ class Plan:
     """
 
     request: PlanRequest
-    style: RasterStyle
+    style: PassStyle
     placing: Placing
     passes: tuple[PlannedPass, ...]
     trajectory: Trajectory
@@ -181,14 +181,14 @@ def plan(
         PlanError: the request has no answer; says why and what comes closest.
     """
     axes = part_axes(surface, request.direction, _vector(request.outward))
-    skin = SkinMap(surface, axes, request.smoothing_radius_m)
-    (first, last), extent = skin.extent_m
+    surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
+    (first, last), extent = surface_map.extent_m
     height = float(extent[1] - extent[0])
     plane = recommend(model, request.for_plane(height, float(last - first)))
     index_range = _index_range(request, plane)
     style = _style(model, request, plane)
     films = LineFilms(
-        surface, skin, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
+        surface, surface_map, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
         lambda share: progress('single passes', share),
     )  # fmt: skip
     ends = float(extent[0]), float(extent[1])
@@ -199,30 +199,32 @@ def plan(
     lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
     target = None if request.speed_m_per_s else request.target_um
     for round_ in range(TARGET_ROUNDS):
-        passes = plan_passes(skin, lines, style)
+        passes = plan_passes(surface_map, lines, style)
         trajectory = trajectory_of(passes, style, frame_id)
         film, emitted = _simulated(
             surface, model, trajectory, lambda share: progress('film', share)
         )
-        mean, sigma_n = _evenness(film[skin.painted], surface.vertex_areas_m2[skin.painted])
+        mean, sigma_n = _evenness(
+            film[surface_map.painted], surface.vertex_areas_m2[surface_map.painted]
+        )
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     statistics = film_statistics(
-        film[skin.painted],
-        surface.vertex_areas_m2[skin.painted],
+        film[surface_map.painted],
+        surface.vertex_areas_m2[surface_map.painted],
         emitted,
         target_um=request.target_um or 0.0,
         target_tolerance_um=0.1 * (request.target_um or 0.0),
     )
     return Plan(
-        request, style, placing, passes, trajectory, film, skin.painted, statistics, sigma_n,
-        plane, on_part,
+        request, style, placing, passes, trajectory, film, surface_map.painted, statistics,
+        sigma_n, plane, on_part,
     )  # fmt: skip
 
 
-def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> RasterStyle:
+def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> PassStyle:
     overspray = request.overspray_m
     if overspray is None:
         distance = plane.setup.standoff_m + model.projection.emission_offset_m
@@ -230,7 +232,7 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
         overspray = widening * float(np.interp(OVERSPRAY_SHARE, enclosed, radii))
-    return RasterStyle(
+    return PassStyle(
         standoff_m=plane.setup.standoff_m,
         speed_m_per_s=plane.speed_m_per_s,
         acceleration_m_per_s2=request.acceleration_m_per_s2,

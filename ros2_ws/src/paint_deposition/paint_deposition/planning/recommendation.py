@@ -9,7 +9,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.collapse import Collapse, half_width_m
-from paint_deposition.model.uniformity import Raster
+from paint_deposition.model.uniformity import ParallelPasses
 from paint_deposition.planning.drift import index_drift_m, standoff_drift_m
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
 from paint_deposition.planning.index_search import IndexCurve, Minimum, choose
@@ -188,7 +188,7 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
     )
 
 
-def _refuse_stripes(raster: Raster, best: Minimum, half_width_m: float) -> None:
+def _refuse_stripes(raster: ParallelPasses, best: Minimum, half_width_m: float) -> None:
     period = raster.period_m(best.index_m)
     least = raster.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
     if least < BARE * raster.mean_um(best.index_m):
@@ -224,7 +224,7 @@ def _at_target(
             raster = curve.raster
             first = raster.first.scaled(speed / wanted)
             second = first if raster.alike else raster.second.scaled(speed / wanted)
-            return replace(curve, raster=Raster(first, second)), best, wanted
+            return replace(curve, raster=ParallelPasses(first, second)), best, wanted
         speed = wanted
         curve = IndexCurve.of(setup.raster(model, speed), low, high)
         best = choose(curve, request.tolerance)
@@ -269,12 +269,16 @@ def _notes(
 
 
 def _held_otherwise(
-    model: DepositionModel, setup: PassSetup, raster: Raster, speed: float
-) -> Raster:
+    model: DepositionModel, setup: PassSetup, raster: ParallelPasses, speed: float
+) -> ParallelPasses:
     if model.effects:
         return replace(setup, gun_turns=not setup.gun_turns).raster(model, speed)
     first = raster.first
-    return Raster.one_way(first) if setup.gun_turns else Raster(first, first.mirrored())
+    return (
+        ParallelPasses.one_way(first)
+        if setup.gun_turns
+        else ParallelPasses(first, first.mirrored())
+    )
 
 
 def _acts_on_film(effect: Effect) -> bool:

@@ -1,4 +1,4 @@
-"""The part's skin as a taught path sees it: a smooth height over a plane in front of the part."""
+"""The part's surface as a taught path sees it: a smooth height over a plane before the part."""
 
 import math
 from dataclasses import dataclass
@@ -11,14 +11,14 @@ from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filte
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
 
-# Skin that leans further from the gun's side than this is not painted from it.
+# Surface that leans further from the gun's side than this is not painted from it.
 STEEPEST_COSINE = math.cos(math.radians(75.0))
 # Mean normals shorter than this share have no side: a closed body.
 LEAST_SIDE = 0.2
 FINEST_CELL_M, COARSEST_CELL_M = 0.004, 0.02
 CELLS_PER_RADIUS = 5.0
 MOST_CELLS = 1_000_000
-# The blend from the skin to what stands in for it outside, in radii.
+# The blend from the surface to what stands in for it outside, in radii.
 OUTSIDE_BLEND = 0.5
 LIFT_M = 1e-3
 
@@ -93,11 +93,11 @@ def part_axes(
     return PartAxes(centre, travel, np.cross(-outward, travel), outward)
 
 
-class SkinMap:
+class SurfaceMap:
     """Smoothed height and slope of the painted side over (travel, across).
 
-    About each place a plane is fitted to the skin with Gaussian weights of half the radius. Past
-    the part's edges height and slope go over to what they are at the edge.
+    About each place a plane is fitted to the surface with Gaussian weights of half the radius.
+    Past the part's edges height and slope go over to what they are at the edge.
 
     Args:
         surface: the part.
@@ -113,14 +113,14 @@ class SkinMap:
         facing = surface.normals @ axes.outward
         self.painted = (facing > STEEPEST_COSINE) & _in_front(surface, axes)
         if not self.painted.any():
-            raise PlanError('no skin faces the gun; give the direction to the gun (outward)')
-        self.skin_m = axes.coordinates_m(surface.vertices_m[self.painted])
+            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
+        self.surface_m = axes.coordinates_m(surface.vertices_m[self.painted])
         weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]
         cell = min(max(radius_m / CELLS_PER_RADIUS, FINEST_CELL_M), COARSEST_CELL_M)
         cell = max(cell, surface.longest_edge_m)
         margin = 3.0 * radius_m + 2.0 * cell
-        low = self.skin_m[:, :2].min(axis=0) - margin
-        high = self.skin_m[:, :2].max(axis=0) + margin
+        low = self.surface_m[:, :2].min(axis=0) - margin
+        high = self.surface_m[:, :2].max(axis=0) + margin
         cell = max(cell, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
         count = np.ceil((high - low) / cell).astype(int) + 1
         self._lines = [low[k] + cell * np.arange(count[k]) for k in range(2)]
@@ -133,7 +133,7 @@ class SkinMap:
         return self._splines[0].ev(*self._held(travel_m, across_m))
 
     def normals(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
-        """(N, 3) unit normals of the smoothed skin, in the part's frame."""
+        """(N, 3) unit normals of the smoothed surface, in the part's frame."""
         place = self._held(travel_m, across_m)
         slopes = [spline.ev(*place) for spline in self._splines[1:]]
         normals = np.stack([-slopes[0], -slopes[1], np.ones(len(slopes[0]))], axis=1)
@@ -142,12 +142,14 @@ class SkinMap:
     @cached_property
     def extent_m(self) -> np.ndarray:
         """(2, 2) least and greatest coordinate along travel and across [m]."""
-        return np.stack([self.skin_m[:, :2].min(axis=0), self.skin_m[:, :2].max(axis=0)], axis=1)
+        return np.stack(
+            [self.surface_m[:, :2].min(axis=0), self.surface_m[:, :2].max(axis=0)], axis=1
+        )
 
     def extent_near_m(self, across_m: float, band_m: float) -> tuple[float, float]:
-        """Ends along travel of the skin within a band about a line; of the nearest if none is."""
-        distance = np.abs(self.skin_m[:, 1] - across_m)
-        near = self.skin_m[distance <= max(band_m, distance.min() + self._cell_m), 0]
+        """Ends along travel of the surface in a band about a line; of the nearest if none is."""
+        distance = np.abs(self.surface_m[:, 1] - across_m)
+        near = self.surface_m[distance <= max(band_m, distance.min() + self._cell_m), 0]
         return float(near.min()), float(near.max())
 
     def _held(self, travel_m: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -160,9 +162,9 @@ class SkinMap:
         """Height and both slopes on the grid, by planes fitted with Gaussian weights."""
         shape = tuple(len(line) for line in self._lines)
         origin = np.array([line[0] for line in self._lines])
-        at = np.rint((self.skin_m[:, :2] - origin) / self._cell_m).astype(int)
+        at = np.rint((self.surface_m[:, :2] - origin) / self._cell_m).astype(int)
         cells = np.ravel_multi_index((at[:, 0], at[:, 1]), shape)
-        u, v, z = self.skin_m.T
+        u, v, z = self.surface_m.T
         deviation = 0.5 * self.radius_m / self._cell_m
 
         def moment(values: np.ndarray) -> np.ndarray:
@@ -171,7 +173,7 @@ class SkinMap:
 
         total = np.maximum(moment(np.ones(len(u))), 1e-300)
         mean_u, mean_v, mean_z = (moment(values) / total for values in (u, v, z))
-        # A bit of the kernel's own spread keeps slopes finite where hardly any skin is near.
+        # A bit of the kernel's own spread keeps slopes finite where hardly any surface is near.
         ridge = 1e-3 * self.radius_m**2
         uu = moment(u * u) / total - mean_u**2 + ridge
         vv = moment(v * v) / total - mean_v**2 + ridge
@@ -183,12 +185,12 @@ class SkinMap:
         slope_v = (vz * uu - uz * uv) / determinant
         grid_u, grid_v = np.meshgrid(*self._lines, indexing='ij')
         height = mean_z + slope_u * (grid_u - mean_u) + slope_v * (grid_v - mean_v)
-        skin = np.bincount(cells, minlength=math.prod(shape)).reshape(shape) > 0
-        return [self._extended(field, skin) for field in (height, slope_u, slope_v)]
+        surface_map = np.bincount(cells, minlength=math.prod(shape)).reshape(shape) > 0
+        return [self._extended(field, surface_map) for field in (height, slope_u, slope_v)]
 
-    def _extended(self, field: np.ndarray, skin: np.ndarray) -> np.ndarray:
+    def _extended(self, field: np.ndarray, surface_map: np.ndarray) -> np.ndarray:
         """The field inside the part; outside it what it is at the nearest place inside."""
-        inside = binary_closing(skin, iterations=3) | skin
+        inside = binary_closing(surface_map, iterations=3) | surface_map
         nearest = distance_transform_edt(~inside, return_distances=False, return_indices=True)
         held = field[tuple(nearest)]
         deviation = OUTSIDE_BLEND * self.radius_m / self._cell_m

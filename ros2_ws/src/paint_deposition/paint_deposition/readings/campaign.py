@@ -11,7 +11,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.readings.outliers import left_out_lines
 from paint_deposition.readings.readings import PointMeans, Readings
 
-# Readings further from the skin, or facing more away from it, do not belong to the part.
+# Readings further from the surface, or facing more away from it, do not belong to the part.
 MAX_DISTANCE_M = 0.02
 MAX_ANGLE_RAD = np.radians(60.0)
 # Distance to the neighbours from which the film's slope at a reading is taken [m].
@@ -20,7 +20,7 @@ STENCIL_M = 0.006
 
 @dataclass(frozen=True)
 class Experiment:
-    """One painted part: the skin, the path that painted it, the readings taken on it.
+    """One painted part: the surface, the path that painted it, the readings taken on it.
 
     Attributes:
         name: for reports.
@@ -29,7 +29,7 @@ class Experiment:
         readings: those that are used.
         means: the readings averaged over repeats; its P points are what is fitted.
         taken: all readings; used: (N,) which of them are used.
-        points: the P places on the skin, with covariates and slope stencils behind them.
+        points: the P places on the surface, with covariates and slope stencils behind them.
         files: where mesh, trajectory and readings came from, for reports.
     """
 
@@ -51,10 +51,10 @@ class Experiment:
         readings: Readings,
         files: dict[str, str] | None = None,
     ) -> 'Experiment':
-        """Match readings to the skin.
+        """Match readings to the surface.
 
         Raises:
-            ReadingsError: readings too far off the skin or on its other side.
+            ReadingsError: readings too far off the surface or on its other side.
         """
         means = PointMeans.of(readings)
         normals = None if readings.normals is None else readings.normals[means.first]
@@ -147,7 +147,7 @@ def _refuse_far(readings: Readings, means: PointMeans, distance_m: np.ndarray) -
     worst = far[np.argmax(distance_m[far])]
     where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
     raise ReadingsError(
-        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's skin, "
+        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
         f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
         f'm (limit {MAX_DISTANCE_M:g}); give positions in the mesh frame, in metres'
     )
@@ -159,6 +159,6 @@ def _refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndar
         worst = away[np.argmax(angle_rad[away])]
         raise ReadingsError(
             f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
-            f"skin, point '{readings.point[means.first[worst]]}' by "
+            f"surface, point '{readings.point[means.first[worst]]}' by "
             f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
         )

@@ -97,7 +97,7 @@ def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> li
         Covariate('standoff_ratio', rays.mean(rays.standoff_ratio)),
         Covariate('curvature_per_m', points.curvature_per_m),
         Covariate('edge_closeness', np.exp(-points.edge_distance_m / EDGE_LENGTH_M)),
-        Covariate('openness', points.openness),
+        Covariate('sky_view_factor', points.sky_view_factor),
         Covariate('height_fraction', points.height_fraction),
         Covariate('across_m', points.positions_m @ part.across),
         Covariate('spray_pass', rays.mean(path.spray_pass[:, np.newaxis])),

@@ -8,7 +8,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.readings.campaign import Experiment
 
-# A skin whose normals stay this close together is flat, and passes this parallel are parallel.
+# A surface whose normals stay this close together is flat, and passes this parallel are parallel.
 FLAT_COSINE = np.cos(np.radians(3.0))
 PARALLEL_COSINE = np.cos(np.radians(2.0))
 SQUARE_COSINE = np.cos(np.radians(5.0))
@@ -26,7 +26,7 @@ class Panel:
         passes_m: (n,) coordinate of each pass's line [m].
         speed_m_per_s: (n,) of each pass.
         mirrored: (n,) bool, passes on which the gun was turned by half a turn against the first.
-        distance_m: mean distance of the TCP from the skin, the standoff [m].
+        distance_m: mean distance of the TCP from the surface, the standoff [m].
         travel_rad: direction of the first pass in the tool's x-y frame [rad].
     """
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.comparison.comparison import Comparison
-from paint_deposition.comparison.residual_field import point_residuals_um, spread_over_skin
+from paint_deposition.comparison.residual_field import point_residuals_um, spread_over_surface
 from paint_deposition.files.atomic import replacing
 from paint_deposition.film.colour_scales import residual_scale
 from paint_deposition.fitting.study import Study
@@ -27,7 +27,7 @@ def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparis
         count = len(experiment)
         points = experiment.points
         fields.append(
-            spread_over_skin(
+            spread_over_surface(
                 experiment.surface, points.positions_m[:count], points.normals[:count], residual
             )
         )

@@ -7,7 +7,7 @@ from paint_deposition.part.points import SurfacePoints
 
 
 class ConvexAttraction(Effect):
-    """The field crowds on convex skin and draws charged drops to it.
+    """The field crowds on convex surface and draws charged drops to it.
 
     Acts on the film: times 1 + a max(-kappa, 0) / kappa_ref, kappa the curvature (positive where
     concave toward the gun), kappa_ref = 1 / 250 mm. Only ever adds.

@@ -1,4 +1,4 @@
-"""A gauge that reads high on convex skin and low in hollows."""
+"""A gauge that reads high on convex surface and low in hollows."""
 
 import numpy as np
 
@@ -10,7 +10,7 @@ class GaugeCurvatureBias(Effect):
     """The probe was zeroed on flat metal; on curved metal its field finds less, or more, of it.
 
     Acts on the reading: minus b kappa / kappa_ref, kappa the curvature (positive where concave
-    toward the gun), kappa_ref = 1 / 250 mm. Positive b: convex skin reads too much, hollows too
+    toward the gun), kappa_ref = 1 / 250 mm. Positive b: convex surface reads too much, hollows too
     little. The film itself is as it was.
     """
 
@@ -22,7 +22,8 @@ class GaugeCurvatureBias(Effect):
 
     bias_um: float = parameter(
         0.0, low=0.0, high=10.0, typical=1.2, unit='um',
-        description='b, excess reading on convex skin of radius 250 mm; positive reads high there',
+        description='b, excess reading on convex surface of radius 250 mm; positive reads high
+        there',
     )  # fmt: skip
 
     def on_gauge(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:

@@ -1,13 +1,13 @@
-"""Attraction to skin that turns away from the gun, or rebound from it."""
+"""Attraction to surface that turns away from the gun, or rebound from it."""
 
 from paint_deposition.effects.base import Effect, Ray, parameter
 
 
 class IncidenceAttraction(Effect):
-    """Charged drops follow the field to skin that turns away; uncharged ones rebound from it.
+    """Charged drops follow the field to surface that turns away; uncharged ones rebound from it.
 
     Flux along each ray times 1 + a (1 - cos theta), theta the incidence. Positive a: the field
-    bends the drops toward the skin, and inclined skin gets more than the projection says.
+    bends the drops toward the surface, and inclined surface gets more than the projection says.
     Negative a: glancing drops are carried past, and it gets less; a = -1 is another factor
     cos theta, the most that was measured of any spray. Linear in a on both sides, so the sign is
     what the readings say.
@@ -15,7 +15,7 @@ class IncidenceAttraction(Effect):
 
     id = 'incidence_attraction'
     family = 'incidence'
-    signature = 'grows with incidence; most on skin that turns away from the gun'
+    signature = 'grows with incidence; most on surface that turns away from the gun'
     rivals = ('standoff_efficiency',)
     source = (
         'hypothesis of Conner et al. (IROS 2002), section 4.3; field and space charge: Ellwood '

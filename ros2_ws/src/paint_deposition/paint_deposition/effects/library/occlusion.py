@@ -1,4 +1,4 @@
-"""Metal that stands between the gun and the skin."""
+"""Metal that stands between the gun and the surface."""
 
 from paint_deposition.effects.base import Effect, parameter
 
@@ -12,7 +12,7 @@ class Occlusion(Effect):
 
     id = 'occlusion'
     family = 'visibility'
-    signature = 'less behind other parts of the skin, with a step at the edge of the shadow'
+    signature = 'less behind other parts of the surface, with a step at the edge of the shadow'
     rivals = ('faraday_shielding',)
     source = 'rays against the mesh (Moeller and Trumbore), as in simulators of cold spray'
 

@@ -1,4 +1,4 @@
-"""Wet paint that runs down a steep skin."""
+"""Wet paint that runs down a steep surface."""
 
 import numpy as np
 
@@ -11,7 +11,7 @@ REFERENCE_FILM_UM = 20.0
 class Sag(Effect):
     """Gravity drives a flux rho g h^3 / (3 eta) down the wet film until it has set.
 
-    Acts on the film: T - d/ds [run T (T / 20 um)^2], s down the skin. ``run_m`` is how far a
+    Acts on the film: T - d/ds [run T (T / 20 um)^2], s down the surface. ``run_m`` is how far a
     film of 20 um as a whole runs before it sets; the cube makes a film twice as thick run four
     times as far. Thick zones lose at their top and gain below; the volume stays, but for what
     runs over the lower edge. Of first order: the run must be short against the film's features.
@@ -30,7 +30,8 @@ class Sag(Effect):
 
     run_m: float = parameter(
         0.0, low=0.0, high=0.03, typical=0.006, unit='m',
-        description='way that a 20 um film runs on vertical skin until it sets; positive is down',
+        description='way that a 20 um film runs on vertical surface until it sets; positive is
+        down',
     )  # fmt: skip
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:

@@ -8,7 +8,7 @@ class StandoffEfficiency(Effect):
     """Drops that fly further lose momentum, evaporate and feel a weaker field: fewer arrive.
 
     Flux along each ray times (L / Omega)^-a, L the distance along the bell's axis and Omega that
-    of the model plane, where nothing changes. Positive a: the far skin gets less.
+    of the model plane, where nothing changes. Positive a: the far surface gets less.
     """
 
     id = 'standoff_efficiency'

@@ -41,7 +41,7 @@ class ModelComparison(PaintingNode):
 
     The residual, measured minus predicted, starts as the whole reading and falls to what the
     model does not explain. It is predicted in double precision at the places of the readings, and
-    spread over the skin around them only to be looked at.
+    spread over the surface around them only to be looked at.
     """
 
     PARAMETERS = (
@@ -63,7 +63,7 @@ class ModelComparison(PaintingNode):
         NodeParameter(
             'color_radius_m',
             0.0,
-            'How far around a reading the skin has its colour; 0: from their spacing [m]',
+            'How far around a reading the surface has its colour; 0: from their spacing [m]',
             low=0.0,
             high=5.0,
         ),

@@ -32,7 +32,7 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 TEND_PERIOD_S = 0.1
-# Which side of an open skin is outward is settled by so many poses that look at it; after so
+# Which side of an open surface is outward is settled by so many poses that look at it; after so
 # many in all it stays as it is.
 POSES_FACING = 50
 POSES_CONSIDERED = 2000

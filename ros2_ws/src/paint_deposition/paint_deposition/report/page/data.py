@@ -19,8 +19,8 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.results.fitted_model import history_as_list
 
-# Share of the skin that stays within the range told; single vertices at rims do not count.
-MOST_OF_THE_SKIN = 0.98
+# Share of the surface that stays within the range told; single vertices at rims do not count.
+MOST_OF_THE_SURFACE = 0.98
 
 
 @dataclass(frozen=True)
@@ -28,8 +28,8 @@ class Change:
     """What one effect does to the readings a gauge would take, over all experiments.
 
     Attributes:
-        least_um, most_um: with the effect minus without it, over most of the skin [um].
-        rms_um: root mean square over the skin [um].
+        least_um, most_um: with the effect minus without it, over most of the surface [um].
+        rms_um: root mean square over the surface [um].
     """
 
     least_um: float
@@ -114,8 +114,8 @@ class ReportData:
         return profiles_of(self.study, self.models)
 
     @cached_property
-    def skins_um(self) -> list[list[np.ndarray]]:
-        """Film on the skin: for each experiment and each model (V,) [um]."""
+    def surfaces_um(self) -> list[list[np.ndarray]]:
+        """Film on the surface: for each experiment and each model (V,) [um]."""
         return [[painted.film_um for painted in row] for row in self._painted]
 
     @cached_property
@@ -143,11 +143,11 @@ class ReportData:
         return found
 
     @cached_property
-    def _skins(self) -> list[SurfacePoints]:
+    def _surfaces(self) -> list[SurfacePoints]:
         return [experiment.surface.points() for experiment in self.experiments]
 
     def _paint(self, index: int, model: DepositionModel) -> FilmIntegrator:
-        experiment, points = self.experiments[index], self._skins[index]
+        experiment, points = self.experiments[index], self._surfaces[index]
         integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
         integrator.add(experiment.path)
         return integrator
@@ -161,7 +161,7 @@ class ReportData:
 def _change(difference_um: np.ndarray, area_m2: np.ndarray) -> Change:
     order = np.argsort(difference_um)
     share = np.cumsum(area_m2[order]) / area_m2.sum()
-    tail = 0.5 * (1.0 - MOST_OF_THE_SKIN)
+    tail = 0.5 * (1.0 - MOST_OF_THE_SURFACE)
     least, most = (
         float(difference_um[order[min(np.searchsorted(share, at), len(order) - 1)]])
         for at in (tail, 1.0 - tail)

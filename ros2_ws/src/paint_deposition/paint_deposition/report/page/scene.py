@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.comparison.residual_field import spread_over_skin
+from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.film.colour_scales import round_up
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.readings.campaign import Experiment
@@ -18,7 +18,7 @@ from paint_deposition.report.page.style import (
     INK,
     MUTED,
     RESIDUAL_COLOURS,
-    SKIN,
+    SURFACE,
     base_layout,
 )
 
@@ -26,9 +26,9 @@ from paint_deposition.report.page.style import (
 SHOWN_SHARE = 0.98
 POINTS_A_PASS = 60
 RESIDUAL = 'measured minus predicted [µm]'
-# Marks float this far above the skin, so that it does not swallow half of them [m].
+# Marks float this far above the surface, so that it does not swallow half of them [m].
 LIFT_M = 0.008
-# Bare skin shows its relief; film and residual have the colours of their scale.
+# Bare surface shows its relief; film and residual have the colours of their scale.
 SHADED = {'ambient': 0.9, 'diffuse': 0.35, 'specular': 0.0, 'roughness': 1.0, 'fresnel': 0.0}
 TRUE_COLOURS = SHADED | {'ambient': 1.0, 'diffuse': 0.2}
 # Plotly's camera sees 45 deg from bottom to top.
@@ -45,16 +45,16 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
     points, surface = experiment.points, experiment.surface
     count = len(experiment)
     positions, normals = points.positions_m[:count], points.normals[:count]
-    fields = [spread_over_skin(surface, positions, normals, r[rows]) for r in data.residuals_um]
+    fields = [spread_over_surface(surface, positions, normals, r[rows]) for r in data.residuals_um]
     near = np.isfinite(fields[0])[surface.faces].all(axis=1)
     traces = []
     last = len(data.models) - 1
     for pane, k in enumerate((0, last) if data.improved else (last,)):
         scene = {'scene': f'scene{pane + 1 if pane else ""}'}
         traces += [
-            _mesh('far', ['residual'], color=SKIN) | scene,
+            _mesh('far', ['residual'], color=SURFACE) | scene,
             _mesh('near', ['residual'], intensity=_f32(fields[k]), coloraxis='coloraxis') | scene,
-            _mesh('all', ['film'], intensity=_f32(data.skins_um[index][k]),
+            _mesh('all', ['film'], intensity=_f32(data.surfaces_um[index][k]),
                   coloraxis='coloraxis2') | scene,
             _readings(data, positions + LIFT_M * normals, rows, k) | scene,
         ]  # fmt: skip
@@ -97,7 +97,7 @@ def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
     wanted = np.array([place.position_m for _, place in numbered])
     lifted = wanted + 2.0 * LIFT_M * experiment.surface.outward
     traces = [
-        _mesh('all', ['places'], color=SKIN),
+        _mesh('all', ['places'], color=SURFACE),
         {'type': 'scatter3d', **_xyz(measured), 'mode': 'markers', 'name': 'measured',
          'marker': {'size': 3, 'color': MUTED}, 'hoverinfo': 'skip', 'views': ['places']},
         {'type': 'scatter3d', **_xyz(lifted), 'mode': 'markers+text', 'name': 'to measure',
@@ -189,7 +189,7 @@ def _passes(path: SprayPath) -> list[dict[str, Any]]:
 def _layout(data: ReportData, experiment: Experiment) -> dict[str, Any]:
     absolute = np.abs(np.concatenate(data.residuals_um))
     reach = round_up(float(np.quantile(absolute, SHOWN_SHARE)))
-    films = [film for part in data.skins_um for film in part]
+    films = [film for part in data.surfaces_um for film in part]
     thickest = round_up(max(float(film.max()) for film in films))
     bar = {
         'orientation': 'h', 'thickness': 12, 'len': 0.5, 'x': 0.5, 'xanchor': 'center',

@@ -12,7 +12,7 @@ MUTED = '#616e7c'
 GRID = '#e4e7eb'
 BEFORE = '#9aa5b1'
 ACCENT = '#00708c'
-SKIN = '#c3c9cf'
+SURFACE = '#c3c9cf'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 # 95 % of normally distributed readings lie within so many standard deviations.
 TWO_SIDED_95 = 1.96

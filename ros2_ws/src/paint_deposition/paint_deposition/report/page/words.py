@@ -14,7 +14,7 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
     'standoff_ratio': ('Distance over Omega', '1'),
     'curvature_per_m': ('Curvature, + concave', '1/m'),
     'edge_closeness': ('Closeness to an edge', '1'),
-    'openness': ('Openness to the booth', '1'),
+    'sky_view_factor': ('Openness to the booth', '1'),
     'height_fraction': ('Height on the part', '1'),
     'across_m': ('Position across', 'm'),
     'spray_pass': ('Pass that painted it', '1'),

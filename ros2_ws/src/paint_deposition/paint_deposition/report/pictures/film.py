@@ -1,4 +1,4 @@
-"""The painted part from the front: film as colour on the shaded skin, and the way of the gun."""
+"""The painted part from the front: film as colour on the shaded surface, and the tool path."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +31,7 @@ LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.25, 0.24, 3.2
 SNAP_COSINE = 0.9
 # Way of the gun around the part that is still shown [m].
 MARGIN_M = 0.18
-# Light from above left; how much a lean of the skin brightens or darkens it.
+# Light from above left; how much a lean of the surface brightens or darkens it.
 LIGHT, CONTRAST = (-0.45, 0.75), 0.5
 DARKEST, BRIGHTEST = 0.55, 1.18
 ARROW_EVERY_M = 0.45
@@ -92,7 +92,7 @@ def write_door_picture(
     corners = view.flat(surface.vertices_m)
     low, high = _window(corners, view.flat(spray.position_m[spray.flow > 0.0]))
     figure, axes = _canvas(high - low)
-    _draw_skin(axes, surface, film_um, view, scale, statistics.painted_above_um)
+    _draw_surface(axes, surface, film_um, view, scale, statistics.painted_above_um)
     _draw_gun(axes, spray, view, low, high)
     axes.set_xlim(low[0], high[0])
     axes.set_ylim(low[1], high[1])
@@ -128,7 +128,7 @@ def _window(corners: np.ndarray, gun: np.ndarray) -> tuple[np.ndarray, np.ndarra
     return low - room, high + room
 
 
-def _draw_skin(
+def _draw_surface(
     axes: Axes,
     surface: Surface,
     film_um: np.ndarray,

@@ -1,4 +1,4 @@
-"""Skins of known shape, triangulated as one likes."""
+"""Surfaces of known shape, triangulated as one likes."""
 
 from collections.abc import Callable
 from itertools import pairwise
@@ -19,7 +19,7 @@ def triangulated(
     half_height_m: float | None = None,
     jitter: float = 0.0,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices and faces of the skin y = depth(x, z), outward to -y.
+    """Vertices and faces of the surface y = depth(x, z), outward to -y.
 
     ``jitter`` moves the grid's vertices by that share of the spacing, those on the rim along it.
     """
@@ -42,9 +42,9 @@ def triangulated(
 def solid(
     vertices_m: np.ndarray, faces: np.ndarray, thickness_m: float, drawn_along: str = 'normals'
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Close a sheet whose outward side is -y: an inner skin behind it, and a rim.
+    """Close a sheet whose outward side is -y: an inner surface behind it, and a rim.
 
-    ``drawn_along`` says where the inner skin lies: along the sheet's 'normals', or along 'y'.
+    ``drawn_along`` says where the inner surface lies: along the sheet's 'normals', or along 'y'.
     """
     inward = np.tile([0.0, 1.0, 0.0], (len(vertices_m), 1))
     if drawn_along == 'normals':
