@@ -27,8 +27,8 @@ bench: build  ## measure the speed of simulation and nodes
 bench-diagnosis: build  ## score the diagnosis on doors with known defects
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
 
-lint: build  ## check style and types
-	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy
+lint: build  ## check style, types and the order of the rooms
+	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .

@@ -22,8 +22,7 @@ class GaugeCurvatureBias(Effect):
 
     bias_um: float = parameter(
         0.0, low=0.0, high=10.0, typical=1.2, unit='um',
-        description='b, excess reading on convex surface of radius 250 mm; positive reads high
-        there',
+        description='b, excess reading on a convex radius of 250 mm; positive reads high there',
     )  # fmt: skip
 
     def on_gauge(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:

@@ -30,8 +30,7 @@ class Sag(Effect):
 
     run_m: float = parameter(
         0.0, low=0.0, high=0.03, typical=0.006, unit='m',
-        description='way that a 20 um film runs on vertical surface until it sets; positive is
-        down',
+        description='run of a 20 um film on a vertical surface until it sets; positive is down',
     )  # fmt: skip
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
