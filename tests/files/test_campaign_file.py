@@ -85,8 +85,8 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'trajectory': 'nowhere'}, "experiment 'door': .*nowhere"),
         ({'measurements': 'none.csv'}, "experiment 'door': .*none.csv: no such file"),
         ({'pose_topic': '/pose'}, "experiment 'door': .*/atomizer/pose"),
-        ({'measurement': 'door.csv'}, "unknown key 'measurement' .* is 'measurements'"),
-        ({'speed': 1}, "unknown key 'speed' in experiment 1; the nearest known key is"),
+        ({'measurement': 'door.csv'}, "unknown key 'measurement' .*did you mean 'measurements'"),
+        ({'speed': 1}, "unknown key 'speed' in experiment 1; there are: mesh, traj"),
         ({'mesh_scale': 0}, "'mesh_scale' is 0; expected above 0"),
         ({'mesh_scale': True}, "'mesh_scale' is True; expected above 0"),
         (

@@ -161,7 +161,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'part_parent_frame'),
         ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]}, 'unit quaternion'),
         ({'down': [0.0, 0.0, 0.0]}, 'not all zero'),
-        ({'mesh_fil': 'x'}, 'did you mean mesh_file'),
+        ({'mesh_fil': 'x'}, "did you mean 'mesh_file'?"),
     ],
 )
 def test_bad_input_is_one_line(ros_context, tmp_path, values, words):

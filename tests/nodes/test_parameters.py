@@ -87,8 +87,8 @@ def test_lists_of_text(declared):
         ({'topics': [1, 2]}, 'tester: topics is [1, 2]: give a list of texts'),
         ({'compression': 'zip'}, "tester: compression is 'zip': choose one of zstd, none"),
         ({'odd': 2}, 'tester: odd is 2: must be an odd number'),
-        ({'mesh_fil': 'x'}, 'tester has no parameter mesh_fil; did you mean mesh_file?'),
-        ({'speed': 1.0}, 'tester has no parameter speed; did you mean'),
+        ({'mesh_fil': 'x'}, "tester has no parameter mesh_fil; did you mean 'mesh_file'?"),
+        ({'speed': 1.0}, 'tester has no parameter speed; '),
     ],
 )
 def test_the_line_for_a_wrong_override(declared, overrides, line):

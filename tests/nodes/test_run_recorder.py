@@ -316,7 +316,7 @@ def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
         ({'compression': 'zip'}, "compression is 'zip': choose one of zstd, lz4, none"),
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
-        ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean topics'),
+        ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
     ],
 )
 def test_bad_input_is_told_at_the_start(record, parameters, says):

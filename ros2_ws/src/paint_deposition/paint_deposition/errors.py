@@ -1,5 +1,11 @@
 """Errors that a user can act on: one line naming the thing, its value and the remedy."""
 
+import difflib
+from collections.abc import Iterable
+
+# Names less alike than this share, as difflib measures it, are not taken for each other.
+ALIKE = 0.4
+
 
 class PaintError(Exception):
     """Base of every error this package raises on purpose; its text is shown to the user as is."""
@@ -23,3 +29,20 @@ class ReadingsError(PaintError):
 
 class PlanError(PaintError):
     """A request for passes or an index has no answer."""
+
+
+def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str:
+    """The remedy for an unknown name.
+
+    Args:
+        name: what was given.
+        known: what could have been meant.
+        otherwise: what to say where none of these looks like it; default: list them all.
+    """
+    known = list(known)
+    # A forgotten unit is likelier than a wrong letter: K1 is meant for K1_cm3_per_s, not K2.
+    near = [other for other in known if other.lower().startswith(f'{name}_'.lower())]
+    near = near or difflib.get_close_matches(str(name), known, n=1, cutoff=ALIKE)
+    if near:
+        return f'did you mean {near[0]!r}?'
+    return otherwise or f'there are: {", ".join(known) or "none"}'

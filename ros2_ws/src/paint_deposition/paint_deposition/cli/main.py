@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import os
 import sys
 
 import click
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, did_you_mean
 
 # Threads that share matrices as small as ours mostly wait for each other, on a busy machine ten
 # times as long as the work takes. To be set before NumPy is loaded.
@@ -48,8 +47,7 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         name = arguments[0]
         if name not in COMMANDS:
-            near = difflib.get_close_matches(name, COMMANDS, n=1)
-            remedy = f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(COMMANDS)}'
+            remedy = did_you_mean(name, COMMANDS)
             raise click.UsageError(f'no command is called {name!r}; {remedy}')
         return super().resolve_command(context, arguments)
 

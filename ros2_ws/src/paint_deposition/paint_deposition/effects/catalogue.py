@@ -1,13 +1,12 @@
 """Every effect that the project knows."""
 
-import difflib
 import importlib
 import pkgutil
 from types import MappingProxyType
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.
 FAMILY_ORDER = (
@@ -42,6 +41,4 @@ def effect_class(effect_id: str) -> type[Effect]:
     """
     if effect_id in EFFECTS:
         return EFFECTS[effect_id]
-    near = difflib.get_close_matches(effect_id, EFFECTS, n=1, cutoff=0.4)
-    remedy = f'did you mean {near[0]!r}?' if near else f'there are: {", ".join(EFFECTS)}'
-    raise ModelError(f'no effect is called {effect_id!r}; {remedy}')
+    raise ModelError(f'no effect is called {effect_id!r}; {did_you_mean(effect_id, EFFECTS)}')

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.errors import PaintError, ReadingsError
+from paint_deposition.errors import PaintError, ReadingsError, did_you_mean
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.files.refusals import nearest
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.part.facing import toward_the_gun
@@ -122,4 +121,6 @@ def _is_number(value: Any) -> bool:
 def _check_keys(path: Path, content: dict, known: tuple[str, ...], where: str) -> None:
     for key in content:
         if key not in known:
-            raise ReadingsError(f'{path}: unknown key {key!r} in {where}; {nearest(key, known)}')
+            raise ReadingsError(
+                f'{path}: unknown key {key!r} in {where}; {did_you_mean(key, known)}'
+            )

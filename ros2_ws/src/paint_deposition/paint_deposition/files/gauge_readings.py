@@ -1,13 +1,12 @@
 """Tables of gauge readings, CSV: read, checked, and written with predictions."""
 
 import csv
-import difflib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from paint_deposition.errors import ReadingsError
+from paint_deposition.errors import ReadingsError, did_you_mean
 from paint_deposition.files.atomic import write_text
 from paint_deposition.readings.readings import Readings, require_repeats_close
 
@@ -164,10 +163,8 @@ def _hint(name: str, header: list[str]) -> str:
     if same and same[0].lower() != name:
         return f"give '{same[0]}' in {UNITS[unit]} and call it {name}"
     strange = [other for other in header if other not in REQUIRED]
-    near = same or difflib.get_close_matches(name, strange, 1, 0.5)
-    if near:
-        return f"did you mean '{near[0]}'?"
-    return f'the readings need {", ".join(REQUIRED)}'
+    needed = f'the readings need {", ".join(REQUIRED)}'
+    return did_you_mean(name, same or strange, needed)
 
 
 def write_predictions(

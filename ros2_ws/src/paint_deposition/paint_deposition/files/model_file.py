@@ -11,10 +11,10 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_text import model_text
-from paint_deposition.files.refusals import boolean_number, nearest, refusal
+from paint_deposition.files.refusals import boolean_number, refusal
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
@@ -95,7 +95,7 @@ def write_model(
 def _model_file(content: dict[str, Any], folder: Path) -> ModelFile:
     for key in content:
         if key not in KEYS:
-            raise ModelError(f'unknown key {key!r}; {nearest(key, KEYS)}')
+            raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
     sections = {key: _section(key, content.get(key)) for key in SECTIONS}
     effects = _effects(content.get('effects'), folder)
     return ModelFile(

@@ -1,12 +1,12 @@
 """Why a checked value was refused, in one line: the key, its value, the range, the remedy."""
 
-import difflib
-from collections.abc import Iterable
 from typing import Any
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
+
+from paint_deposition.errors import did_you_mean
 
 
 def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
@@ -21,22 +21,11 @@ def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
     more = f' (and {others} more)' if others else ''
     key = '.'.join(str(part) for part in first['loc'])
     if first['type'] == 'extra_forbidden':
-        return f'{where}: unknown key {key!r}; {nearest(key, model.model_fields)}{more}'
+        return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
     field = model.model_fields.get(key)
     if field is None:
         return f'{where}: {first["msg"]}{more}'
     return f'{where}: {key} is {first["input"]!r}; expected {_expected(field)}{more}'
-
-
-def nearest(key: object, known: Iterable[str]) -> str:
-    """A hint at the known key that looks most like this one."""
-    known = list(known)
-    if not known:
-        return 'it takes none'
-    # A forgotten unit is likelier than a wrong letter: K1 is meant for K1_cm3_per_s, not K2.
-    begun = [name for name in known if name.lower().startswith(f'{key}_'.lower())]
-    found = begun or difflib.get_close_matches(str(key), known, n=1, cutoff=0.0)
-    return f'the nearest known key is {found[0]!r}'
 
 
 def boolean_number(model: type[BaseModel], where: str, values: dict[str, Any]) -> str | None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 import os
 from collections.abc import Callable, Sequence
@@ -19,7 +18,7 @@ from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, did_you_mean
 
 INT64_MAX = 2**63 - 1
 # What rclpy itself declares, or reads while it makes publishers and subscriptions.
@@ -152,9 +151,8 @@ def _refuse_unknown(node: Node, rows: dict[str, NodeParameter], overrides: dict[
     for name in overrides:
         if name in rows or name in RESERVED_NAMES or name.startswith(RESERVED_PREFIX):
             continue
-        nearest = difflib.get_close_matches(name, rows, n=1, cutoff=0.0)
-        remedy = f'; did you mean {nearest[0]}?' if nearest else ''
-        raise PaintError(f'{node.get_name()} has no parameter {name}{remedy}')
+        remedy = did_you_mean(name, rows)
+        raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
 
 
 def _declare(node: Node, row: NodeParameter, value: Any) -> None:
