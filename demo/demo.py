@@ -95,8 +95,8 @@ def paint_live(folder: Path) -> tuple[Path, Path]:
     print(
         f'{stats.poses_received} poses, {stats.poses_rejected} rejected; film '
         f'{stats.mean_um:.1f} um mean, {stats.std_dev_um:.1f} um standard deviation, '
-        f'{100 * stats.coverage:.0f} % covered, transfer efficiency '
-        f'{100 * stats.transfer_efficiency:.0f} %'
+        f'{100 * stats.coverage:.0f} % covered, capture fraction '
+        f'{100 * stats.capture_fraction:.0f} %'
     )
     return run, next(path for path in paths if path.suffix == '.csv')
 

@@ -88,7 +88,7 @@ def test_the_figures_say_how_it_was_painted(painted_door):
     assert figures['spraying_time_s'] == pytest.approx(on_s, rel=1e-9)
     emitted = DepositionModel().planar.K1_cm3_per_s * on_s
     assert figures['emitted_volume_cm3'] == pytest.approx(emitted, rel=1e-9)
-    assert figures['transfer_efficiency'] == pytest.approx(
+    assert figures['capture_fraction'] == pytest.approx(
         figures['painted_volume_cm3'] / emitted, rel=1e-9
     )
     assert figures['down'] == [0.0, 0.0, -1.0]
@@ -206,7 +206,7 @@ def test_a_bare_part_is_told_with_the_reason(panel, one_pass, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0
     assert 'the gun never sprays; check --state-topic' in done.stderr
-    assert json.loads(done.stdout)['transfer_efficiency'] is None
+    assert json.loads(done.stdout)['capture_fraction'] is None
 
 
 def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):

@@ -16,7 +16,7 @@ def test_even_film_is_its_own_mean():
     assert stats.coverage == 1.0
     # 40 um on 1 m2 is 40 cm3.
     assert stats.painted_volume_cm3 == pytest.approx(40.0, rel=1e-12)
-    assert stats.transfer_efficiency == pytest.approx(0.8, rel=1e-12)
+    assert stats.capture_fraction == pytest.approx(0.8, rel=1e-12)
 
 
 def test_area_weighs_not_the_number_of_vertices():
@@ -56,6 +56,6 @@ def test_share_within_the_target_band(tolerance, share):
 def test_without_target_or_paint_figures_say_so():
     stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
     assert math.isnan(stats.within_target)
-    assert math.isnan(stats.transfer_efficiency)
-    assert stats.as_dict()['transfer_efficiency'] is None
+    assert math.isnan(stats.capture_fraction)
+    assert stats.as_dict()['capture_fraction'] is None
     assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)

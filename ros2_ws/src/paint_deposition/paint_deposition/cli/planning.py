@@ -254,7 +254,7 @@ def plan(
     click.echo(
         f'film {result.statistics.min_um:.1f} to {result.statistics.max_um:.1f} um, coverage '
         f'{100 * result.statistics.coverage:.0f} %, '
-        f'{100 * result.statistics.transfer_efficiency:.0f} % of the solids on the part'
+        f'capture fraction {100 * result.statistics.capture_fraction:.0f} %'
     )
     _tell_files(files)
 

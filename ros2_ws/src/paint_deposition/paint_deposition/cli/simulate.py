@@ -257,10 +257,10 @@ def _say(statistics: FilmStatistics, counts: PoseCounts, files: list[Path]) -> N
             f'{100 * s.within_target:.1f} % of it within {s.target_um:g} +- '
             f'{s.target_tolerance_um:g} um'
         )
-    if not math.isnan(s.transfer_efficiency):
+    if not math.isnan(s.capture_fraction):
         click.echo(
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
-            f'transfer efficiency {100 * s.transfer_efficiency:.0f} %'
+            f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
     if counts.rejected or counts.gaps or counts.restarts:
         click.echo(

@@ -20,8 +20,9 @@ class FilmStatistics:
         coverage: share of the part's area that is painted, 0 to 1.
         within_target: share of the painted area in the target band, 0 to 1; NaN without a target.
         painted_volume_cm3: solids on the whole part, dust included [cm3].
-        transfer_efficiency: solids on the part over solids that left the bell; NaN if none did.
-        emitted_volume_cm3: solids that left the bell [cm3].
+        capture_fraction: solids on the part over `emitted_volume_cm3`; NaN without any. It is no
+            transfer efficiency: K1 already holds that of a part which catches everything.
+        emitted_volume_cm3: solids that a part which catches everything would get [cm3].
         area_m2: of the part [m2].
         painted_above_um: film that counts as painted [um].
         target_um, target_tolerance_um: the band is target +- tolerance [um]; 0 is no target.
@@ -36,7 +37,7 @@ class FilmStatistics:
     coverage: float
     within_target: float
     painted_volume_cm3: float
-    transfer_efficiency: float
+    capture_fraction: float
     emitted_volume_cm3: float
     area_m2: float
     painted_above_um: float
@@ -62,7 +63,8 @@ def film_statistics(
     Args:
         film_um: (V,) film at the vertices [um].
         area_m2: (V,) area that each vertex stands for [m2]; 1 um on 1 m2 is 1 cm3.
-        emitted_cm3: solids that left the bell, K1 times the time sprayed [cm3].
+        emitted_cm3: solids that a part which catches everything would get, K1 times the time
+            sprayed [cm3].
         painted_above_um: film that counts as painted [um].
         target_um, target_tolerance_um: target band [um]; target 0 is none.
     """
@@ -87,7 +89,7 @@ def film_statistics(
         coverage=painted_area / float(area_m2.sum()),
         within_target=within,
         painted_volume_cm3=volume,
-        transfer_efficiency=volume / emitted_cm3 if emitted_cm3 > 0.0 else math.nan,
+        capture_fraction=volume / emitted_cm3 if emitted_cm3 > 0.0 else math.nan,
         emitted_volume_cm3=float(emitted_cm3),
         area_m2=float(area_m2.sum()),
         painted_above_um=float(painted_above_um),
