@@ -114,6 +114,20 @@ def test_the_first_state_takes_back_what_was_painted_before_it():
     assert film.counts.late_triggers == 0
 
 
+def test_changes_that_come_out_of_order_leave_the_newest_in_force():
+    motion = straight_pass(TIMES_S)
+    film = LiveFilm(lying_plane(), MODEL)
+    for time_s, flow in ((0.0, 1.0), (3.0, 0.0), (1.0, 0.8), (2.0, 0.6), (0.5, 0.9)):
+        film.add_trigger(TriggerChange(int(stamps_ns([time_s])[0]), flow))
+    for upto, flow in ((200, 0.9), (300, 0.8), (600, 0.6), (1000, 0.0)):
+        film.add_poses(_poses(motion, slice(upto - 100, upto)))
+        assert film.flow == flow
+    film.add_trigger(TriggerChange(int(stamps_ns([3.5])[0]), 0.7))
+    # Late: an earlier change than the one in force leaves that one in force.
+    film.add_trigger(TriggerChange(int(stamps_ns([3.2])[0]), 0.5))
+    assert film.flow == 0.7
+
+
 def test_after_a_reset_the_gun_stays_as_it_was():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = LiveFilm(lying_plane(), MODEL)

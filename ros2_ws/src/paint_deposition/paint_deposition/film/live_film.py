@@ -1,7 +1,9 @@
 """The film of a motion that is still under way."""
 
 import copy
+from bisect import bisect_right, insort
 from collections.abc import Iterable
+from operator import attrgetter
 
 import numpy as np
 
@@ -21,6 +23,7 @@ from paint_deposition.part.points import SurfacePoints
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change so much older than the newest pose is from a stream that begins again [ns].
 ANOTHER_STREAM_NS = 1_000_000_000
+_STAMP = attrgetter('stamp_ns')
 
 
 class LiveFilm:
@@ -88,8 +91,8 @@ class LiveFilm:
         if not changes:
             return None
         newest = self.newest_ns
-        passed = [c for c in changes if newest is None or c.stamp_ns <= newest]
-        return passed[-1].flow if passed else 0.0
+        passed = len(changes) if newest is None else bisect_right(changes, newest, key=_STAMP)
+        return changes[passed - 1].flow if passed else 0.0
 
     def reset(self) -> None:
         """Back to bare metal; the gun stays as it is, on or off, if the motion goes on."""
@@ -180,8 +183,7 @@ class LiveFilm:
 
     def _note(self, change: TriggerChange) -> None:
         """Keep the changes that count from the newest pose on."""
-        later = [c for c in self._changes if c.stamp_ns <= change.stamp_ns]
-        self._changes = [*later, change, *(c for c in self._changes if c not in later)]
-        passed = sum(c.stamp_ns <= (self.newest_ns or 0) for c in self._changes)
-        self._changes = self._changes[max(0, passed - 1) :]
+        insort(self._changes, change, key=_STAMP)
+        passed = bisect_right(self._changes, self.newest_ns or 0, key=_STAMP)
+        del self._changes[: max(0, passed - 1)]
         self._now = None
