@@ -1,5 +1,6 @@
 """A user's own effect: one Python file with one class, checked before it is used."""
 
+import functools
 import hashlib
 import inspect
 import re
@@ -31,10 +32,21 @@ _loaded: dict[tuple[Path, str], type[Effect]] = {}
 
 
 def load_effect_file(path: str | Path) -> type[Effect]:
+    """The class of a user's own effect, read and tried out.
+
+    Raises:
+        ModelError: as ``read_effect_file`` and ``try_effect``.
+    """
+    effect = read_effect_file(path)
+    try_effect(effect, path)
+    return effect
+
+
+def read_effect_file(path: str | Path) -> type[Effect]:
     """The class of a user's own effect: a Python file with one class derived from Effect.
 
     The same class while the file is the same. The file is run: load only what you would run
-    yourself.
+    yourself. Its laws are not compiled yet; ``try_effect`` does that.
 
     Raises:
         ModelError: the file cannot be read or run, its class is not sound, or its id is taken.
@@ -56,6 +68,19 @@ def load_effect_file(path: str | Path) -> type[Effect]:
             f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
         )
     return effect
+
+
+@functools.cache
+def try_effect(effect: type[Effect], path: str | Path) -> None:
+    """Compile the laws of an effect and use it on a short path and a few points.
+
+    Raises:
+        ModelError: it does not compile, fails or gives no usable result; ``path`` names its file.
+    """
+    laws = (_problem_with_law(effect, name) for name in LAWS)
+    problem = next(filter(None, laws), None) or _problem_with_places(effect.typical())
+    if problem:
+        raise ModelError(f'{path}: {effect.__name__} {problem}')
 
 
 def _run(path: Path, source: bytes, digest: str) -> ModuleType:
@@ -134,8 +159,7 @@ def _problem_with(effect: type[Effect]) -> str | None:
         return 'is absent at its typical size; make typical differ from neutral'
     if all(getattr(effect, place) is getattr(Effect, place) for place in PLACES):
         return f'does nothing; define one of {", ".join(PLACES)}'
-    laws = (_problem_with_law(effect, name) for name in LAWS)
-    return next(filter(None, laws), None) or _problem_with_places(effect.typical())
+    return None
 
 
 def _problem_with_law(effect: type[Effect], name: str) -> str | None:

@@ -1,6 +1,6 @@
 """Model files: the deposition model with its effects, as YAML that a person edits."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
@@ -23,6 +23,7 @@ SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': P
 WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
 KEYS = ('name', *SECTIONS, 'effects', 'uncertainty', 'history')
 
+LoadEffect = Callable[[Path], type[Effect]]
 Made = TypeVar('Made', bound=BaseModel)
 
 
@@ -43,16 +44,16 @@ class ModelFile:
     history: Sequence[Mapping[str, Any]] = ()
 
 
-def read_model(path: str | Path) -> DepositionModel:
-    """The deposition model of a file.
+def read_model(path: str | Path, load_effect: LoadEffect = load_effect_file) -> DepositionModel:
+    """The deposition model of a file; ``load_effect`` reads the effect files that it names.
 
     Raises:
         ModelError: naming the file, the key, its value and the remedy.
     """
-    return read_model_file(path).model
+    return read_model_file(path, load_effect).model
 
 
-def read_model_file(path: str | Path) -> ModelFile:
+def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file) -> ModelFile:
     """The deposition model of a file with its name, uncertainty and history.
 
     What the file leaves out has its default. Effects given as ``file`` are looked for beside the
@@ -66,7 +67,7 @@ def read_model_file(path: str | Path) -> ModelFile:
     if not isinstance(content, dict):
         raise ModelError(f'{path}: holds no model; expected the keys planar and projection')
     try:
-        return _model_file(content, path.parent)
+        return _model_file(content, lambda name: load_effect(path.parent / name))
     except ModelError as error:
         raise ModelError(f'{path}: {error}') from None
 
@@ -92,12 +93,12 @@ def write_model(
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 
-def _model_file(content: dict[str, Any], folder: Path) -> ModelFile:
+def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) -> ModelFile:
     for key in content:
         if key not in KEYS:
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
     sections = {key: _section(key, content.get(key)) for key in SECTIONS}
-    effects = _effects(content.get('effects'), folder)
+    effects = _effects(content.get('effects'), load)
     return ModelFile(
         DepositionModel(**sections, effects=effects),
         _of_type('name', content.get('name'), str, ''),
@@ -117,17 +118,17 @@ def _section(key: str, values: Any) -> BaseModel:
     return _made(SECTIONS[key], key, _of_type(key, values, dict, {}))
 
 
-def _effects(entries: Any, folder: Path) -> tuple[Effect, ...]:
+def _effects(entries: Any, load: Callable[[str], type[Effect]]) -> tuple[Effect, ...]:
     effects: list[Effect] = []
     for number, entry in enumerate(_of_type('effects', entries, list, []), start=1):
-        effect = _effect(f'effects, entry {number}', entry, folder)
+        effect = _effect(f'effects, entry {number}', entry, load)
         if effect.id in [other.id for other in effects]:
             raise ModelError(f'effects: {effect.id!r} is there twice; keep one')
         effects.append(effect)
     return tuple(effects)
 
 
-def _effect(where: str, entry: Any, folder: Path) -> Effect:
+def _effect(where: str, entry: Any, load: Callable[[str], type[Effect]]) -> Effect:
     entry = _of_type(where, entry, dict, {})
     chosen = [key for key in ('id', 'file') if key in entry]
     if len(chosen) != 1:
@@ -135,7 +136,7 @@ def _effect(where: str, entry: Any, folder: Path) -> Effect:
     source = entry[chosen[0]]
     if not isinstance(source, str):
         raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
-    cls = effect_class(source) if chosen == ['id'] else load_effect_file(folder / source)
+    cls = effect_class(source) if chosen == ['id'] else load(source)
     return _made(cls, source, {key: entry[key] for key in entry if key not in chosen})
 
 
