@@ -92,14 +92,15 @@ def spin(executor: object) -> Callable[..., None]:
 
 @pytest.fixture
 def wait_until(executor: object) -> Callable[..., None]:
-    """`wait_until(condition, timeout_s=10.0, what='...')`: run callbacks until it holds.
+    """`wait_until(condition, what='...')`: run callbacks until it holds.
 
-    Fails the test when it does not hold in time. The condition is looked at after every
+    Fails the test when it does not hold within a minute, which is long even on a machine that is
+    busy with other work. The condition is looked at after every
     callback and at least every 20 ms, so it may also watch other processes and files.
     """
 
     def wait_until(
-        condition: Callable[[], object], timeout_s: float = 10.0, what: str = 'the condition'
+        condition: Callable[[], object], what: str = 'the condition', timeout_s: float = 60.0
     ) -> None:
         deadline = time.monotonic() + timeout_s
         while not condition():

@@ -146,7 +146,7 @@ def test_open_chunk_is_closed_by_age(tmp_path):
     writer.add_topic(gun_topic())
     writer.write('/gun', TRUE_CDR, 1, 1)
     assert not chunks_of(writer)
-    deadline = time.monotonic() + 5.0
+    deadline = time.monotonic() + 60.0
     while not chunks_of(writer) and time.monotonic() < deadline:
         writer.close_old_chunk()
     assert len(chunks_of(writer)) == 1
@@ -180,8 +180,9 @@ start_s = time.monotonic()
 number = 0
 while True:
     number += 1
-    writer.write('/gun', TRUE_CDR, number, time.monotonic_ns())
-    print(number, flush=True)
+    written_ns = time.monotonic_ns()
+    writer.write('/gun', TRUE_CDR, number, written_ns)
+    print(written_ns, flush=True)
     while time.monotonic() < start_s + number / 250:
         time.sleep(0.0005)
 """
@@ -192,15 +193,14 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     process = subprocess.Popen(
         [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests], stdout=subprocess.PIPE
     )
-    number = 0
-    while number < 700:
-        number = int(process.stdout.readline())
+    written_ns = [int(process.stdout.readline()) for _ in range(700)]
     os.kill(process.pid, signal.SIGKILL)
-    number = max([number, *map(int, process.stdout.read().split())])
+    written_ns += map(int, process.stdout.read().split())
     process.wait()
     recovery = recover(run, tmp_path / 'recovered')
-    lost = number - recovery.message_count
-    assert 0 <= lost <= 0.6 * 250
+    lost_ns = written_ns[recovery.message_count :]
+    # By the writer's own clock: a busy machine may keep it waiting between two messages.
+    assert not lost_ns or lost_ns[-1] - lost_ns[0] < 1_000_000_000
     with Reader(tmp_path / 'recovered') as reader:
         assert [t for _, t, _ in reader.messages()] == list(range(1, recovery.message_count + 1))
 
