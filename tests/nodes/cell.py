@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,20 +14,24 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
+from rclpy.time import Time
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.runtime.messages import to_time
 
 START_NS = 1_760_000_000_000_000_000
 # The tool's z axis along +y, toward a panel that looks to -y.
 FACING_PANEL = np.array([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
 PANEL_M = 0.8
 TWO_PASSES_POSES = 600
-# A user's effect whose code is new for every number, so that no cache has it compiled.
+# A user's effect whose code is new for every number, so that no cache has it compiled. Before it
+# is used it waits for a file `gate`; in a main thread, which poses may be waiting for, it fails.
 OWN_EFFECT = """
+import threading
+import time
+from pathlib import Path
 from paint_deposition.effects.base import Effect, parameter
 
 class Own(Effect):
@@ -37,7 +42,23 @@ class Own(Effect):
     @staticmethod
     def flux_factor(ray, gain):
         return 1.0 + gain * ray.cos_incidence + {unique!r} * (1.0 - ray.cos_incidence)
+
+    def on_film(self, film_um, points):
+        gate = Path(__file__).with_name('gate')
+        if threading.current_thread() is threading.main_thread() and not gate.exists():
+            raise RuntimeError('tried out while poses wait')
+        while not gate.exists():
+            time.sleep(0.01)
+        return film_um
 """
+
+
+def write_own_model(folder: Path) -> Path:
+    """A model file with an effect of the user's own that nobody has compiled yet."""
+    (folder / 'own.py').write_text(OWN_EFFECT.format(unique=time.time() * 1e-20))
+    path = folder / 'own.yaml'
+    path.write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
+    return path
 
 
 def write_panel(path: Path, reverse: bool = False) -> Path:
@@ -111,7 +132,7 @@ class Robot(Node):
     def send_pose(self, stamp_ns, position, quaternion, frame_id: str = 'part') -> None:
         message = PoseStamped()
         message.header.frame_id = frame_id
-        message.header.stamp = to_time(stamp_ns)
+        message.header.stamp = Time(nanoseconds=int(stamp_ns)).to_msg()
         p, q = message.pose.position, message.pose.orientation
         p.x, p.y, p.z = map(float, position)
         q.x, q.y, q.z, q.w = map(float, quaternion)
@@ -119,7 +140,7 @@ class Robot(Node):
 
     def send_state(self, stamp_ns, flow: float) -> None:
         message = AtomizerState(spraying=bool(flow > 0.0), flow=float(flow))
-        message.header.stamp = to_time(stamp_ns)
+        message.header.stamp = Time(nanoseconds=int(stamp_ns)).to_msg()
         self.state_publisher.publish(message)
 
     def send(self, trajectory: Trajectory, rows: slice = slice(None), frame_id='part') -> None:

@@ -62,7 +62,7 @@ def call(wait_until):
         client = node.create_client(service, name)
         wait_until(client.service_is_ready, what=f'service {name}')
         future = client.call_async(request)
-        wait_until(future.done, what=f'answer of {name}', timeout_s=30.0)
+        wait_until(future.done, what=f'answer of {name}')
         return future.result()
 
     return call
@@ -79,7 +79,6 @@ def painted(wait_until):
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:
         wait_until(
             lambda: node.film.counts.received >= count,
-            timeout_s=30.0,
             what=f'{count} poses painted',
         )
         return node.film.up_to_date().film_um

@@ -50,7 +50,7 @@ class NodeProcess:
     def exit_code(self) -> int | None:
         return self._process.poll()
 
-    def wait(self, timeout_s: float = 20.0) -> int:
+    def wait(self, timeout_s: float = 60.0) -> int:
         return self._process.wait(timeout_s)
 
     def interrupt_as_launch_does(self) -> None:

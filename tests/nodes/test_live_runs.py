@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import time
-
 import numpy as np
 import pytest
 
@@ -14,7 +12,7 @@ from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import OWN_EFFECT, Onlooker, parameters, two_passes, write_panel
+from nodes.cell import Onlooker, parameters, two_passes, write_own_model, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
@@ -38,9 +36,9 @@ def call(ros_context, spin, wait_until):
 
     def call(service, name, request):
         client = caller.create_client(service, name)
-        wait_until(client.service_is_ready, timeout_s=40.0, what=f'service {name}')
+        wait_until(client.service_is_ready, what=f'service {name}')
         future = client.call_async(request)
-        wait_until(future.done, timeout_s=30.0, what=f'answer of {name}')
+        wait_until(future.done, what=f'answer of {name}')
         return future.result()
 
     return call
@@ -61,7 +59,7 @@ def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wai
             with NodeProcess(
                 tmp_path / name, PLAYER, bag=bag, state_topic='/atomizer/state', rate=rate
             ) as player:
-                wait_until(lambda p=player: p.exit_code is not None, timeout_s=40.0, what=name)
+                wait_until(lambda p=player: p.exit_code is not None, what=name)
                 assert player.exit_code == 0, player.err
             saved = call(SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name=name))
             assert saved.success, saved.message
@@ -92,7 +90,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
             tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, max_edge_length_m=EDGE_M
         ) as simulator,
     ):
-        wait_until(lambda: player.exit_code is not None, timeout_s=120.0, what='the replay')
+        wait_until(lambda: player.exit_code is not None, what='the replay')
         assert player.exit_code == 0, player.err
         wait_until(
             lambda: statistics.newest('thickness/stats').poses_received == 300,
@@ -119,7 +117,7 @@ def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(
         caller = Onlooker(ros_context, {})
         spin(caller)
         client = caller.create_client(SaveFilm, '/deposition_simulator/save_film')
-        wait_until(client.service_is_ready, timeout_s=40.0, what='the service')
+        wait_until(client.service_is_ready, what='the service')
         client.call_async(SaveFilm.Request(name='film'))
         wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')
         simulator.interrupt_as_launch_does()
@@ -128,18 +126,19 @@ def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(
     assert {path.name for path in films.iterdir()} == {'film.ply', 'film.csv', 'film.json'}
 
 
-def test_ctrl_c_while_a_model_is_compiled_ends_it_at_once(ros_domain, call, tmp_path):
-    own = tmp_path / 'own.py'
-    own.write_text(OWN_EFFECT.format(unique=time.time() * 1e-20))
-    (tmp_path / 'own.yaml').write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
+def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
+    """The trial of this effect would never end."""
+    own = write_own_model(tmp_path)
     mesh = write_panel(tmp_path / 'panel.stl')
-    with NodeProcess(tmp_path / 'simulator', SIMULATOR, mesh_file=mesh) as simulator:
-        changes = parameters(model_file=str(tmp_path / 'own.yaml'))
+    with NodeProcess(
+        tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, allow_user_effects=True
+    ) as simulator:
+        changes = parameters(model_file=str(own))
         request = SetParameters.Request(parameters=[p.to_parameter_msg() for p in changes])
         answer = call(SetParameters, '/deposition_simulator/set_parameters', request)
         assert answer.results[0].successful, answer.results[0].reason
         simulator.interrupt_as_launch_does()
-        assert simulator.wait(timeout_s=5.0) == 0, simulator.err
+        assert simulator.wait() == 0, simulator.err
 
 
 @pytest.mark.parametrize(

@@ -73,6 +73,11 @@ def generate_launch_description():
             description='Deposition model, model.yaml; empty: a 50 mm bell [path]',
         ),
         DeclareLaunchArgument(
+            'allow_user_effects',
+            default_value='false',
+            description='Run the Python code of effect files that a model names [true/false]',
+        ),
+        DeclareLaunchArgument(
             'bag',
             default_value='',
             description='Bag to replay into the cell; empty: poses come from the robot [path]',
@@ -102,7 +107,7 @@ def generate_launch_description():
             default_value='',
             description='Gauge readings to compare with, CSV; empty: no comparison [path]',
         ),
-        # Whoever is still loading when the replay starts would miss its start.
+        # A node that is still loading when the replay starts would miss its first poses.
         DeclareLaunchArgument(
             'wait_for_subscribers',
             default_value=count_with('record', 'measurements'),
@@ -125,7 +130,12 @@ def generate_launch_description():
             description='Take time from /clock, which a replayed bag publishes [true/false]',
         ),
     ]
-    part = {'mesh_file': text('mesh'), 'model_file': text('model')}
+    mesh, model_file = {'mesh_file': text('mesh')}, {'model_file': text('model')}
+    model = model_file | {
+        'allow_user_effects': ParameterValue(
+            LaunchConfiguration('allow_user_effects'), value_type=bool
+        )
+    }
     replay = {
         'bag': text('bag'),
         'pose_topic': text('pose_topic'),
@@ -136,13 +146,17 @@ def generate_launch_description():
         ),
     }
     nodes = [
-        cell_node('deposition_simulator', part),
-        cell_node('index_planner', {'model_file': text('model')}),
+        cell_node('deposition_simulator', mesh | model),
+        cell_node('index_planner', model),
         cell_node('bag_player', replay, given('bag')),
-        cell_node('run_recorder', {**part, 'output_directory': text('record')}, given('record')),
+        cell_node(
+            'run_recorder',
+            mesh | model_file | {'output_directory': text('record')},
+            given('record'),
+        ),
         cell_node(
             'model_comparison',
-            {**part, 'measurements_file': text('measurements')},
+            mesh | model | {'measurements_file': text('measurements')},
             given('measurements'),
         ),
     ]

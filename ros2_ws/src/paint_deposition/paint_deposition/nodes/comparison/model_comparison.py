@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
+from rclpy.time import Time
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -21,12 +22,11 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.painting_parameters import AT_START
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import ColouredMesh, to_time
-from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.shutdown import run_node
+from paint_deposition.nodes.runtime.messages import ColouredMesh
+from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
+from paint_deposition.nodes.runtime.process import run_node
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
@@ -51,14 +51,12 @@ class ModelComparison(PaintingNode):
             '',
             'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
             is_path=True,
-            fixed_because=AT_START,
+            fixed_because='the film is painted where they were taken; restart the node',
         ),
-        NodeParameter(
+        thickness(
             'color_max_um',
-            0.0,
-            'Residual at the ends of the colours; 0: a quarter of the thickest reading [um]',
-            low=0.0,
-            high=10_000.0,
+            description='Residual at the ends of the colours; 0: a quarter of the thickest '
+            'reading [µm]',
         ),
         NodeParameter(
             'color_radius_m',
@@ -131,6 +129,7 @@ class ModelComparison(PaintingNode):
     # --- parameters
 
     def _changed(self, names: set[str]) -> None:
+        super()._changed(names)
         if 'color_radius_m' in names:
             self._spread_colours()
         if 'color_max_um' in names:
@@ -168,7 +167,7 @@ class ModelComparison(PaintingNode):
 
     def _publish_legend(self) -> None:
         self._outputs['comparison/legend'].publish(
-            legend(self._scale, 'um', self.surface, self._frame_id)
+            legend(self._scale, 'µm', self.surface, self._frame_id)
         )
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
@@ -186,7 +185,7 @@ class ModelComparison(PaintingNode):
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
         message.header.frame_id = self._frame_id
-        message.header.stamp = to_time(stamp_ns)
+        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         return message
 
     def summary(self) -> str:
@@ -195,21 +194,21 @@ class ModelComparison(PaintingNode):
         x, y, z = found.positions_m[found.worst]
         return (
             f'{self._model_name}: {len(found.residual_um)} readings, {found.painted.sum()} where '
-            f'paint is predicted; residual {found.bias_um:+.2f} um on average, rms '
-            f'{found.rmse_um:.2f} um (gauge {self._noise.typical_um:.2f} um, '
+            f'paint is predicted; residual {found.bias_um:+.2f} µm on average, rms '
+            f'{found.rmse_um:.2f} µm (gauge {self._noise.typical_um:.2f} µm, '
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
-            f'worst {found.residual_um[found.worst]:+.2f} um at ({x:.3f}, {y:.3f}, {z:.3f}) m'
+            f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
         )
 
     def _status(self) -> Status:
         found = self.residuals()
         return Status(
             OK,
-            f'rms {found.rmse_um:.2f} um at {len(found.residual_um)} readings',
+            f'rms {found.rmse_um:.2f} µm at {len(found.residual_um)} readings',
             {
                 'readings': self.values['measurements_file'],
-                'bias [um]': f'{found.bias_um:.3f}',
-                'noise of the gauge [um]': f'{self._noise.typical_um:.3f}',
+                'bias [µm]': f'{found.bias_um:.3f}',
+                'noise of the gauge [µm]': f'{self._noise.typical_um:.3f}',
                 'noise known from': self._noise.source,
             },
         )

@@ -8,18 +8,18 @@ from typing import Protocol
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bags import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import relative_flow
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.tf_queue import HeldPoses, NoTransform
+from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.messages import to_ns
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
 
 POSES_A_BATCH = 50
@@ -28,7 +28,7 @@ PROGRESS_PERIOD_S = 0.2
 
 
 class MotionReceiver(Protocol):
-    """What takes the motion."""
+    """Whatever the poses and trigger changes are handed to."""
 
     def add_poses(self, batch: PoseBatch) -> None: ...
 
@@ -52,7 +52,7 @@ class AtomizerInput:
 
     def __init__(
         self,
-        node: Node,
+        node: PaintNode,
         frame: PartFrame,
         receiver: MotionReceiver,
         watch: QosWatch,
@@ -64,7 +64,7 @@ class AtomizerInput:
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
         self._poses: list[tuple[float, ...]] = []
-        self._held = HeldPoses()
+        self._tf_queue = TfQueue()
         self.reset()
         profile = qos.poses(depth)
         if reliability == 'reliable':
@@ -76,10 +76,9 @@ class AtomizerInput:
             node.create_subscription(
                 message, topic, take, profile, event_callbacks=watch.subscription(topic)
             )
-        self._progress = node.create_publisher(PoseProgress, 'atomizer/progress', qos.PROGRESS)
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        node.create_timer(BATCH_PERIOD_S, self.hand_on, clock=steady)
-        node.create_timer(PROGRESS_PERIOD_S, self._report_progress, clock=steady)
+        self._progress = node.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
+        node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
+        node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
 
     @property
     def poses_refused(self) -> int:
@@ -93,18 +92,18 @@ class AtomizerInput:
         self.refused_states = 0
         self.without_frame = 0
         self.intervals = Intervals()
-        self._held.clear()
+        self._tf_queue.clear()
         self._stamps.clear()
         self._poses.clear()
 
     @property
-    def poses_held(self) -> int:
-        """Poses that wait for tf."""
-        return len(self._held)
+    def poses_in_tf_queue(self) -> int:
+        """Poses that wait for their transform."""
+        return len(self._tf_queue)
 
     def hand_on(self) -> None:
-        """Give the receiver what has come, but for poses that wait for tf."""
-        self._held.release(time.monotonic(), self._place, self._refuse)
+        """Give the receiver what has come, except poses that wait for their transform."""
+        self._tf_queue.release(time.monotonic(), self._place, self._refuse)
         if not self._stamps:
             return
         stamps, poses = np.array(self._stamps, dtype=np.int64), np.array(self._poses)
@@ -121,8 +120,8 @@ class AtomizerInput:
         self.poses_received += 1
         self._newest = message
         now_s = time.monotonic()
-        self._held.add(message, now_s)
-        self._held.release(now_s, self._place, self._refuse)
+        self._tf_queue.add(message, now_s)
+        self._tf_queue.release(now_s, self._place, self._refuse)
         if len(self._stamps) >= POSES_A_BATCH:
             self.hand_on()
         if self.poses_received % POSES_A_BATCH == 0:
@@ -130,7 +129,7 @@ class AtomizerInput:
 
     def _place(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
-        stamp = to_ns(message.header.stamp)
+        stamp = stamp_ns(message.header)
         if self._frame.is_own(frame_id):
             p, q = message.pose.position, message.pose.orientation
             pose = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
@@ -151,7 +150,7 @@ class AtomizerInput:
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 
     def _take_state(self, message: AtomizerState) -> None:
-        stamp = to_ns(message.header.stamp)
+        stamp = stamp_ns(message.header)
         try:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')

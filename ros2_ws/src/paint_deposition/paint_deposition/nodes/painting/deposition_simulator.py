@@ -22,19 +22,15 @@ from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import ColourScale, film_scale
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.nodes.painting.film_messages import FilmCloud, FilmField, stats_message
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import film_status, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.simulator_parameters import SIMULATOR
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import (
-    ColouredMesh,
-    FilmCloud,
-    FilmField,
-    stats_message,
-)
-from paint_deposition.nodes.runtime.shutdown import run_node
+from paint_deposition.nodes.runtime.messages import ColouredMesh
+from paint_deposition.nodes.runtime.process import run_node
 from paint_deposition.part.identity import mesh_id
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -118,6 +114,7 @@ class DepositionSimulator(PaintingNode):
             )
 
     def _changed(self, names: set[str]) -> None:
+        super()._changed(names)
         self._shown = None
 
     # --- publishing
@@ -153,7 +150,7 @@ class DepositionSimulator(PaintingNode):
         if self._scale is None or (scale.low, scale.high) != (self._scale.low, self._scale.high):
             self._scale = scale
             self._outputs['thickness/legend'].publish(
-                legend(scale, 'um', self.surface, self._frame_id)
+                legend(scale, 'µm', self.surface, self._frame_id)
             )
 
     def _publish_stats(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
 
-# Share of real time above which there is little left for anything but painting.
+# Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
 # What happened to poses and states, in words, by the name of its count.
 IN_WORDS = {
@@ -33,7 +33,7 @@ def poses_status(node: PaintingNode) -> Status:
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'poses without a frame': source.without_frame,
-        'poses waiting for tf': source.poses_held,
+        'poses in the tf queue': source.poses_in_tf_queue,
         'states refused': source.refused_states,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
@@ -61,12 +61,12 @@ def poses_status(node: PaintingNode) -> Status:
 
 
 def topics_status(node: PaintingNode) -> Status:
-    """Partners that will not hear this node, or that it does not hear."""
+    """Publishers and subscribers whose quality of service does not fit that of this node."""
     found = node.watch.incompatible
     if found:
         listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
         return Status(ERROR, listed, found)
-    return Status(OK, 'all partners fit')
+    return Status(OK, 'every quality of service fits')
 
 
 def film_status(node: PaintingNode) -> Status:
@@ -79,20 +79,22 @@ def film_status(node: PaintingNode) -> Status:
         'model': node.values['model_file'] or 'default',
         'effects': ' '.join(effect.id for effect in node.film.model.effects) or 'none',
         'poses remembered': log.poses,
-        'load of painting in real time': f'{node.load.share:.0%}',
+        'real-time factor': f'{node.real_time_factor.value:.2f}',
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
     }
+    if node.model_problem:
+        return Status(WARN, node.model_problem, values)
     if not log.complete:
         return Status(
             WARN,
             f'over {log.limit_poses} poses (pose_memory): a new model paints from then on only',
             values,
         )
-    if node.load.share > BUSY:
+    if node.real_time_factor.value > BUSY:
         return Status(
             WARN,
-            f'painting takes {node.load.share:.0%} of real time: poses may be lost; '
-            'use a larger max_edge_length_m',
+            f'painting takes {node.real_time_factor.value:.0%} of the time that the motion lasts: '
+            'poses may be lost; use a larger max_edge_length_m',
             values,
         )
     if node.repainting:

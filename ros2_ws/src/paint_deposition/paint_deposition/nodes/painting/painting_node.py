@@ -8,25 +8,23 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.clock import Clock, ClockType
-from rclpy.parameter import Parameter
 from rclpy.timer import Timer
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import Precision
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
-from paint_deposition.nodes.painting import painting_parameters
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.real_time_factor import Load
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
+from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
+from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
-from paint_deposition.nodes.runtime.shutdown import PaintNode
 from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -48,34 +46,15 @@ class PaintingNode(PaintNode, ABC):
         points: where it is painted.
         film: what is painted so far.
         input: what comes from the cell.
-        watch: partners with which there is no understanding.
-        load: how long painting takes beside the motion.
+        watch: publishers and subscribers whose quality of service does not fit.
+        real_time_factor: how long painting takes beside the motion.
+        model_problem: why the last model that was set is not used, '' if it is.
     """
 
-    PARAMETERS = (
-        *painting_parameters.PART,
-        *painting_parameters.MOTION,
-        *painting_parameters.MODEL,
-        *painting_parameters.SHOWING,
-    )
+    PARAMETERS = PAINTING
 
     def __init__(self, name: str, **kwargs: Any):
-        self._repainting: Repainting | None = None
-        self._facing_settled = False
-        self._notes_told = 0
-        self.load = Load()
         super().__init__(name, **kwargs)
-        try:
-            self._check(self.values)
-            model = self._read_model(self.values)
-            self._read_part()
-            self._take_surface(self._read_surface())
-            self.film = self._make_film(model)
-            self.get_logger().info('getting ready; a model seen for the first time is compiled')
-            self.film.warm_up()
-        except PaintError:
-            self.destroy_node()
-            raise
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
         self.watch = QosWatch(self)
@@ -87,12 +66,21 @@ class PaintingNode(PaintNode, ABC):
             self.values['pose_queue_depth'],
             self.values['pose_reliability'],
         )
-        self.add_on_set_parameters_callback(self._check_changes)
-        self.add_post_set_parameters_callback(self._apply_changes)
-        # A simulated clock may stand still; what has come is shown all the same.
-        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(TEND_PERIOD_S, self._tend, clock=self._steady)
+        self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
+
+    def _prepare(self) -> None:
+        self.real_time_factor = RealTimeFactor()
+        self.model_problem = ''
+        self._repainting: Repainting | None = None
+        self._facing_settled = False
+        self._notes_told = 0
+        self._model = read_chosen_model(self.values)
+        self._read_part()
+        self._take_surface(self._read_surface())
+        self.film = self._make_film(self._model)
+        self.get_logger().info('getting ready; a model seen for the first time is compiled')
+        self.film.warm_up()
 
     # --- for the subclass
 
@@ -114,14 +102,6 @@ class PaintingNode(PaintNode, ABC):
             self.get_logger().warning(note)
         self._notes_told = len(surface.notes)
 
-    def _check(self, values: Mapping[str, Any]) -> None:
-        """Raise PaintError if these parameter values do not go together."""
-        if values['part_pose'] and not values['part_parent_frame']:
-            raise PaintError('part_pose is given without part_parent_frame: name its frame')
-
-    def _changed(self, names: set[str]) -> None:
-        """Parameters of the subclass have changed; ``self.values`` has the new ones."""
-
     @abstractmethod
     def publish(self) -> None:
         """Publish the film, if it has changed."""
@@ -131,7 +111,7 @@ class PaintingNode(PaintNode, ABC):
     def add_poses(self, batch: PoseBatch) -> None:
         began_s = time.monotonic()
         self.film.add_poses(batch)
-        self.load.note(time.monotonic() - began_s, batch.stamps_ns)
+        self.real_time_factor.note(time.monotonic() - began_s, batch.stamps_ns)
 
     def add_trigger(self, change: TriggerChange) -> None:
         self.film.add_trigger(change)
@@ -148,7 +128,7 @@ class PaintingNode(PaintNode, ABC):
         self.input.hand_on()
         self._tend()
 
-    # --- the model
+    # --- the part and the model
 
     @property
     def repainting(self) -> bool:
@@ -166,10 +146,6 @@ class PaintingNode(PaintNode, ABC):
             limit_poses=self.values['pose_memory'],
         )
 
-    @staticmethod
-    def _read_model(values: Mapping[str, Any]) -> DepositionModel:
-        return read_model(values['model_file']) if values['model_file'] else DepositionModel()
-
     def _read_surface(self) -> Surface:
         values = self.values
         if not values['mesh_file']:
@@ -179,51 +155,51 @@ class PaintingNode(PaintNode, ABC):
             values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'], down
         )
 
-    def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
-        names = {change.name for change in changes}
-        values = self.values | {change.name: change.value for change in changes}
-        try:
-            self._check(values)
-            if 'model_file' in names:
-                self._read_model(values)
-            if 'max_pose_gap_s' in names and not self.film.log.complete:
-                raise PaintError(
-                    f'max_pose_gap_s: the motion is longer than pose_memory '
-                    f'({self.film.log.limit_poses} poses) and cannot be painted again; reset first'
-                )
-        except PaintError as error:
-            return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _check(self, values: Mapping[str, Any]) -> None:
+        if values['part_pose'] and not values['part_parent_frame']:
+            raise PaintError('part_pose is given without part_parent_frame: name its frame')
 
-    def _apply_changes(self, changes: list[Parameter]) -> None:
-        names = {change.name for change in changes}
-        self.values.update({change.name: change.value for change in changes})
+    def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
+        if 'max_pose_gap_s' in names and not self.film.log.complete:
+            raise PaintError(
+                f'max_pose_gap_s: the motion is longer than pose_memory '
+                f'({self.film.log.limit_poses} poses) and cannot be painted again; reset first'
+            )
+        if 'model_file' in names:
+            # Its effect files are tried out in the thread that repaints: poses must not wait.
+            self._next_model = read_chosen_model(values, read_effect_file)
+
+    def _changed(self, names: set[str]) -> None:
         if names & {'part_pose', 'part_parent_frame'}:
             self._place_part()
         if 'trigger_latency_s' in names:
             self.film.trigger_latency_s = self.values['trigger_latency_s']
+        if 'model_file' in names:
+            self._model = self._next_model
         if names & {'model_file', 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
             self.destroy_timer(self._show_timer)
             self._show_timer = self._new_show_timer()
-        self._changed(names)
 
     def _new_show_timer(self) -> Timer:
-        return self.create_timer(
-            1.0 / self.values['publish_rate_hz'], self.publish, clock=self._steady
-        )
+        return self.create_steady_timer(1.0 / self.values['publish_rate_hz'], self.publish)
 
     def _place_part(self) -> None:
         self.frame.place(self.values['part_parent_frame'], self.values['part_pose'])
 
     def _repaint(self, from_start: bool = True) -> None:
-        """Prepare a film, in a thread, with the values as they are now."""
+        """Prepare a film, in a thread, with the model and the values as they are now."""
         self._give_up_repainting()
-        values = dict(self.values)
-        self._repainting = Repainting(
-            self.film, lambda: self._make_film(self._read_model(values)), from_start
-        )
+        model = self._model
+
+        def make() -> LiveFilm:
+            for effect in model.effects:
+                if effect.file is not None:
+                    try_effect(type(effect), effect.file)
+            return self._make_film(model)
+
+        self._repainting = Repainting(self.film, make, from_start)
 
     def _tend(self) -> None:
         """Take over a film that is ready, and see that the part is the right way round."""
@@ -234,10 +210,13 @@ class PaintingNode(PaintNode, ABC):
 
     def _take_over(self, repainting: Repainting) -> None:
         self._repainting = None
+        self.model_problem = ''
         try:
             film = repainting.take_over(self.film)
         except Exception as error:  # from a user's effect, say; the old model goes on
-            self.get_logger().error(f'the new model is not used: {error}')
+            self.model_problem = f'the new model is not used: {error}'
+            self.get_logger().error(self.model_problem)
+            self._model = self.film.model
             return
         if film is None:
             self._repaint()

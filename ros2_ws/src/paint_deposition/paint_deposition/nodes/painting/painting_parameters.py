@@ -5,15 +5,13 @@ from __future__ import annotations
 import math
 
 from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
-from paint_deposition.nodes.runtime.parameters import NodeParameter
-
-AT_START = 'it is read once, when the node starts; restart the node with the new value'
-SUBSCRIBED = 'the subscriptions are made with it when the node starts; restart the node'
-
-
-def is_direction(value: list[float]) -> bool:
-    """Nothing, or three finite numbers that are not all zero."""
-    return not value or (len(value) == 3 and all(map(math.isfinite, value)) and any(value))
+from paint_deposition.nodes.runtime.model_parameters import model_parameters
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    direction,
+    fixed,
+    mesh_parameters,
+)
 
 
 def is_pose(value: list[float]) -> bool:
@@ -25,47 +23,15 @@ def is_pose(value: list[float]) -> bool:
     return abs(math.hypot(*value[3:]) - 1.0) <= 0.01
 
 
-PART = (
-    NodeParameter(
-        'mesh_file',
-        '',
-        "The part's mesh: STL, PLY or OBJ [path]",
-        is_path=True,
-        fixed_because='the film lies on this mesh; restart the node for another part',
-    ),
-    NodeParameter(
-        'mesh_scale',
-        1.0,
-        'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]',
-        low=1e-9,
-        high=1e3,
-        fixed_because='the film lies on this mesh; restart the node',
-    ),
-    NodeParameter(
-        'max_edge_length_m',
-        0.01,
-        'Triangles are split until no edge is longer [m]',
-        low=1e-4,
-        high=10.0,
-        fixed_because='the film lies on the refined mesh; restart the node',
-    ),
-    NodeParameter(
-        'down',
-        [],
-        'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
-        'stands, -y for one drawn lying in x-y [-]',
-        constraints='three numbers that are not all zero, or none',
-        allows=is_direction,
-        element=float,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'frame_id',
-        'part',
-        'Frame of the mesh, of the poses and of what is published [name]',
-        constraints='a name',
-        allows=lambda value: bool(value.strip('/')),
-        fixed_because='everything published so far is in this frame; restart the node',
+PAINTING = (
+    *fixed(
+        'the film so far lies on this mesh, in this frame; restart the node for another part',
+        *mesh_parameters(max_edge_length_m=0.01),
+        direction(
+            'down',
+            'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
+            'stands, -y for one drawn lying in x-y [-]',
+        ),
     ),
     NodeParameter(
         'part_pose',
@@ -80,9 +46,6 @@ PART = (
         '',
         'Frame that part_pose is given in; poses in it are transformed [name]',
     ),
-)
-
-MOTION = (
     NodeParameter(
         'max_pose_gap_s',
         0.25,
@@ -99,49 +62,38 @@ MOTION = (
         low=0.0,
         high=10.0,
     ),
-    NodeParameter(
-        'pose_queue_depth',
-        5000,
-        'Poses that may wait while the node is busy; too few lose paint [poses]',
-        low=1,
-        high=100_000,
-        fixed_because=SUBSCRIBED,
+    *fixed(
+        'the subscriptions and the pose memory are made with it when the node starts; restart '
+        'the node',
+        NodeParameter(
+            'pose_queue_depth',
+            5000,
+            'Poses that may wait while the node is busy; too few lose paint [poses]',
+            low=1,
+            high=100_000,
+        ),
+        NodeParameter(
+            'pose_reliability',
+            'best_effort',
+            'What is asked of the publishers of poses and states; best_effort hears all of them, '
+            'reliable only those that promise it [name]',
+            choices=('best_effort', 'reliable'),
+        ),
+        NodeParameter(
+            'pose_memory',
+            DEFAULT_LIMIT_POSES,
+            'Poses kept, about 100 bytes each, to paint the motion again with another model; '
+            'beyond, a new model paints from then on only [poses]',
+            low=10_000,
+            high=100_000_000,
+        ),
     ),
-    NodeParameter(
-        'pose_reliability',
-        'best_effort',
-        'What is asked of the publishers of poses and states; best_effort hears all of them, '
-        'reliable only those that promise it [name]',
-        choices=('best_effort', 'reliable'),
-        fixed_because=SUBSCRIBED,
-    ),
-    NodeParameter(
-        'pose_memory',
-        DEFAULT_LIMIT_POSES,
-        'Poses kept, about 100 bytes each, to paint the motion again with another model; beyond, '
-        'a new model paints from then on only [poses]',
-        low=10_000,
-        high=100_000_000,
-        fixed_because=AT_START,
-    ),
-)
-
-MODEL = (
-    NodeParameter(
-        'model_file',
-        '',
-        'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
-        'reads it and paints the motion so far again [path]',
-        is_path=True,
-    ),
+    *model_parameters(' and paints the motion so far again'),
     NodeParameter(
         'repaint',
         True,
         'Whether a new model paints the motion so far again; false: from then on only [-]',
     ),
-)
-
-SHOWING = (
     NodeParameter(
         'publish_rate_hz',
         2.0,

@@ -6,12 +6,12 @@ from collections import deque
 
 import numpy as np
 
-# Batches over which the load is taken.
+# Batches over which it is taken.
 REMEMBERED = 100
 
 
-class Load:
-    """Time spent on painting as a share of the time that the motion lasts by its stamps."""
+class RealTimeFactor:
+    """Time spent on painting over the duration of the motion by its stamps."""
 
     def __init__(self) -> None:
         self._spans: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
@@ -26,7 +26,7 @@ class Load:
             self._spans.append((spent_s, lasted_s))
 
     @property
-    def share(self) -> float:
+    def value(self) -> float:
         """Above 1 the node falls behind a motion that comes in real time; 0 before any."""
         lasted_s = sum(lasted for _, lasted in self._spans)
         return sum(spent for spent, _ in self._spans) / lasted_s if lasted_s else 0.0

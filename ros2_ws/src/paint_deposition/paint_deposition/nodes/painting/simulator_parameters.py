@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
-from paint_deposition.nodes.runtime.parameters import NodeParameter
-
-THICKEST_UM = 10_000.0
+from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 
 SIMULATOR = (
     NodeParameter(
@@ -15,38 +13,23 @@ SIMULATOR = (
         choices=('single', 'double'),
         fixed_because='the film so far was summed in it; restart the node',
     ),
-    NodeParameter(
+    thickness(
         'color_min_um',
-        0.0,
-        'Film at the lower end of the colours; both ends 0: automatic [um]',
-        low=0.0,
-        high=THICKEST_UM,
+        description='Film at the lower end of the colours; both ends 0: automatic [µm]',
     ),
-    NodeParameter(
+    thickness(
         'color_max_um',
-        0.0,
-        'Film at the upper end of the colours; both ends 0: automatic [um]',
-        low=0.0,
-        high=THICKEST_UM,
+        description='Film at the upper end of the colours; both ends 0: automatic [µm]',
     ),
-    NodeParameter(
+    thickness(
         'painted_above_um',
-        DEFAULT_PAINTED_ABOVE_UM,
-        'Thinner film counts, and is shown, as bare metal [um]',
-        low=0.0,
-        high=THICKEST_UM,
+        default=DEFAULT_PAINTED_ABOVE_UM,
+        description='Thinner film counts, and is shown, as bare metal [µm]',
     ),
-    NodeParameter(
-        'target_um', 0.0, 'Film wanted; 0: none [um]', low=0.0, high=THICKEST_UM
-    ),
-    NodeParameter(
+    thickness('target_um', description='Film wanted; 0: none [µm]'),
+    thickness(
         'target_tolerance_um',
-        0.0,
-        'Difference from the target that is allowed, either way [um]',
-        low=0.0,
-        high=THICKEST_UM,
+        description='Difference from the target that is allowed, either way [µm]',
     ),
-    NodeParameter(
-        'output_directory', 'runs', 'Where ~/save_film writes [path]', is_path=True
-    ),
-)  # fmt: skip
+    NodeParameter('output_directory', 'runs', 'Where ~/save_film writes [path]', is_path=True),
+)

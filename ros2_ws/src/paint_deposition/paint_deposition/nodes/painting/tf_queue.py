@@ -7,10 +7,10 @@ from collections.abc import Callable
 
 from geometry_msgs.msg import PoseStamped
 
-# tf comes by another way than the poses and is often some milliseconds late, static transforms
-# a little after the start; what is not there after so long will not come.
-HELD_FOR_S = 0.5
-HELD_POSES = 5000
+# A transform comes on another topic than the poses and is often some milliseconds late, a static
+# one a little after the start; one that is not there after so long will not come.
+TIMEOUT_S = 0.5
+LONGEST = 5000
 
 
 class NoTransform(Exception):
@@ -21,11 +21,11 @@ class NoTransform(Exception):
         self.may_come = may_come
 
 
-class HeldPoses:
-    """A queue of poses that leave it in the order in which they came, at most `HELD_FOR_S` late.
+class TfQueue:
+    """A queue of poses that leave it in the order in which they came, at most `TIMEOUT_S` late.
 
     A pose without a transform holds back all behind it. It is refused when its transform cannot
-    come, has not come in time, or more than `HELD_POSES` wait.
+    come, has not come in time, or more than `LONGEST` poses wait.
     """
 
     def __init__(self) -> None:
@@ -50,7 +50,7 @@ class HeldPoses:
             try:
                 place(pose)
             except NoTransform as missing:
-                in_time = now_s - since_s < HELD_FOR_S and len(self._waiting) <= HELD_POSES
+                in_time = now_s - since_s < TIMEOUT_S and len(self._waiting) <= LONGEST
                 if missing.may_come and in_time:
                     return
                 refuse(pose, missing)

@@ -3,25 +3,29 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
-from nav_msgs.msg import Path as PathMessage
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
-from rcl_interfaces.msg import SetParametersResult
-from rclpy.parameter import Parameter
+from rclpy.time import Time
 
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import read_model
-from paint_deposition.nodes.planning.path_message import path_message
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.planning.planner_parameters import PLANNER
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.process import run_node
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.plan import PlanRequest, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
+
+SPACING_M = 0.02
 
 
 class IndexPlanner(PaintNode):
@@ -34,22 +38,17 @@ class IndexPlanner(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('index_planner', **kwargs)
-        try:
-            self._model = _model_of(self.values['model_file'])
-            path = self._planned() if self.values['mesh_file'] else None
-        except PaintError:
-            self.destroy_node()
-            raise
-        self._next_model = self._model
         self._asked = 0
         self._last = Status(OK, 'not asked yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
-        self._path_publisher = self.create_publisher(PathMessage, 'planned_path', qos.LATCHED)
-        if path is not None:
-            self._path_publisher.publish(path)
+        self._path_publisher = self.create_publisher(Path, 'planned_path', qos.LATCHED)
+        if self._path is not None:
+            self._path_publisher.publish(self._path)
         self._diagnostics = Diagnostics(self, {'index': self._status})
-        self.add_on_set_parameters_callback(self._check_changes)
-        self.add_post_set_parameters_callback(self._apply_changes)
+
+    def _prepare(self) -> None:
+        self._model = read_chosen_model(self.values)
+        self._path = self._planned() if self.values['mesh_file'] else None
 
     # --- recommending
 
@@ -83,7 +82,7 @@ class IndexPlanner(PaintNode):
 
     # --- planning
 
-    def _planned(self) -> PathMessage:
+    def _planned(self) -> Path:
         values = self.values
         surface = read_mesh(values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
@@ -106,23 +105,16 @@ class IndexPlanner(PaintNode):
             frame_id,
         )
         self.get_logger().info(planned.sentence)
-        return path_message(planned.trajectory, self.get_clock().now().nanoseconds)
+        return _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
 
     # --- state
 
-    def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
-        """Read a new model before the change is accepted, so that a bad file is refused."""
-        for change in changes:
-            if change.name == 'model_file':
-                try:
-                    self._next_model = _model_of(change.value)
-                except PaintError as error:
-                    return SetParametersResult(successful=False, reason=str(error))
-        return SetParametersResult(successful=True)
+    def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
+        if 'model_file' in names:
+            self._next_model = read_chosen_model(values)
 
-    def _apply_changes(self, changes: list[Parameter]) -> None:
-        self.values |= {change.name: change.value for change in changes}
-        if any(change.name == 'model_file' for change in changes):
+    def _changed(self, names: set[str]) -> None:
+        if 'model_file' in names:
             self._model = self._next_model
 
     def _status(self) -> Status:
@@ -132,10 +124,6 @@ class IndexPlanner(PaintNode):
             'requests': self._asked,
         }
         return Status(self._last.level, self._last.message, values)
-
-
-def _model_of(model_file: str) -> DepositionModel:
-    return read_model(model_file) if model_file else DepositionModel()
 
 
 def _given(value: float) -> float | None:
@@ -170,6 +158,28 @@ def _fill(response: RecommendIndex.Response, answer: Recommendation) -> Recommen
     response.index_drift_low_m, response.index_drift_high_m = index_drift
     response.standoff_drift_low_m, response.standoff_drift_high_m = standoff_drift
     return response
+
+
+def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
+    """Poses about SPACING_M apart, both ends included; stamps count from the start."""
+    step = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
+    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
+    kept = np.append(True, np.diff(travelled) > 0.0)
+    kept[-1] = True
+    message = Path()
+    message.header.frame_id = trajectory.frame_id
+    message.header.stamp = Time(nanoseconds=start_ns).to_msg()
+    first_ns = int(trajectory.stamps_ns[0])
+    for row in np.flatnonzero(kept):
+        pose = PoseStamped()
+        pose.header.frame_id = trajectory.frame_id
+        stamp_ns = start_ns + int(trajectory.stamps_ns[row]) - first_ns
+        pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        p, q = pose.pose.position, pose.pose.orientation
+        p.x, p.y, p.z = trajectory.positions_m[row].tolist()
+        q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()
+        message.poses.append(pose)
+    return message
 
 
 def main() -> int:

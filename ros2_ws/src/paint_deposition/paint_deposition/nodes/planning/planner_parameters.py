@@ -4,21 +4,19 @@ from __future__ import annotations
 
 import math
 
-from paint_deposition.nodes.painting.painting_parameters import is_direction
-from paint_deposition.nodes.runtime.parameters import NodeParameter
+from paint_deposition.nodes.runtime.model_parameters import model_parameters
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    direction,
+    fixed,
+    mesh_parameters,
+    thickness,
+)
 from paint_deposition.planning.index_request import FASTEST_M_PER_S
 from paint_deposition.planning.plan import DEFAULT_SMOOTHING_RADIUS_M
 
-AT_START = 'passes are planned once, when the node starts; restart the node with the new value'
-
-RECOMMENDING = (
-    NodeParameter(
-        'model_file',
-        '',
-        'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
-        'reads it [path]',
-        is_path=True,
-    ),
+PLANNER = (
+    *model_parameters(''),
     NodeParameter(
         'width_m',
         0.0,
@@ -50,99 +48,53 @@ RECOMMENDING = (
     NodeParameter(
         'gun_turns',
         False,
-        'Whether the gun is turned by 180 deg for every way back; else it keeps its orientation '
-        'and lays the same profile both ways [-]',
+        'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
+        'orientation and lays the same profile both ways [-]',
+    ),
+    *fixed(
+        'passes are planned once, when the node starts; restart the node with the new value',
+        *mesh_parameters(max_edge_length_m=0.02),
+        NodeParameter(
+            'direction',
+            'horizontal',
+            'How planned passes run on the part [name]',
+            choices=('horizontal', 'vertical'),
+        ),
+        NodeParameter(
+            'speed_m_per_s',
+            0.3,
+            'Speed of planned passes; 0: from target_um [m/s]',
+            low=0.0,
+            high=FASTEST_M_PER_S,
+        ),
+        thickness(
+            'target_um',
+            description='Mean film of planned passes where speed_m_per_s is 0 [µm]',
+        ),
+        NodeParameter(
+            'index_m',
+            0.0,
+            'Distance between planned passes; 0: the most even [m]',
+            low=0.0,
+            high=10.0,
+        ),
+        NodeParameter(
+            'smoothing_radius_m',
+            DEFAULT_SMOOTHING_RADIUS_M,
+            'What is finer than this on the part is not followed [m]',
+            low=0.005,
+            high=2.0,
+        ),
+        NodeParameter(
+            'acceleration_m_per_s2',
+            2.0,
+            'Acceleration of the robot [m/s^2]',
+            low=0.05,
+            high=50.0,
+        ),
+        direction(
+            'outward',
+            'Direction from the part to the gun, any length; empty: the mean normal [-]',
+        ),
     ),
 )
-
-PLANNING = (
-    NodeParameter(
-        'mesh_file',
-        '',
-        "The part's mesh to plan passes on: STL, PLY or OBJ; empty: none [path]",
-        is_path=True,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'mesh_scale',
-        1.0,
-        'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]',
-        low=1e-9,
-        high=1e3,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'max_edge_length_m',
-        0.02,
-        'Triangles are split until no edge is longer [m]',
-        low=1e-4,
-        high=10.0,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'frame_id',
-        'part',
-        'Frame of the mesh and of the planned path [name]',
-        constraints='a name',
-        allows=lambda value: bool(value.strip('/')),
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'direction',
-        'horizontal',
-        'How planned passes run on the part [name]',
-        choices=('horizontal', 'vertical'),
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'speed_m_per_s',
-        0.3,
-        'Speed of planned passes; 0: from target_um [m/s]',
-        low=0.0,
-        high=FASTEST_M_PER_S,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'target_um',
-        0.0,
-        'Mean film of planned passes where speed_m_per_s is 0 [um]',
-        low=0.0,
-        high=10_000.0,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'index_m',
-        0.0,
-        'Distance between planned passes; 0: the most even [m]',
-        low=0.0,
-        high=10.0,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'smoothing_radius_m',
-        DEFAULT_SMOOTHING_RADIUS_M,
-        'What is finer than this on the part is not followed [m]',
-        low=0.005,
-        high=2.0,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'acceleration_m_per_s2',
-        2.0,
-        'Acceleration of the robot [m/s^2]',
-        low=0.05,
-        high=50.0,
-        fixed_because=AT_START,
-    ),
-    NodeParameter(
-        'outward',
-        [],
-        'Direction from the part to the gun, any length; empty: the mean normal [-]',
-        constraints='three numbers that are not all zero, or none',
-        allows=is_direction,
-        element=float,
-        fixed_because=AT_START,
-    ),
-)
-
-PLANNER = (*RECOMMENDING, *PLANNING)

@@ -12,7 +12,7 @@ from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.nodes.replay.replayed_messages import header_stamp_ns
+from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
 if TYPE_CHECKING:  # older distributions have no such name
     from rclpy.subscription import MessageInfo

@@ -9,23 +9,23 @@ from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import PoseProgress
-from rclpy.clock import Clock, ClockType
 from rclpy.qos import QoSProfile
+from rclpy.time import Time
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_srvs.srv import Trigger
 
-from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.errors import RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.recording.recorder_parameters import RECORDER
-from paint_deposition.nodes.replay.flow_control import PROGRESS_TOPIC
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import to_time
-from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.process import run_node
 
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
@@ -60,12 +60,6 @@ class RunRecorder(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
-        try:
-            notes = provenance(self.values['mesh_file'], self.values['model_file'])
-            self._run = RunWriter(self._folder(), notes, compression=self.values['compression'])
-        except PaintError:
-            self.destroy_node()
-            raise
         wanted = self.values['topics'] or DEFAULT_TOPICS
         self._wanted = [self.resolve_topic_name(name) for name in wanted]
         self._topics: dict[str, RecordedTopic] = {}
@@ -74,13 +68,15 @@ class RunRecorder(PaintNode):
         self._pose_topic = self.resolve_topic_name('atomizer/pose')
         self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
         self.create_service(Trigger, '~/stop', self._stop)
-        # A recorder keeps its own time: a simulated clock may stand still.
-        steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self.create_timer(DISCOVERY_PERIOD_S, self._discover, clock=steady)
-        self.create_timer(FLUSH_PERIOD_S, self._flush, clock=steady)
-        self.create_timer(PROGRESS_PERIOD_S, self._report_progress, clock=steady)
+        self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
+        self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
+        self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
         self._diagnostics = Diagnostics(self, {'recording': self._status})
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self._run.folder}')
+
+    def _prepare(self) -> None:
+        notes = provenance(self.values['mesh_file'], self.values['model_file'])
+        self._run = RunWriter(self._folder(), notes, compression=self.values['compression'])
 
     @property
     def folder(self) -> Path:
@@ -100,9 +96,8 @@ class RunRecorder(PaintNode):
         self._complete()
 
     def destroy_node(self) -> None:
-        run = getattr(self, '_run', None)
-        if run and not run.complete:
-            run.abandon()
+        if not self._run.complete:
+            self._run.abandon()
         super().destroy_node()
 
     def _folder(self) -> Path:
@@ -176,7 +171,7 @@ class RunRecorder(PaintNode):
         if topic is None:
             return
         progress = PoseProgress(poses_received=topic.counts.messages)
-        progress.header.stamp = to_time(topic.counts.newest_stamp_ns)
+        progress.header.stamp = Time(nanoseconds=topic.counts.newest_stamp_ns).to_msg()
         self._progress.publish(progress)
 
     # --- ending

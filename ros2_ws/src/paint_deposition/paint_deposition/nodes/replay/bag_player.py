@@ -7,8 +7,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
-from rclpy.clock import Clock as SteadyClock
-from rclpy.clock import ClockType
+from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
 from std_srvs.srv import Trigger
 
@@ -21,14 +20,14 @@ from paint_deposition.files.recordings.bags import (
     choose_state_topic,
     read_trajectory,
 )
-from paint_deposition.nodes.replay.flow_control import Audience
+from paint_deposition.nodes.replay.flow_control import FlowControl
 from paint_deposition.nodes.replay.player_parameters import PLAYER
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import to_time
-from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.process import run_node
 
 CLOCK_PERIOD_S = 0.01
 STOP_NOTICED_S = 0.05
@@ -49,11 +48,6 @@ class BagPlayer(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
-        try:
-            self._poses_in_bag, self._states_in_bag = self._choose_topics()
-        except PaintError:
-            self.destroy_node()
-            raise
         depth = max(qos.POSE_DEPTH, self.values['window'])
         profile = qos.replayed(depth)
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
@@ -65,13 +59,14 @@ class BagPlayer(PaintNode):
         )
         self._clock_order = threading.Lock()
         self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
-        steady = SteadyClock(clock_type=ClockType.STEADY_TIME)
         if self._clock_publisher:
-            self.create_timer(CLOCK_PERIOD_S, self._publish_clock, clock=steady)
+            self.create_steady_timer(CLOCK_PERIOD_S, self._publish_clock)
         self.create_service(Trigger, '~/pause', self._pause)
         self.create_service(Trigger, '~/resume', self._resume)
         self._stopped = threading.Event()
-        self._audience = Audience(self, self._pose_publisher, self.values['window'], self._stopped)
+        self._flow_control = FlowControl(
+            self, self._pose_publisher, self.values['window'], self._stopped
+        )
         self.poses_published = 0
         self.states_published = 0
         self._diagnostics = Diagnostics(self, {'replay': self._status})
@@ -89,10 +84,11 @@ class BagPlayer(PaintNode):
         super().destroy_node()
 
     def _stop_thread(self) -> None:
-        thread = getattr(self, '_thread', None)
-        if thread and thread.is_alive():
-            self._stopped.set()
-            thread.join()
+        self._stopped.set()
+        self._thread.join()
+
+    def _prepare(self) -> None:
+        self._poses_in_bag, self._states_in_bag = self._choose_topics()
 
     def _choose_topics(self) -> tuple[BagTopic, BagTopic | None]:
         values = self.values
@@ -128,7 +124,7 @@ class BagPlayer(PaintNode):
         return response
 
     def _status(self) -> Status:
-        doing = self._audience.doing if self._time.running else 'paused'
+        doing = self._flow_control.doing if self._time.running else 'paused'
         return Status(
             WARN if doing.startswith('waiting') else OK,
             doing,
@@ -136,7 +132,7 @@ class BagPlayer(PaintNode):
                 'bag': self.values['bag'],
                 'poses published': self.poses_published,
                 'states published': self.states_published,
-                'poses ahead of the slowest subscriber': self._audience.poses_ahead,
+                'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
             },
         )
 
@@ -145,10 +141,10 @@ class BagPlayer(PaintNode):
     def _replay(self) -> None:
         try:
             self._stand_at_the_start()
-            self._audience.wait_for_subscribers(self.values['wait_for_subscribers'])
+            self._flow_control.wait_for_subscribers(self.values['wait_for_subscribers'])
             while not self._stopped.is_set():
                 self._play_once()
-                self._audience.wait_until_taken()
+                self._flow_control.wait_until_taken()
                 if not self.values['loop']:
                     break
         except Exception as error:
@@ -184,11 +180,11 @@ class BagPlayer(PaintNode):
             if self._time.wait_for(log_time_ns, timeout_s=STOP_NOTICED_S):
                 break
         if self.values['rate'] == 0.0:
-            self._audience.wait_for_room()
+            self._flow_control.wait_for_room()
 
     def _publish(self, message: ReplayMessage) -> None:
         if message.is_pose:
-            self._audience.sent(message.stamp_ns)
+            self._flow_control.sent(message.stamp_ns)
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
         else:
@@ -199,7 +195,7 @@ class BagPlayer(PaintNode):
         with self._clock_order:
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
-                self._clock_publisher.publish(Clock(clock=to_time(time_ns)))
+                self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
 
 
 def main() -> int:

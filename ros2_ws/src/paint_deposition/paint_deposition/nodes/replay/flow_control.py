@@ -1,4 +1,4 @@
-"""Who listens to a replay, and waiting for them."""
+"""Flow control of a replay: it waits for the nodes that take its poses."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from rclpy.publisher import Publisher
 from paint_deposition.files.recordings.bags import stamp_ns
 from paint_deposition.nodes.replay.pose_window import PoseWindow
 from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
 
 if TYPE_CHECKING:  # older distributions have no such name
     from rclpy.subscription import MessageInfo
@@ -24,11 +25,10 @@ SETTLED_S = 0.5
 GRAPH_PERIOD_S = 0.1
 NOTICE_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
-PROGRESS_TOPIC = 'atomizer/progress'
 
 
-class Audience:
-    """The subscribers of a publisher of poses.
+class FlowControl:
+    """Holds a publisher of poses back until its subscribers have taken them.
 
     Nodes that take the poses and publish PoseProgress on `atomizer/progress` are waited for, pose
     by pose; of all others only the acknowledgement by their middleware is known. The waiting

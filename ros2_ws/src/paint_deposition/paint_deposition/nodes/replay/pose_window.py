@@ -1,4 +1,4 @@
-"""Flow control of a replay: how far the subscribers have come with the poses they were sent."""
+"""How far the subscribers of a replay have come with the poses they were sent."""
 
 from __future__ import annotations
 

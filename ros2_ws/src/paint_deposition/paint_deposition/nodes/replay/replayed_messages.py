@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any, NamedTuple
 
 from paint_msgs.msg import AtomizerState
 from rclpy.serialization import deserialize_message, serialize_message
+from rclpy.time import Time
 from std_msgs.msg import Bool
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
 from paint_deposition.files.recordings.bags import BOOL_TYPE, STATE_TYPE, stamp_ns
 from paint_deposition.motion.trigger import relative_flow
-from paint_deposition.nodes.runtime.messages import to_time
-
-STAMP_OFFSET = 4  # behind the four bytes that say how the message is encoded
+from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
 
 class ReplayMessage(NamedTuple):
@@ -40,13 +38,6 @@ def replay_messages(bag: Bag, poses: BagTopic, states: BagTopic | None) -> Itera
             yield ReplayMessage(message.log_time_ns, is_pose, header_stamp_ns(cdr), cdr)
 
 
-def header_stamp_ns(cdr: bytes) -> int:
-    """Stamp of a serialised message that begins with a header [ns]."""
-    little_endian = cdr[1] & 1
-    sec, nanosec = struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET)
-    return sec * 1_000_000_000 + nanosec
-
-
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
     if states is None or states.type == BOOL_TYPE:
         return _state_of_bool
@@ -59,7 +50,7 @@ def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage]
 def _state_of_bool(message: RawMessage) -> bytes:
     spraying = deserialize_message(message.cdr, Bool).data
     state = AtomizerState(spraying=spraying, flow=relative_flow(spraying))
-    state.header.stamp = to_time(message.log_time_ns)
+    state.header.stamp = Time(nanoseconds=message.log_time_ns).to_msg()
     unknown = float('nan')
     state.shaping_air_l_per_min = state.bell_speed_rpm = state.voltage_kv = unknown
     return serialize_message(state)
@@ -71,6 +62,6 @@ def _state_of(recorded: Any) -> AtomizerState:
         if kind == 'double':
             setattr(state, name, float(getattr(recorded, name, float('nan'))))
     state.spraying = bool(recorded.spraying)
-    state.header.stamp = to_time(stamp_ns(recorded.header))
+    state.header.stamp = Time(nanoseconds=stamp_ns(recorded.header)).to_msg()
     state.header.frame_id = recorded.header.frame_id
     return state

@@ -1,28 +1,22 @@
-"""Films as messages, without a Python object for each point.
+"""Messages that several nodes use: progress, stamps in serialised messages, a coloured mesh.
 
-A Marker of 100,000 triangles takes a second to build from Python objects and milliseconds to
-serialise anew; here it is serialised once and its colours are rewritten in the bytes. Messages
-whose large part is an array of numbers need no such care: their arrays are filled in place.
+A Marker of 100,000 triangles takes a second to build from Python objects. Here it is serialised
+once, and for each publication only its stamp and colours are rewritten in the bytes.
 """
 
 from __future__ import annotations
 
 import struct
-import sys
-from array import array
 
 import numpy as np
-from builtin_interfaces.msg import Time
 from geometry_msgs.msg import Point, Vector3
-from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.serialization import serialize_message
-from sensor_msgs.msg import PointCloud2, PointField
 from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
-from paint_deposition.film.statistics import FilmStatistics
-
-# The stamp is the first thing in a Marker, behind the four bytes that say how it is encoded.
+# Every node that takes poses reports here how far it has come.
+PROGRESS_TOPIC = 'atomizer/progress'
+# A header begins with its stamp, behind the four bytes that say how the message is encoded.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
 SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
@@ -31,15 +25,11 @@ SAMPLE_COLOURS = np.array(
 )
 
 
-def to_time(stamp_ns: int) -> Time:
-    """A stamp in nanoseconds as a message."""
-    sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
-    return Time(sec=sec, nanosec=nanosec)
-
-
-def to_ns(stamp: Time) -> int:
-    """A stamp in integer nanoseconds, which a float could not hold."""
-    return stamp.sec * 1_000_000_000 + stamp.nanosec
+def header_stamp_ns(cdr: bytes) -> int:
+    """Stamp of a serialised message that begins with a header [ns]."""
+    little_endian = cdr[1] & 1
+    sec, nanosec = struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET)
+    return sec * 1_000_000_000 + nanosec
 
 
 class ColouredMesh:
@@ -97,64 +87,3 @@ def _around_the_arrays(frame_id: str, namespace: str) -> tuple[bytes, bytes]:
     colours = sample.index(SAMPLE_COLOURS.tobytes())
     count = struct.pack('=I', len(SAMPLE_POINTS))
     return sample[: sample.rindex(count, 0, points)], sample[colours + SAMPLE_COLOURS.nbytes :]
-
-
-class FilmCloud:
-    """A PointCloud2 with x, y, z [m] and thickness_um, filled in place."""
-
-    FIELDS = ('x', 'y', 'z', 'thickness_um')
-
-    def __init__(self, positions_m: np.ndarray, frame_id: str) -> None:
-        size = 4 * len(self.FIELDS)
-        self._message = PointCloud2(
-            height=1,
-            width=len(positions_m),
-            fields=[
-                PointField(name=name, offset=4 * k, datatype=PointField.FLOAT32, count=1)
-                for k, name in enumerate(self.FIELDS)
-            ],
-            is_bigendian=sys.byteorder == 'big',
-            point_step=size,
-            row_step=size * len(positions_m),
-            data=array('B', bytes(size * len(positions_m))),
-            is_dense=True,
-        )
-        self._message.header.frame_id = frame_id
-        self._values = np.frombuffer(self._message.data, np.float32).reshape(-1, len(self.FIELDS))
-        self._values[:, :3] = positions_m
-
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> PointCloud2:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = to_time(stamp_ns)
-        self._values[:, 3] = film_um
-        return self._message
-
-
-class FilmField:
-    """A ThicknessField, filled in place."""
-
-    def __init__(self, vertex_count: int, mesh_id: str, frame_id: str) -> None:
-        self._message = ThicknessField(
-            mesh_id=mesh_id, thickness_um=array('f', bytes(4 * vertex_count))
-        )
-        self._message.header.frame_id = frame_id
-        self._values = np.frombuffer(self._message.thickness_um, np.float32)
-
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = to_time(stamp_ns)
-        self._values[:] = film_um
-        return self._message
-
-
-def stats_message(frame_id: str, stamp_ns: int, figures: FilmStatistics) -> ThicknessStats:
-    """The film's figures; counts of poses are the caller's to add."""
-    message = ThicknessStats()
-    message.header.frame_id = frame_id
-    message.header.stamp = to_time(stamp_ns)
-    for name in (
-        'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
-        'painted_volume_cm3', 'transfer_efficiency',
-    ):  # fmt: skip
-        setattr(message, name, getattr(figures, name))
-    return message

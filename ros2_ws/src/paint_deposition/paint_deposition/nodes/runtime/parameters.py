@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import os
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from rcl_interfaces.msg import (
@@ -123,6 +124,58 @@ class NodeParameter:
 
 
 ParameterTable = Sequence[NodeParameter]
+
+# A film or a difference of films [um].
+thickness = functools.partial(NodeParameter, default=0.0, low=0.0, high=10_000.0)
+
+
+def direction(name: str, description: str) -> NodeParameter:
+    """A row for a direction of any length; empty is none."""
+    return NodeParameter(
+        name,
+        [],
+        description,
+        constraints='three numbers that are not all zero, or none',
+        allows=_is_direction,
+        element=float,
+    )
+
+
+def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
+    """The rows of a part's mesh, with this default of `max_edge_length_m`."""
+    return (
+        NodeParameter('mesh_file', '', "The part's mesh: STL, PLY or OBJ [path]", is_path=True),
+        NodeParameter(
+            'mesh_scale',
+            1.0,
+            'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]',
+            low=1e-9,
+            high=1e3,
+        ),
+        NodeParameter(
+            'max_edge_length_m',
+            max_edge_length_m,
+            'Triangles are split until no edge is longer [m]',
+            low=1e-4,
+            high=10.0,
+        ),
+        NodeParameter(
+            'frame_id',
+            'part',
+            'Frame of the mesh and of what is published on it [name]',
+            constraints='a name',
+            allows=lambda value: bool(value.strip('/')),
+        ),
+    )
+
+
+def fixed(because: str, *rows: NodeParameter) -> ParameterTable:
+    """The same rows, none of which can change while the node runs, with the reason."""
+    return tuple(replace(row, fixed_because=because) for row in rows)
+
+
+def _is_direction(value: list[float]) -> bool:
+    return not value or (len(value) == 3 and all(map(math.isfinite, value)) and any(value))
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:

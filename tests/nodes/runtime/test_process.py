@@ -7,11 +7,12 @@ pytest.importorskip('rclpy')
 from nodes.processes import NodeProcess
 
 NODE = """
-import sys, time
+import os, signal, sys, time
 from pathlib import Path
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.shutdown import PaintNode, run_node
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.process import run_node
 
 
 class Worker(PaintNode):
@@ -22,16 +23,23 @@ class Worker(PaintNode):
 
     def __init__(self, **kwargs):
         super().__init__('worker', **kwargs)
+        self.ready = False
+        if self.values['does'] == 'begin':
+            os.kill(os.getpid(), signal.SIGINT)
+        self.create_timer(0.02, self.work)
+
+    def _prepare(self):
         if self.values['does'] == 'refuse':
             raise PaintError('mesh none.stl does not exist; give a mesh')
         if self.values['does'] == 'load':
             print('loading', flush=True)
             while True:
                 time.sleep(0.01)
-        self.create_timer(0.02, self.work)
-        print('ready', flush=True)
 
     def work(self):
+        if not self.ready:
+            print('ready', flush=True)
+        self.ready = True
         does = self.values['does']
         if does == 'fail':
             raise PaintError('the disk is full; empty it')
@@ -113,6 +121,13 @@ def test_an_interrupt_while_loading(worker, wait_until):
     wait_until(lambda: 'loading' in process.out, what='the node')
     process.interrupt_as_launch_does()
     assert process.wait() == 0
+    assert process.err == ''
+
+
+def test_an_interrupt_between_loading_and_running_closes_the_node(worker):
+    process = worker('begin')
+    assert process.wait() == 0
+    assert process.out.split()[-1] == 'closed'
     assert process.err == ''
 
 

@@ -75,10 +75,10 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
 @pytest.mark.parametrize(
     ('values', 'reason'),
     [
-        ({'mesh_file': 'other.stl'}, 'cannot change while the node runs: the film lies on this'),
-        ({'max_edge_length_m': 0.01}, 'the film lies on the refined mesh'),
+        ({'mesh_file': 'other.stl'}, 'cannot change while the node runs: the film so far lies on'),
+        ({'max_edge_length_m': 0.01}, 'the film so far lies on this mesh'),
         ({'frame_id': 'other'}, 'in this frame'),
-        ({'pose_queue_depth': 10}, 'the subscriptions are made with it'),
+        ({'pose_queue_depth': 10}, 'the subscriptions and the pose memory are made with it'),
         ({'precision': 'double'}, 'was summed in it'),
         ({'publish_rate_hz': 600.0}, 'out of range'),
         ({'max_pose_gap_s': math.nan}, 'out of range'),
@@ -123,6 +123,6 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=100.0)
     assert all(result.successful for result in node.set_parameters(changes))
     wait_until(lambda: viewer.newest('thickness/stats').within_target == 1.0)
-    wait_until(lambda: viewer.newest('thickness/legend').markers[-1].text == '25 um')
+    wait_until(lambda: viewer.newest('thickness/legend').markers[-1].text == '25 µm')
     assert node.set_parameters(parameters(publish_rate_hz=1.0))[0].successful
     assert node._show_timer.timer_period_ns == 1_000_000_000

@@ -15,10 +15,18 @@ from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
 from rclpy.node import Node
 
-from nodes.cell import DIAGNOSTICS, PANEL_M, Onlooker, parameters, values_of, write_panel
+from nodes.cell import (
+    DIAGNOSTICS,
+    PANEL_M,
+    Onlooker,
+    parameters,
+    values_of,
+    write_own_model,
+    write_panel,
+)
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
@@ -121,6 +129,18 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     assert not result.successful
     assert 'K9' in result.reason
     assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
+
+
+def test_effect_files_need_leave_at_the_start_and_later(planner, ros_context, tmp_path):
+    own = write_own_model(tmp_path)
+    (result,) = planner().set_parameters(parameters(model_file=str(own)))
+    assert not result.successful
+    assert 'start the node with allow_user_effects:=true' in result.reason
+    with pytest.raises(ModelError, match='start the node with allow_user_effects:=true'):
+        planner(model_file=str(own))
+    (tmp_path / 'gate').touch()
+    trusted = planner(model_file=str(own), allow_user_effects=True)
+    assert [effect.id for effect in trusted._model.effects] == ['own']
 
 
 def test_gun_turns_is_a_parameter_and_is_told(planner, ask):

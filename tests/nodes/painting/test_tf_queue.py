@@ -5,9 +5,9 @@ import pytest
 pytest.importorskip('rclpy')
 
 from geometry_msgs.msg import PoseStamped
+from rclpy.time import Time
 
-from paint_deposition.nodes.painting.tf_queue import HELD_FOR_S, HELD_POSES, HeldPoses, NoTransform
-from paint_deposition.nodes.runtime.messages import to_ns, to_time
+from paint_deposition.nodes.painting.tf_queue import LONGEST, TIMEOUT_S, NoTransform, TfQueue
 
 
 class Part:
@@ -16,28 +16,28 @@ class Part:
     def __init__(self) -> None:
         self.known_until_ns = 0
         self.may_come = True
-        self.held = HeldPoses()
+        self.queue = TfQueue()
         self.placed: list[int] = []
         self.refused: list[int] = []
 
     def take(self, stamp_ns: int, now_s: float) -> None:
         pose = PoseStamped()
-        pose.header.stamp = to_time(stamp_ns)
-        self.held.add(pose, now_s)
+        pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        self.queue.add(pose, now_s)
         self.release(now_s)
 
     def release(self, now_s: float) -> None:
-        self.held.release(now_s, self._place, self._refuse)
+        self.queue.release(now_s, self._place, self._refuse)
 
     def _place(self, pose: PoseStamped) -> None:
-        stamp_ns = to_ns(pose.header.stamp)
+        stamp_ns = Time.from_msg(pose.header.stamp).nanoseconds
         if stamp_ns > self.known_until_ns:
             raise NoTransform('not known', self.may_come)
         self.placed.append(stamp_ns)
 
     def _refuse(self, pose: PoseStamped, missing: NoTransform) -> None:
         assert str(missing) == 'not known'
-        self.refused.append(to_ns(pose.header.stamp))
+        self.refused.append(Time.from_msg(pose.header.stamp).nanoseconds)
 
 
 @pytest.fixture
@@ -48,19 +48,19 @@ def part() -> Part:
 def test_a_late_transform_lets_the_poses_through_in_order(part):
     for stamp_ns in (4, 8, 12):
         part.take(stamp_ns, now_s=stamp_ns * 1e-3)
-    assert (part.placed, len(part.held)) == ([], 3)
+    assert (part.placed, len(part.queue)) == ([], 3)
     part.known_until_ns = 8
     part.release(now_s=0.020)
-    assert (part.placed, len(part.held)) == ([4, 8], 1)
+    assert (part.placed, len(part.queue)) == ([4, 8], 1)
     part.known_until_ns = 16
     part.take(16, now_s=0.024)
-    assert (part.placed, part.refused, len(part.held)) == ([4, 8, 12, 16], [], 0)
+    assert (part.placed, part.refused, len(part.queue)) == ([4, 8, 12, 16], [], 0)
 
 
 def test_a_pose_that_needs_nothing_waits_behind_one_that_does(part):
     part.take(20, now_s=0.0)
     part.take(0, now_s=0.0)
-    assert (part.placed, len(part.held)) == ([], 2)
+    assert (part.placed, len(part.queue)) == ([], 2)
     part.known_until_ns = 20
     part.release(now_s=0.1)
     assert part.placed == [20, 0]
@@ -69,21 +69,21 @@ def test_a_pose_that_needs_nothing_waits_behind_one_that_does(part):
 def test_a_pose_is_refused_when_its_time_is_up(part):
     part.take(4, now_s=0.0)
     part.take(8, now_s=0.1)
-    part.release(now_s=HELD_FOR_S - 1e-3)
+    part.release(now_s=TIMEOUT_S - 1e-3)
     assert part.refused == []
-    part.release(now_s=HELD_FOR_S)
-    assert (part.refused, len(part.held)) == ([4], 1)
-    part.release(now_s=HELD_FOR_S + 0.1)
-    assert (part.refused, part.placed, len(part.held)) == ([4, 8], [], 0)
+    part.release(now_s=TIMEOUT_S)
+    assert (part.refused, len(part.queue)) == ([4], 1)
+    part.release(now_s=TIMEOUT_S + 0.1)
+    assert (part.refused, part.placed, len(part.queue)) == ([4, 8], [], 0)
 
 
 def test_nothing_waits_for_what_cannot_come(part):
     part.may_come = False
     part.take(4, now_s=0.0)
-    assert (part.refused, len(part.held)) == ([4], 0)
+    assert (part.refused, len(part.queue)) == ([4], 0)
 
 
 def test_no_more_wait_than_may(part):
-    for stamp_ns in range(1, HELD_POSES + 4):
+    for stamp_ns in range(1, LONGEST + 4):
         part.take(stamp_ns, now_s=0.0)
-    assert (part.refused, len(part.held)) == ([1, 2, 3], HELD_POSES)
+    assert (part.refused, len(part.queue)) == ([1, 2, 3], LONGEST)

@@ -62,8 +62,8 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     values = np.frombuffer(bytes(cloud.data), np.float32).reshape(-1, 4)
     assert np.array_equal(values[:, 3], film.astype(np.float32))
     texts = [m.text for m in late.newest('thickness/legend').markers if m.text]
-    assert texts[0] == '0 um'
-    assert texts[-1] == '40 um'
+    assert texts[0] == '0 µm'
+    assert texts[-1] == '40 µm'
     for message in (mesh, field, cloud, late.newest('thickness/stats')):
         stamp = message.header.stamp
         assert stamp.sec * 1_000_000_000 + stamp.nanosec == MOTION.stamps_ns[-1]
@@ -111,7 +111,7 @@ def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, w
     assert stats.within_target == pytest.approx(area[good].sum() / area[coated].sum())
     assert stats.painted_volume_cm3 == pytest.approx(film @ area)
     sprayed_s = 0.004 * 600 * (0.441 - 0.02 + 1.0 - 0.561) - 0.004
-    assert stats.transfer_efficiency == pytest.approx(film @ area / (1.9 * sprayed_s), rel=1e-6)
+    assert stats.capture_fraction == pytest.approx(film @ area / (1.9 * sprayed_s), rel=1e-6)
     assert (stats.poses_rejected, stats.pose_gaps) == (0, 0)
 
 
@@ -143,7 +143,7 @@ def test_stamps_before_any_pose_are_zero(simulator, onlooker, wait_until):
     wait_until(lambda: viewer.newest('thickness/stats'))
     stats = viewer.newest('thickness/stats')
     assert stats.header.stamp.sec == 0
-    assert math.isnan(stats.transfer_efficiency)
+    assert math.isnan(stats.capture_fraction)
 
 
 def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,

@@ -137,7 +137,7 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     assert without.model == 'default model'
     assert without.rmse_um > 3 * SIGMA_UM
     node.set_parameters(parameters(model_file=_true_model(tmp_path)))
-    wait_until(lambda: viewer.newest('comparison/stats').rmse_um < 1.5 * SIGMA_UM, timeout_s=60.0)
+    wait_until(lambda: viewer.newest('comparison/stats').rmse_um < 1.5 * SIGMA_UM)
     assert viewer.newest('comparison/stats').model == 'truth.yaml'
 
 
@@ -177,7 +177,7 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     assert grey[distance > 0.0601].all()
     assert not grey[distance < 0.0599].any()
     texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
-    assert (texts[0], texts[-1]) == ('-5 um', '5 um')
+    assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
 
 
 def test_compare_says_it_in_a_line(comparison, robot, viewer, wait_until):
@@ -191,7 +191,7 @@ def test_compare_says_it_in_a_line(comparison, robot, viewer, wait_until):
     answer = future.result()
     assert answer.success
     assert '\n' not in answer.message
-    assert f'rms {node.residuals().rmse_um:.2f} um' in answer.message
+    assert f'rms {node.residuals().rmse_um:.2f} µm' in answer.message
     assert '40 readings, 40 where' in answer.message
 
 

@@ -1,0 +1,74 @@
+"""The simulator's film as messages, whose arrays are filled in place."""
+
+from __future__ import annotations
+
+import sys
+from array import array
+
+import numpy as np
+from paint_msgs.msg import ThicknessField, ThicknessStats
+from rclpy.time import Time
+from sensor_msgs.msg import PointCloud2, PointField
+
+from paint_deposition.film.statistics import FilmStatistics
+
+
+class FilmCloud:
+    """A PointCloud2 with x, y, z [m] and thickness_um, filled in place."""
+
+    FIELDS = ('x', 'y', 'z', 'thickness_um')
+
+    def __init__(self, positions_m: np.ndarray, frame_id: str) -> None:
+        size = 4 * len(self.FIELDS)
+        self._message = PointCloud2(
+            height=1,
+            width=len(positions_m),
+            fields=[
+                PointField(name=name, offset=4 * k, datatype=PointField.FLOAT32, count=1)
+                for k, name in enumerate(self.FIELDS)
+            ],
+            is_bigendian=sys.byteorder == 'big',
+            point_step=size,
+            row_step=size * len(positions_m),
+            data=array('B', bytes(size * len(positions_m))),
+            is_dense=True,
+        )
+        self._message.header.frame_id = frame_id
+        self._values = np.frombuffer(self._message.data, np.float32).reshape(-1, len(self.FIELDS))
+        self._values[:, :3] = positions_m
+
+    def message(self, stamp_ns: int, film_um: np.ndarray) -> PointCloud2:
+        """The one message that is filled; publish it before the next call."""
+        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        self._values[:, 3] = film_um
+        return self._message
+
+
+class FilmField:
+    """A ThicknessField, filled in place."""
+
+    def __init__(self, vertex_count: int, mesh_id: str, frame_id: str) -> None:
+        self._message = ThicknessField(
+            mesh_id=mesh_id, thickness_um=array('f', bytes(4 * vertex_count))
+        )
+        self._message.header.frame_id = frame_id
+        self._values = np.frombuffer(self._message.thickness_um, np.float32)
+
+    def message(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
+        """The one message that is filled; publish it before the next call."""
+        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        self._values[:] = film_um
+        return self._message
+
+
+def stats_message(frame_id: str, stamp_ns: int, figures: FilmStatistics) -> ThicknessStats:
+    """The film's figures; counts of poses are the caller's to add."""
+    message = ThicknessStats()
+    message.header.frame_id = frame_id
+    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+    for name in (
+        'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
+        'painted_volume_cm3', 'capture_fraction',
+    ):  # fmt: skip
+        setattr(message, name, getattr(figures, name))
+    return message

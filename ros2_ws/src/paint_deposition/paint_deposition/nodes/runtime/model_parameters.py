@@ -1,0 +1,61 @@
+"""The parameters that choose a node's deposition model, and reading it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.errors import ModelError
+from paint_deposition.files.model_file import LoadEffect, read_model
+from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable
+
+
+def model_parameters(use: str) -> ParameterTable:
+    """The rows `model_file` and `allow_user_effects`; `use` says what a new model does."""
+    return (
+        NodeParameter(
+            'model_file',
+            '',
+            'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
+            f'reads it{use} [path]',
+            is_path=True,
+        ),
+        NodeParameter(
+            'allow_user_effects',
+            False,
+            'Whether a model may name effect files, whose Python code this node then runs '
+            '[true/false]',
+            fixed_because='whoever can set parameters could otherwise run code on this machine; '
+            'restart the node with the new value',
+        ),
+    )
+
+
+def read_chosen_model(
+    values: Mapping[str, Any], load: LoadEffect = load_effect_file
+) -> DepositionModel:
+    """The model that a node's parameters choose.
+
+    Args:
+        values: of the rows above.
+        load: reads an effect file, where the model may name one.
+
+    Raises:
+        ModelError: the model cannot be used, or names an effect file without being allowed to.
+    """
+    if not values['model_file']:
+        return DepositionModel()
+    return read_model(
+        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
+    )
+
+
+def _refuse_effect_file(path: Path) -> type[Effect]:
+    raise ModelError(
+        f'effect file {path} is not run, because it is Python code; if you trust it, start the '
+        'node with allow_user_effects:=true'
+    )

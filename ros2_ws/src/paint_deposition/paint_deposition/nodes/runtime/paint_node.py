@@ -1,0 +1,115 @@
+"""The base of every node: its parameters, its process, its clock, its diagnostics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+from rcl_interfaces.msg import SetParametersResult
+from rclpy.clock import Clock, ClockType
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+from rclpy.task import Future
+from rclpy.timer import Timer
+
+from paint_deposition.errors import PaintError
+from paint_deposition.nodes.runtime.parameters import (
+    ParameterTable,
+    declare_parameters,
+    refusal_of_fixed,
+)
+
+
+class PaintNode(Node):
+    """A node with a parameter table that can end its process and has something to finish then.
+
+    Keyword arguments are those of rclpy's Node (context, namespace, parameter_overrides, ...).
+
+    Attributes:
+        loading: whether a node of this process is reading its files.
+        values: the parameters by name, as they are now.
+        finished: completed when the process is to end, with its exit code or an exception.
+    """
+
+    PARAMETERS: ParameterTable = ()
+    loading = False
+
+    def __init__(self, name: str, **kwargs: Any):
+        super().__init__(name, **kwargs)
+        self.finished: Future = Future()
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        try:
+            self.values = declare_parameters(self, self.PARAMETERS)
+            self._check(self.values)
+            PaintNode.loading = True
+            self._prepare()
+        except PaintError:
+            # The subclass is not complete yet: it has nothing of its own to destroy.
+            super().destroy_node()
+            raise
+        finally:
+            PaintNode.loading = False
+        self.add_on_set_parameters_callback(self._check_changes)
+        self.add_post_set_parameters_callback(self._apply_changes)
+
+    # --- for the subclass
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        """Raise PaintError if these values do not go together."""
+
+    def _prepare(self) -> None:
+        """Read the files that ``self.values`` name; a PaintError ends the node."""
+
+    def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
+        """Raise PaintError if the new values of these parameters cannot be taken up now."""
+
+    def _changed(self, names: set[str]) -> None:
+        """Take up the new values of these parameters, which are in ``self.values``."""
+
+    def close(self) -> None:
+        """Finish files and the like. Called once, after the last callback; signals are ignored."""
+
+    # --- for everybody
+
+    def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
+        """A timer that also runs while a simulated clock stands still."""
+        return self.create_timer(period_s, callback, clock=self._steady)
+
+    def finish(self, exit_code: int = 0) -> None:
+        """Ask the process to end; the callback that runs is completed first."""
+        if not self.finished.done():
+            self.finished.set_result(exit_code)
+
+    def fail(self, error: Exception) -> None:
+        """Ask the process to end with an error, from a thread or a callback that must return."""
+        if not self.finished.done():
+            self.finished.set_exception(error)
+
+    # --- changes of parameters
+
+    def set_parameters_atomically(
+        self, parameter_list: list[Parameter[Any]]
+    ) -> SetParametersResult:
+        """Refuse to change what is fixed with the reason, which rclpy leaves out."""
+        reason = refusal_of_fixed(self, self.PARAMETERS, parameter_list)
+        if reason:
+            return SetParametersResult(successful=False, reason=reason)
+        return super().set_parameters_atomically(parameter_list)
+
+    def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:
+        """As if each were set on its own."""
+        return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
+        new = {change.name: change.value for change in changes}
+        try:
+            self._check(self.values | new)
+            self._check_change(self.values | new, set(new))
+        except PaintError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)
+
+    def _apply_changes(self, changes: list[Parameter]) -> None:
+        new = {change.name: change.value for change in changes}
+        self.values |= new
+        self._changed(set(new))
