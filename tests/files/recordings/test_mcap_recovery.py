@@ -13,9 +13,8 @@ from files.recorded import straight_pass
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import standard
-from paint_deposition.files.recordings.recorded_qos import offered_qos
 
 BOOL = 'std_msgs/msg/Bool'
 

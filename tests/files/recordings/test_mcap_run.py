@@ -18,9 +18,8 @@ from rosbags.rosbag2 import Reader
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import standard
-from paint_deposition.files.recordings.recorded_qos import offered_qos
 
 BOOL = 'std_msgs/msg/Bool'
 TRUE_CDR, FALSE_CDR = b'\0\1\0\0\1', b'\0\1\0\0\0'

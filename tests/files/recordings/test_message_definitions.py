@@ -42,10 +42,10 @@ def test_what_counts_as_a_field():
         'float64[] values',
         'int32[<=3] few',
         'Part[4] parts',
-        'other/Type[<=5] bounded 1',
+        'other/Type[<=5] bounded',
         'other_msgs/msg/Full full  # Unused u',
     ])  # fmt: skip
-    assert definitions._used_types(text, 'own') == {
+    assert definitions._used_types(text, 'own/msg/Whole') == {
         'own/msg/Part', 'other/msg/Type', 'other_msgs/msg/Full',
     }  # fmt: skip
 

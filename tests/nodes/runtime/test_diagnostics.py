@@ -9,10 +9,11 @@ from rclpy.node import Node
 
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.paint_node import PaintNode
 
 
 def test_every_task_reports_each_period(ros_context, spin, wait_until):
-    node = Node('painter', context=ros_context, namespace='cell1')
+    node = PaintNode('painter', context=ros_context, namespace='cell1')
     calls = []
 
     def gun() -> Status:

@@ -15,8 +15,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.recorded_qos import offered_qos
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import relative_flow
 
@@ -70,18 +69,13 @@ def read_trajectory(
 
 def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
     """The named PoseStamped topic of a bag, or its only one; the errors list those there are."""
-    candidates = bag.topics_of(POSE_TYPE)
     if not name:
+        candidates = bag.topics_of(POSE_TYPE)
         if len(candidates) != 1:
-            raise RecordingError(f'{bag.path}: name a pose topic; {_listed(candidates)}')
+            listed = _listed(candidates, 'PoseStamped')
+            raise RecordingError(f'{bag.path}: name a pose topic; {listed}')
         name = candidates[0]
-    topic = bag.find(name)
-    if topic is None:
-        raise RecordingError(f'{bag.path} has no topic {name}; {_listed(candidates)}')
-    if topic.type != POSE_TYPE:
-        raise RecordingError(
-            f'{topic.name} in {bag.path} is {topic.type}, not {POSE_TYPE}; {_listed(candidates)}'
-        )
+    topic = _choose_topic(bag, name, (POSE_TYPE,), 'PoseStamped')
     if topic.message_count == 0:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
     return topic
@@ -89,15 +83,17 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
 def choose_state_topic(bag: Bag, name: str) -> BagTopic:
     """The named trigger topic of a bag."""
-    candidates = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
-    listed = _listed(candidates, 'state')
+    return _choose_topic(bag, name, (STATE_TYPE, BOOL_TYPE), 'state')
+
+
+def _choose_topic(bag: Bag, name: str, types: tuple[str, ...], kind: str) -> BagTopic:
+    listed = _listed([topic for type_ in types for topic in bag.topics_of(type_)], kind)
     topic = bag.find(name)
     if topic is None:
         raise RecordingError(f'{bag.path} has no topic {name}; {listed}')
-    if topic.type not in (STATE_TYPE, BOOL_TYPE):
+    if topic.type not in types:
         raise RecordingError(
-            f'{topic.name} in {bag.path} is {topic.type}, '
-            f'not {STATE_TYPE} or {BOOL_TYPE}; {listed}'
+            f'{topic.name} in {bag.path} is {topic.type}, not {" or ".join(types)}; {listed}'
         )
     return topic
 
@@ -107,7 +103,7 @@ def stamp_ns(header: Any) -> int:
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
-def _listed(candidates: list[str], kind: str = 'PoseStamped') -> str:
+def _listed(candidates: list[str], kind: str) -> str:
     if not candidates:
         return f'it has no {kind} topic'
     return f'its {kind} topics: {" ".join(candidates)}'

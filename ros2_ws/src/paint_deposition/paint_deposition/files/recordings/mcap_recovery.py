@@ -196,6 +196,12 @@ def _copy(
 ) -> None:
     schemas, channels = dict(survey.schemas), dict(survey.channels)
     topics: dict[int, str | None] = {}
+
+    def topic_of(channel_id: int) -> str | None:
+        if channel_id in channels and channel_id not in topics:
+            topics[channel_id] = _add_topic(channels[channel_id], schemas, writer, recovery)
+        return topics.get(channel_id)
+
     with file.open('rb') as stream:
         position = 0
         for record in _records(file, stream, recovery):
@@ -204,14 +210,10 @@ def _copy(
                     schemas[inner.id] = inner
                 elif isinstance(inner, Channel):
                     channels[inner.id] = inner
-                    if inner.id not in topics:
-                        topics[inner.id] = _add_topic(inner, schemas, writer, recovery)
+                    topic_of(inner.id)
                 elif isinstance(inner, Message):
                     # The chunk that introduced the channel may be among the damaged ones.
-                    if inner.channel_id not in topics and inner.channel_id in channels:
-                        channel = channels[inner.channel_id]
-                        topics[channel.id] = _add_topic(channel, schemas, writer, recovery)
-                    topic = topics.get(inner.channel_id)
+                    topic = topic_of(inner.channel_id)
                     if topic:
                         writer.write(topic, inner.data, inner.log_time, inner.publish_time)
             on_bytes(stream.tell() - position)

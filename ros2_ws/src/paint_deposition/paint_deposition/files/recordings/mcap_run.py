@@ -15,7 +15,14 @@ from pathlib import Path
 
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
-from rosbags.interfaces import Qos
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 from rosbags.rosbag2.metadata import dump_qos_v9
 
 from paint_deposition.errors import RecordingError
@@ -34,6 +41,23 @@ CHUNK_SECONDS = 0.5
 NO_TIME_NS = 2**63 - 1
 # With all indexes, mcap writes the offset of an empty attachment group, which checkers refuse.
 INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
+
+FOREVER = QosTime(9223372036, 854775807)
+
+
+def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos:
+    """The QoS of a topic as rosbag2 stores it; a latched one is transient local."""
+    return Qos(
+        QosHistory.KEEP_LAST,
+        depth,
+        QosReliability.RELIABLE if reliable else QosReliability.BEST_EFFORT,
+        QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
+        FOREVER,
+        FOREVER,
+        QosLiveliness.AUTOMATIC,
+        FOREVER,
+        False,
+    )
 
 
 @dataclass(frozen=True)

@@ -4,23 +4,18 @@ from __future__ import annotations
 
 import functools
 import json
-import re
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from rosbags.typesys import Stores, get_typestore
+from rosbags.interfaces import Nodetype
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from paint_deposition.errors import RecordingError
 
 SEPARATOR = '=' * 80
 # The layout of messages that this package serialises itself, without a ROS installation.
 STANDARD_STORE = Stores.ROS2_KILTED
-PRIMITIVES = frozenset(
-    {'bool', 'byte', 'char', 'float32', 'float64', 'int8', 'uint8', 'int16', 'uint16'}
-    | {'int32', 'uint32', 'int64', 'uint64', 'string', 'wstring'}
-)
-# "pkg/Type[<=5] name", "Type name" or "string<=8 name"; a constant has NAME=value instead.
-FIELD = re.compile(r'^\s*(?P<type>[A-Za-z][\w/]*)(?:<=\d+)?(?:\[[^\]]*\])?\s+\w+\s*(?P<rest>.*)$')
 
 
 @dataclass(frozen=True)
@@ -66,8 +61,7 @@ def _dependencies(message_type: str) -> list[str]:
     found: dict[str, None] = {}
 
     def collect(name: str) -> None:
-        package = name.split('/')[0]
-        for used in sorted(_used_types(_share_file(name, '.msg').read_text(), package)):
+        for used in sorted(_used_types(_share_file(name, '.msg').read_text(), name)):
             if used not in found:
                 found[used] = None
                 collect(used)
@@ -76,14 +70,15 @@ def _dependencies(message_type: str) -> list[str]:
     return list(found)
 
 
-def _used_types(text: str, package: str) -> set[str]:
+def _used_types(text: str, message_type: str) -> set[str]:
+    _, fields = get_types_from_msg(text, message_type)[message_type]
     used = set()
-    for line in text.splitlines():
-        field = FIELD.match(line.split('#', 1)[0])
-        if not field or field['rest'].startswith('=') or field['type'] in PRIMITIVES:
-            continue
-        parts = field['type'].split('/')
-        used.add(f'{parts[0]}/msg/{parts[-1]}' if len(parts) > 1 else f'{package}/msg/{parts[0]}')
+    for _, description in fields:
+        node: Any = description
+        while node[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+            node = node[1][0]
+        if node[0] == Nodetype.NAME:
+            used.add(node[1])
     return used
 
 

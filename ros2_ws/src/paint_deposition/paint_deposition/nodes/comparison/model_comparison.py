@@ -69,11 +69,8 @@ class ModelComparison(PaintingNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)
-        watched = self.watch.publisher
         self._outputs = {
-            topic: self.create_publisher(
-                message, topic, qos.LATCHED, event_callbacks=watched(topic)
-            )
+            topic: self.watch.publisher(message, topic, qos.LATCHED)
             for topic, message in (
                 ('comparison/mesh', Marker),
                 ('comparison/stats', ComparisonStats),
@@ -101,8 +98,9 @@ class ModelComparison(PaintingNode):
     def _take_surface(self, surface: Surface) -> None:
         self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
         super()._take_surface(surface)
-        self._frame_id = self.values['frame_id'].lstrip('/')
-        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, self._frame_id, 'residual')
+        self._mesh = ColouredMesh(
+            surface.vertices_m, surface.faces, self.frame.frame_id, 'residual'
+        )
         self._spread_colours()
 
     def _spread_colours(self) -> None:
@@ -167,7 +165,7 @@ class ModelComparison(PaintingNode):
 
     def _publish_legend(self) -> None:
         self._outputs['comparison/legend'].publish(
-            legend(self._scale, 'µm', self.surface, self._frame_id)
+            legend(self._scale, 'µm', self.surface, self.frame.frame_id)
         )
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
@@ -184,7 +182,7 @@ class ModelComparison(PaintingNode):
             worst_position=Point(x=x, y=y, z=z),
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
-        message.header.frame_id = self._frame_id
+        message.header.frame_id = self.frame.frame_id
         message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         return message
 

@@ -56,8 +56,6 @@ class AtomizerInput:
         frame: PartFrame,
         receiver: MotionReceiver,
         watch: QosWatch,
-        depth: int,
-        reliability: str,
     ) -> None:
         self._node, self._frame, self._receiver = node, frame, receiver
         self.poses_received = 0
@@ -66,16 +64,14 @@ class AtomizerInput:
         self._poses: list[tuple[float, ...]] = []
         self._tf_queue = TfQueue()
         self.reset()
-        profile = qos.poses(depth)
-        if reliability == 'reliable':
+        profile = qos.poses(node.values['pose_queue_depth'])
+        if node.values['pose_reliability'] == 'reliable':
             profile.reliability = ReliabilityPolicy.RELIABLE
         for message, topic, take in (
             (PoseStamped, 'atomizer/pose', self._take_pose),
             (AtomizerState, 'atomizer/state', self._take_state),
         ):
-            node.create_subscription(
-                message, topic, take, profile, event_callbacks=watch.subscription(topic)
-            )
+            watch.subscription(message, topic, take, profile)
         self._progress = node.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
         node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -132,7 +128,7 @@ class AtomizerInput:
         stamp = stamp_ns(message.header)
         if self._frame.is_own(frame_id):
             p, q = message.pose.position, message.pose.orientation
-            pose = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
+            pose: tuple[float, ...] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
             self.without_frame += not frame_id
         else:
             pose = self._frame.transform_from(frame_id, stamp).applied(message.pose)

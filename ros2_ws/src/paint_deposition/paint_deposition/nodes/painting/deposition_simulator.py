@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import re
-import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
@@ -50,9 +50,8 @@ class DepositionSimulator(PaintingNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
-        watched = self.watch.publisher
         self._outputs = {
-            topic: self.create_publisher(message, topic, profile, event_callbacks=watched(topic))
+            topic: self.watch.publisher(message, topic, profile)
             for topic, message, profile in (
                 ('thickness/mesh', Marker, qos.LATCHED),
                 ('thickness/legend', MarkerArray, qos.LATCHED),
@@ -70,7 +69,7 @@ class DepositionSimulator(PaintingNode):
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
         self._greeted = 0
-        self._saving: set[threading.Thread] = set()
+        self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
         self._diagnostics = Diagnostics(self, painting_tasks(self) | {'film': self._film_status})
         self.publish()
@@ -85,12 +84,11 @@ class DepositionSimulator(PaintingNode):
 
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
-        frame_id = self.values['frame_id'].lstrip('/')
+        frame_id = self.frame.frame_id
         self.mesh_id = mesh_id(surface)
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
         self._cloud = FilmCloud(surface.vertices_m, frame_id)
         self._field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
-        self._frame_id = frame_id
 
     def statistics(self, film_um: np.ndarray, emitted_cm3: float) -> FilmStatistics:
         """The film's figures with the target and the limit that are set."""
@@ -140,7 +138,7 @@ class DepositionSimulator(PaintingNode):
         if not with_latched:
             return
         figures = self.statistics(film_um, film.emitted_cm3)
-        self._stats = stats_message(self._frame_id, stamp_ns, figures)
+        self._stats = stats_message(self.frame.frame_id, stamp_ns, figures)
         self._counts_shown = None
         scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
         rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
@@ -150,7 +148,7 @@ class DepositionSimulator(PaintingNode):
         if self._scale is None or (scale.low, scale.high) != (self._scale.low, self._scale.high):
             self._scale = scale
             self._outputs['thickness/legend'].publish(
-                legend(scale, 'µm', self.surface, self._frame_id)
+                legend(scale, 'µm', self.surface, self.frame.frame_id)
             )
 
     def _publish_stats(self) -> None:
@@ -180,8 +178,7 @@ class DepositionSimulator(PaintingNode):
     # --- services
 
     def close(self) -> None:
-        for thread in self._saving:
-            thread.join()
+        self._saving.shutdown()
 
     def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
         poses = self.film.counts.received
@@ -209,10 +206,8 @@ class DepositionSimulator(PaintingNode):
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
         written.add_done_callback(lambda _: None)
-        thread = threading.Thread(target=lambda: written.set_result(job()), name='saving')
-        self._saving = {thread, *(other for other in self._saving if other.is_alive())}
-        thread.start()
-        outcome = await written
+        self._saving.submit(lambda: written.set_result(job()))
+        outcome: Any = await written
         if isinstance(outcome, Exception):
             response.message = str(outcome)
             return response
@@ -221,14 +216,16 @@ class DepositionSimulator(PaintingNode):
         response.message = f'wrote {", ".join(path.name for path in outcome)}'
         return response
 
-    def _film_to_save(self, stem: str, film: FilmIntegrator):
+    def _film_to_save(
+        self, stem: str, film: FilmIntegrator
+    ) -> Callable[[], list[Path] | Exception]:
         """A function that writes the film as it is now; it returns the paths, or the error."""
         surface, film_um, values = self.surface, film.film_um, self.values
         figures = self.statistics(film_um, film.emitted_cm3)
         details = {
             'mesh_file': values['mesh_file'],
             'mesh_id': self.mesh_id,
-            'frame_id': self._frame_id,
+            'frame_id': self.frame.frame_id,
             'down': surface.down,
             'model_file': values['model_file'],
             'effects': [effect.id for effect in self.film.model.effects],

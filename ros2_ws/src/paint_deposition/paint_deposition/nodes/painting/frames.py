@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Pose, Transform
@@ -123,7 +124,7 @@ def _one_line(error: Exception) -> str:
     return ' '.join(str(error).split())
 
 
-def _transform_buffer(node: Node):
+def _transform_buffer(node: Node) -> Any:
     """A buffer that listens to tf, None where tf2 is not installed."""
     try:
         import tf2_ros

@@ -55,17 +55,8 @@ class PaintingNode(PaintNode, ABC):
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
-        self.frame = PartFrame(self, self.values['frame_id'])
-        self._place_part()
         self.watch = QosWatch(self)
-        self.input = AtomizerInput(
-            self,
-            self.frame,
-            self,
-            self.watch,
-            self.values['pose_queue_depth'],
-            self.values['pose_reliability'],
-        )
+        self.input = AtomizerInput(self, self.frame, self, self.watch)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
@@ -75,6 +66,8 @@ class PaintingNode(PaintNode, ABC):
         self._repainting: Repainting | None = None
         self._facing_settled = False
         self._notes_told = 0
+        self.frame = PartFrame(self, self.values['frame_id'])
+        self._place_part()
         self._model = read_chosen_model(self.values)
         self._read_part()
         self._take_surface(self._read_surface())
@@ -213,7 +206,7 @@ class PaintingNode(PaintNode, ABC):
         self.model_problem = ''
         try:
             film = repainting.take_over(self.film)
-        except Exception as error:  # from a user's effect, say; the old model goes on
+        except (Exception, SystemExit) as error:  # of a user's effect; the old model goes on
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
             self._model = self.film.model

@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import threading
 from collections.abc import Callable
+from concurrent.futures import Future
 
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import merged
@@ -35,16 +36,14 @@ class Repainting:
         self._from_start = from_start
         self._given_up = threading.Event()
         self._followed = 0
-        self._film: LiveFilm | None = None
-        self._error: Exception | None = None
+        self._prepared: Future[LiveFilm] = Future()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, sys.getswitchinterval()))
-        self._thread = threading.Thread(target=self._run, name='repainting', daemon=True)
-        self._thread.start()
+        threading.Thread(target=self._run, name='repainting', daemon=True).start()
 
     @property
     def done(self) -> bool:
         """Whether the film is ready, or never will be."""
-        return not self._thread.is_alive()
+        return self._prepared.done()
 
     def give_up(self) -> None:
         """Stop as soon as possible; a compilation under way still ends first."""
@@ -61,15 +60,14 @@ class Repainting:
         Raises:
             Exception: whatever went wrong in the thread.
         """
-        if self._error is not None:
-            raise self._error
+        film = self._prepared.result()
         if not self._from_start or not self._log.complete:
-            current.use(self._film.model)
+            current.use(film.model)
             return current
         if current.log is not self._log:
             return None
-        self._film.follow(self._log.events[self._followed :])
-        return self._film
+        film.follow(self._log.events[self._followed :])
+        return film
 
     def _run(self) -> None:
         try:
@@ -77,9 +75,9 @@ class Repainting:
             film.warm_up()
             if self._from_start:
                 self._paint(film)
-            self._film = film
-        except Exception as error:  # it is raised again where the film is taken over
-            self._error = error
+            self._prepared.set_result(film)
+        except BaseException as error:  # it is raised again where the film is taken over
+            self._prepared.set_exception(error)
 
     def _paint(self, film: LiveFilm) -> None:
         while not self._given_up.is_set() and self._log.complete:

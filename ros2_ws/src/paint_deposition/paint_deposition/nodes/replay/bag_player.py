@@ -64,6 +64,7 @@ class BagPlayer(PaintNode):
         self.create_service(Trigger, '~/pause', self._pause)
         self.create_service(Trigger, '~/resume', self._resume)
         self._stopped = threading.Event()
+        self._awaited = self.values['wait_for_subscribers']
         self._flow_control = FlowControl(
             self, self._pose_publisher, self.values['window'], self._stopped
         )
@@ -140,8 +141,6 @@ class BagPlayer(PaintNode):
 
     def _replay(self) -> None:
         try:
-            self._stand_at_the_start()
-            self._flow_control.wait_for_subscribers(self.values['wait_for_subscribers'])
             while not self._stopped.is_set():
                 self._play_once()
                 self._flow_control.wait_until_taken()
@@ -152,12 +151,6 @@ class BagPlayer(PaintNode):
             return
         self.finish()
 
-    def _stand_at_the_start(self) -> None:
-        with open_bag(self.values['bag']) as bag:
-            for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
-                self._time.stand_at(message.log_time_ns)
-                return
-
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
@@ -165,6 +158,8 @@ class BagPlayer(PaintNode):
                 if not begun:
                     begun = True
                     self._time.stand_at(message.log_time_ns)
+                    self._flow_control.wait_for_subscribers(self._awaited)
+                    self._awaited = 0  # in further rounds
                     self._time.start()
                 self._wait_for_turn(message.log_time_ns)
                 if self._stopped.is_set():

@@ -6,10 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-from rclpy.clock import Clock, ClockType
-from rclpy.node import Node
 
 from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.paint_node import PaintNode
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -33,14 +32,12 @@ class Diagnostics:
     """
 
     def __init__(
-        self, node: Node, tasks: Mapping[str, Callable[[], Status]], period_s: float = 1.0
+        self, node: PaintNode, tasks: Mapping[str, Callable[[], Status]], period_s: float = 1.0
     ):
         self._node = node
         self._tasks = dict(tasks)
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
-        self._timer = node.create_timer(
-            period_s, self.publish, clock=Clock(clock_type=ClockType.STEADY_TIME)
-        )
+        self._timer = node.create_steady_timer(period_s, self.publish)
 
     def publish(self) -> None:
         message = DiagnosticArray()

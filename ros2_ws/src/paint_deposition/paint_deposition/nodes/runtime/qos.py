@@ -6,9 +6,14 @@ from collections.abc import Sequence
 
 from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
-from rosbags.interfaces import Qos, QosTime
-
-from paint_deposition.files.recordings.recorded_qos import offered_qos
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 # Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
 # builds one mesh marker, whatever the reliability: a full queue drops its oldest message.
@@ -38,11 +43,11 @@ def replayed(depth: int = POSE_DEPTH) -> QoSProfile:
     return _profile(depth, ReliabilityPolicy.RELIABLE)
 
 
-# The newest message is kept for whoever comes later: meshes, statistics, run status.
+# The newest message is kept for subscribers that come later: meshes, statistics, run status.
 LATCHED = _profile(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
 # Clouds, fields and other results that are drawn or recorded as they come.
 RESULTS = _profile(10, ReliabilityPolicy.RELIABLE)
-# Progress reports of those who take poses; the newest one says all.
+# Progress reports of the nodes that take poses; the newest one says all.
 PROGRESS = _profile(100, ReliabilityPolicy.RELIABLE)
 DIAGNOSTICS = _profile(10, ReliabilityPolicy.RELIABLE)
 CLOCK = _profile(1, ReliabilityPolicy.BEST_EFFORT)
@@ -61,16 +66,16 @@ def accepting(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
 
 def as_recorded(profile: QoSProfile) -> Qos:
     """A publisher's profile, as the middleware tells it, the way bags store it."""
-    return offered_qos(
+    return Qos(
+        QosHistory[profile.history.name],
         profile.depth,
-        reliable=profile.reliability == ReliabilityPolicy.RELIABLE,
-        latched=profile.durability == DurabilityPolicy.TRANSIENT_LOCAL,
-        history=profile.history.name,
-        liveliness=profile.liveliness.name,
-        deadline=_as_time(profile.deadline),
-        lifespan=_as_time(profile.lifespan),
-        lease=_as_time(profile.liveliness_lease_duration),
-        plain_names=profile.avoid_ros_namespace_conventions,
+        QosReliability[profile.reliability.name],
+        QosDurability[profile.durability.name],
+        _as_time(profile.deadline),
+        _as_time(profile.lifespan),
+        QosLiveliness[profile.liveliness.name],
+        _as_time(profile.liveliness_lease_duration),
+        profile.avoid_ros_namespace_conventions,
     )
 
 
