@@ -26,6 +26,8 @@ COMPARISON = 'paint_deposition.nodes.comparison.model_comparison'
 PLAYER = 'paint_deposition.nodes.replay.bag_player'
 RECORDER = 'paint_deposition.nodes.recording.run_recorder'
 EDGE_M = 0.03
+# Several processes start one after the other, on a busy machine in half a minute each.
+pytestmark = pytest.mark.timeout(600)
 
 
 @pytest.fixture

@@ -1,4 +1,4 @@
-"""Bags of every kind behind one door: ROS 1 .bag, rosbag2 folder (sqlite3, MCAP), lone .mcap.
+"""Reading bags of every kind alike: ROS 1 .bag, rosbag2 folder (sqlite3, MCAP), lone .mcap.
 
 Only the types of the topics that are read are parsed: one exotic topic, such as the service
 events that rosbags does not understand, does not make the poses beside it unreadable.

@@ -37,11 +37,11 @@ SHARE_OF_READING = 0.25
 
 
 class ModelComparison(PaintingNode):
-    """Paints the places of gauge readings and publishes what is missing there.
+    """Paints the points of gauge readings and publishes the residuals there.
 
     The residual, measured minus predicted, starts as the whole reading and falls to what the
     model does not explain. It is predicted in double precision at the places of the readings, and
-    spread over the surface around them only to be looked at.
+    spread over the surface around them for display only.
     """
 
     PARAMETERS = (

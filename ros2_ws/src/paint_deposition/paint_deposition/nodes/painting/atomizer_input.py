@@ -38,8 +38,8 @@ class MotionReceiver(Protocol):
 class AtomizerInput:
     """Takes `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
 
-    Poses are handed on by the fifty, or as soon as they stop coming for a moment; a state is
-    handed on at once, so that it is there before the poses that it may cut.
+    Poses are handed on in batches of fifty, and what there is of them every twentieth of a
+    second; a state is handed on at once, so that it is there before the poses that it may cut.
 
     Attributes:
         poses_received: since the node started.

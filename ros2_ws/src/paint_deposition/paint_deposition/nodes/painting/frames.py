@@ -1,4 +1,4 @@
-"""Poses in other frames than the part's: transformed where a transform is known."""
+"""Poses in other frames than the part's are transformed where a transform is known."""
 
 from __future__ import annotations
 
@@ -40,12 +40,12 @@ class Rigid:
 
     @staticmethod
     def of_message(transform: Transform) -> Rigid:
-        """From a message."""
+        """From a message of tf2."""
         t, q = transform.translation, transform.rotation
         return Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
 
     def inverse(self) -> Rigid:
-        """The way back."""
+        """The inverse transform."""
         x, y, z, w = self.quaternion_xyzw
         back = self.rotation.T
         return Rigid(back, (-x, -y, -z, w), -back @ self.translation_m)

@@ -30,8 +30,8 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 TEND_PERIOD_S = 0.1
-# Which side of an open surface is outward is settled by so many poses that look at it; after so
-# many in all it stays as it is.
+# So many poses that look at the part settle which side of an open surface is outward; after
+# so many poses in all it stays as it is.
 POSES_FACING = 50
 POSES_CONSIDERED = 2000
 
@@ -117,7 +117,7 @@ class PaintingNode(PaintNode, ABC):
             self._repaint()
 
     def up_to_date(self) -> None:
-        """Take in all that has come, and whatever has been prepared."""
+        """Paint all poses that have come, and take over a film that has been prepared."""
         self.input.hand_on()
         self._tend()
 
@@ -195,7 +195,7 @@ class PaintingNode(PaintNode, ABC):
         self._repainting = Repainting(self.film, make, from_start)
 
     def _tend(self) -> None:
-        """Take over a film that is ready, and see that the part is the right way round."""
+        """Take over a film that is ready, and settle which side of the part is outward."""
         if self._repainting is not None and self._repainting.done:
             self._take_over(self._repainting)
         if not self._facing_settled:

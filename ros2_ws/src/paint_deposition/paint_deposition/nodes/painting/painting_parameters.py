@@ -57,8 +57,8 @@ PAINTING = (
     NodeParameter(
         'trigger_latency_s',
         0.1,
-        'How much later than the poses of its time a state may come and still cut where it '
-        'belongs, by the stamps [s]',
+        'How much later than the poses of the same time a state may come and still switch the gun '
+        'at its own stamp [s]',
         low=0.0,
         high=10.0,
     ),
@@ -75,8 +75,8 @@ PAINTING = (
         NodeParameter(
             'pose_reliability',
             'best_effort',
-            'What is asked of the publishers of poses and states; best_effort hears all of them, '
-            'reliable only those that promise it [name]',
+            'Reliability asked of the publishers of poses and states; best_effort hears all of '
+            'them, reliable only those that offer it [name]',
             choices=('best_effort', 'reliable'),
         ),
         NodeParameter(

@@ -1,4 +1,4 @@
-"""Node `bag_player`: replays the poses and the trigger of a bag, in time or as fast as taken."""
+"""Node `bag_player`: replays a bag's poses and trigger, in time or as fast as they are taken."""
 
 from __future__ import annotations
 

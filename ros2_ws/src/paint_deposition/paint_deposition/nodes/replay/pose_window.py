@@ -7,8 +7,8 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-# A subscriber that keeps reporting the same pose for so long while none is sent has got all
-# that will ever reach it.
+# A subscriber that has reported the same pose for so long while none was sent has got all that
+# will ever reach it.
 LOST_AFTER_S = 5.0
 
 
@@ -55,9 +55,9 @@ class PoseWindow:
             self._forget_taken()
 
     def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
-        """Take a subscriber's word that the pose of this stamp is the newest it has taken.
+        """Note that the pose of this stamp is the newest that a subscriber has taken.
 
-        Without a name the word is taken for every subscriber.
+        Without a name this is noted for every subscriber.
         """
         with self._lock:
             taken = self._number_of(stamp_ns)

@@ -1,4 +1,4 @@
-"""How a node's process runs and ends: cleanly, once, with an exit code that tells."""
+"""How a node's process runs and ends: it closes the node once, and its exit code says why."""
 
 from __future__ import annotations
 
