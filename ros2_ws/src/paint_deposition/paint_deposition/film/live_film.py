@@ -117,9 +117,7 @@ class LiveFilm:
         newest = self.newest_ns
         if newest is not None and newest - change.stamp_ns > ANOTHER_STREAM_NS:
             self._changes = []
-        self.log.add(change)
-        self._builder.add_trigger(change.stamp_ns, change.flow)
-        self._note(change)
+        self._take_change(change)
 
     def add_poses(self, batch: PoseBatch) -> None:
         """Take poses and paint what is old enough."""
@@ -169,9 +167,7 @@ class LiveFilm:
     def _begin_again(self, first_change: TriggerChange) -> None:
         events = self.log.events
         self._clear()
-        self.log.add(first_change)
-        self._builder.add_trigger(first_change.stamp_ns, first_change.flow)
-        self._note(first_change)
+        self._take_change(first_change)
         self.follow(events)
 
     def _carry_on(self, stamp_ns: int) -> None:
@@ -181,8 +177,10 @@ class LiveFilm:
             for change in carried:
                 self.add_trigger(change)
 
-    def _note(self, change: TriggerChange) -> None:
-        """Keep the changes that count from the newest pose on."""
+    def _take_change(self, change: TriggerChange) -> None:
+        self.log.add(change)
+        self._builder.add_trigger(change.stamp_ns, change.flow)
+        # Kept are the changes that count from the newest pose on.
         insort(self._changes, change, key=_STAMP)
         passed = bisect_right(self._changes, self.newest_ns or 0, key=_STAMP)
         del self._changes[: max(0, passed - 1)]
