@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from paint_deposition.files.atomic import replacing, write_text
+from paint_deposition.files.atomic import write_text
 
 
 def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
@@ -38,13 +38,3 @@ def test_content_and_name_are_on_disk_before_it_returns(tmp_path: Path, monkeypa
     monkeypatch.setattr(os, 'replace', seen_replace)
     write_text(tmp_path / 'film.csv', 'x_m,y_m')
     assert calls == ['x_m,y_m', 'renamed', 'folder']
-
-
-def test_a_failed_write_leaves_the_old_file_alone(tmp_path: Path):
-    path = tmp_path / 'film.csv'
-    write_text(path, 'old')
-    with pytest.raises(ZeroDivisionError), replacing(path) as temporary:
-        temporary.write_text('half')
-        raise ZeroDivisionError
-    assert path.read_text() == 'old'
-    assert list(tmp_path.iterdir()) == [path]

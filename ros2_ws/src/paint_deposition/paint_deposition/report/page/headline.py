@@ -6,9 +6,9 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from paint_deposition.diagnosis.procedure import ALPHA, SURE
-from paint_deposition.report.page.data import ReportData
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows, effect_rows
-from paint_deposition.report.page.words import (
+from paint_deposition.report.words import (
     covariate_label,
     effect_name,
     in_print,

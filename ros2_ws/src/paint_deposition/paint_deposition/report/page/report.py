@@ -15,9 +15,10 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.provenance import git_version, package_version
 from paint_deposition.fitting.study import Study
+from paint_deposition.report import words
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
-from paint_deposition.report.page import tables, words
-from paint_deposition.report.page.data import ReportData
+from paint_deposition.report.page import tables
 from paint_deposition.report.page.headline import headline
 from paint_deposition.report.page.profiles import profile_figure
 from paint_deposition.report.page.scene import places_scene, scene_data
@@ -97,8 +98,8 @@ def report_html(data: ReportData) -> str:
 
 
 def _figures(data: ReportData) -> list[dict[str, Any]]:
-    found = [profile_figure(data, k) for k in range(len(data.experiments))]
-    found += [
+    found = [
+        *(profile_figure(data, k) for k in range(len(data.experiments))),
         charts.parity_figure(data),
         charts.covariate_figure(data),
         charts.history_figure(data),

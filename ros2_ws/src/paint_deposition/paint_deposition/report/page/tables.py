@@ -8,8 +8,8 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.parameters import PATTERN_NAMES
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.words import (
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.words import (
     SYMBOLS,
     effect_class_of,
     effect_meaning,

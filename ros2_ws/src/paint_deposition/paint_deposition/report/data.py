@@ -93,6 +93,11 @@ class ReportData:
         """The best model."""
         return self.models[-1]
 
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        """What the models are called where both are shown."""
+        return ('model before', 'model after') if self.improved else ('model',)
+
     @cached_property
     def residuals_um(self) -> list[np.ndarray]:
         """For each model (P,) at the points, averaged over repeats [um]."""
@@ -102,6 +107,11 @@ class ReportData:
     def rmse_um(self) -> list[float]:
         """For each model, over the points [um]."""
         return [float(np.sqrt(np.mean(r**2))) for r in self.residuals_um]
+
+    def errors_in_words(self, rows: np.ndarray) -> str:
+        """RMSE of each model at these points of the study."""
+        errors = [f'{np.sqrt(np.mean(r[rows] ** 2)):.2f}' for r in self.residuals_um]
+        return f'RMSE {" → ".join(errors)} µm'
 
     @cached_property
     def chi_square_per_point(self) -> list[float]:
@@ -162,9 +172,7 @@ def _change(difference_um: np.ndarray, area_m2: np.ndarray) -> Change:
     order = np.argsort(difference_um)
     share = np.cumsum(area_m2[order]) / area_m2.sum()
     tail = 0.5 * (1.0 - MOST_OF_THE_SURFACE)
-    least, most = (
-        float(difference_um[order[min(np.searchsorted(share, at), len(order) - 1)]])
-        for at in (tail, 1.0 - tail)
-    )
+    ends = np.minimum(np.searchsorted(share, [tail, 1.0 - tail]), len(order) - 1)
+    least, most = difference_um[order[ends]].tolist()
     rms = float(np.sqrt(np.average(difference_um**2, weights=area_m2)))
     return Change(min(least, 0.0), max(most, 0.0), rms)
