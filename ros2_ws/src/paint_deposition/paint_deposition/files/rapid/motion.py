@@ -17,6 +17,8 @@ from paint_deposition.motion.trajectory import Trajectory
 
 SUFFIXES = ('.mod', '.prg')
 POSE_PERIOD_S = 0.02
+# No move of a paint cell takes longer; one that does has a wrong number in it.
+LONGEST_MOVE_S = 3600.0
 # What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
 REORIENTATION_RAD_PER_S = math.radians(500.0)
 
@@ -36,7 +38,7 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         RecordingError: there is no second move, or one without a speed.
     """
     if len(program.moves) < 2:
-        raise RecordingError(f'{program.module} has a single move; give a program with a way')
+        raise RecordingError(f'{program.module} has a single move; give a program that travels')
     first = program.moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
     changes: list[tuple[float, bool]] = []
@@ -47,6 +49,11 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         length_m = _length_m(before.position_m, move)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
         duration_s = max(length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S)
+        if duration_s > LONGEST_MOVE_S:
+            raise RecordingError(
+                f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
+                f'{duration_s / 3600.0:.3g} h; check its target and speed'
+            )
         changes.append((times_s[-1], move.spraying))
         changes += [(times_s[-1] + at * duration_s, on) for at, on in _switches(move, length_m)]
         count = math.ceil(duration_s / POSE_PERIOD_S)
@@ -130,12 +137,14 @@ def _switches(move: RapidMove, length_m: float) -> list[tuple[float, bool]]:
     return sorted(switches, key=lambda switch: switch[0])
 
 
-def _arc(begin_m: np.ndarray, move: RapidMove) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _arc(
+    begin_m: np.ndarray, via_m: np.ndarray, end_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Centre, two radii square to each other from the beginning on, and the angle swept [rad].
 
     The angle is 0 where begin, middle and end lie on a line.
     """
-    to_via, to_end = np.subtract(move.via_m, begin_m), move.position_m - begin_m
+    to_via, to_end = via_m - begin_m, end_m - begin_m
     normal = np.cross(to_via, to_end)
     square = normal @ normal
     if square <= 1e-12 * (to_via @ to_via) * (to_end @ to_end):
@@ -150,7 +159,7 @@ def _arc(begin_m: np.ndarray, move: RapidMove) -> tuple[np.ndarray, np.ndarray, 
 
 def _length_m(begin_m: np.ndarray, move: RapidMove) -> float:
     if move.via_m is not None:
-        _, radius, _, angle_rad = _arc(begin_m, move)
+        _, radius, _, angle_rad = _arc(begin_m, move.via_m, move.position_m)
         if angle_rad:
             return float(np.linalg.norm(radius)) * angle_rad
     return float(np.linalg.norm(move.position_m - begin_m))
@@ -160,7 +169,7 @@ def _on_the_way(begin_m: np.ndarray, move: RapidMove, share: np.ndarray) -> np.n
     """(N, 3) places at these shares of a move [m]."""
     share = share[:, np.newaxis]
     if move.via_m is not None:
-        centre, radius, along, angle_rad = _arc(begin_m, move)
+        centre, radius, along, angle_rad = _arc(begin_m, move.via_m, move.position_m)
         if angle_rad:
             turned = share * angle_rad
             return centre + np.cos(turned) * radius + np.sin(turned) * along
