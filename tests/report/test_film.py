@@ -10,7 +10,8 @@ from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.pictures.chart import new_figure
-from paint_deposition.report.pictures.film import View, draw_film, write_door_picture
+from paint_deposition.report.pictures.film import draw_film, write_door_picture
+from paint_deposition.report.pictures.view import View
 
 X, Y, Z = np.eye(3)
 

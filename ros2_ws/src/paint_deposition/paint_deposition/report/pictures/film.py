@@ -1,6 +1,5 @@
 """The painted part from the front: film as colour on the shaded surface, and the tool path."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -22,14 +21,13 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, save_png
+from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].
 PART_IN = (7.6, 7.6)
 LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.75, 2.45, 0.6, 0.75
 LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.25, 0.24, 3.2
-# A view this close to an axis of the mesh is along it and has the mesh's coordinates.
-SNAP_COSINE = 0.9
 # Tool path around the part that is still shown [m].
 MARGIN_M = 0.18
 # Light from above left; how much a lean of the surface brightens or darkens it.
@@ -37,42 +35,7 @@ LIGHT, CONTRAST = (-0.45, 0.75), 0.5
 DARKEST, BRIGHTEST = 0.55, 1.18
 ARROW_EVERY_M = 0.45
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
-
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
-
-
-@dataclass(frozen=True)
-class View:
-    """The directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer.
-
-    Attributes:
-        labels: names of the axes to the right and up.
-    """
-
-    right: np.ndarray
-    up: np.ndarray
-    toward: np.ndarray
-    labels: tuple[str, str]
-
-    @staticmethod
-    def of_surface(surface: Surface) -> 'View':
-        """From the gun's side of a part."""
-        return View.of_front(surface.outward, surface.down)
-
-    @staticmethod
-    def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':
-        """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
-        toward, down = _snapped(outward), _snapped(down)
-        up = -down + (down @ toward) * toward
-        if np.linalg.norm(up) < 0.1:  # a part seen from straight above: its y is up
-            up = np.eye(3)[1] - toward[1] * toward
-        up /= np.linalg.norm(up)
-        right = np.cross(up, toward)
-        return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
-
-    def flat(self, points_m: np.ndarray) -> np.ndarray:
-        """(..., 2) where points (..., 3) lie in the picture [m]."""
-        return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
 
 
 def write_door_picture(
@@ -289,16 +252,3 @@ def _figures(s: FilmStatistics) -> list[str]:
             f'{100 * s.within_target:.0f} % within {s.target_um:g} ± {s.target_tolerance_um:g} µm'
         )
     return lines
-
-
-def _snapped(direction: np.ndarray) -> np.ndarray:
-    largest = int(np.abs(direction).argmax())
-    if abs(direction[largest]) < SNAP_COSINE:
-        return direction
-    return np.sign(direction[largest]) * np.eye(3)[largest]
-
-
-def _name(direction: np.ndarray, otherwise: str) -> str:
-    largest = int(np.abs(direction).argmax())
-    on_axis = abs(direction[largest]) > 1.0 - 1e-9
-    return f'{"xyz"[largest]} [m]' if on_axis else f'{otherwise} [m]'
