@@ -40,7 +40,8 @@ def write_calibration_pictures(folder: str | Path, calibration: Calibration) -> 
         legend(rows[0], loc='lower center', ncols=2)
         written.append(save_png(figure, folder / 'profiles.png'))
     figure = new_figure(5.2, 5.0)
-    draw_agreement(figure.subplots(), calibration)
+    study, predicted_um = calibration.study, calibration.fit.predicted_um
+    draw_agreement(figure.subplots(), study.measured_um, predicted_um, study.sigma_um)
     return [*written, save_png(figure, folder / 'agreement.png')]
 
 
@@ -91,16 +92,16 @@ def draw_panel(axes: Axes, calibration: Calibration, number: int, one: PanelFit)
     axes.set_ylim(bottom=0.0)
 
 
-def draw_agreement(axes: Axes, calibration: Calibration) -> None:
-    """Draw measured against predicted film of every point."""
-    study, predicted = calibration.study, calibration.fit.predicted_um
+def draw_agreement(
+    axes: Axes, measured_um: np.ndarray, predicted_um: np.ndarray, sigma_um: np.ndarray
+) -> None:
+    """Draw measured over predicted film, (P,) each with the gauge's standard deviation [um]."""
     quiet(axes, 'predicted [µm]', 'measured [µm]', 'All points')
-    top = 1.08 * float(max(predicted.max(), study.measured_um.max()))
+    top = 1.08 * float(max(predicted_um.max(), measured_um.max()))
     axes.plot([0.0, top], [0.0, top], color=MUTED, linewidth=0.9, linestyle='--')
     axes.errorbar(
-        predicted, study.measured_um, study.sigma_um,
-        fmt='o', color=MODEL, markersize=3.5, linewidth=0.8,
-    )  # fmt: skip
+        predicted_um, measured_um, sigma_um, fmt='o', color=MODEL, markersize=3.5, linewidth=0.8
+    )
     axes.set_xlim(0.0, top)
     axes.set_ylim(0.0, top)
     axes.set_aspect('equal')

@@ -26,12 +26,12 @@ def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
     """Draw a recommendation: sigma_n over the index, and the film at the recommended one."""
     figure = new_figure(11.0, 4.4)
     left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
-    draw_uniformity(left, recommendation)
+    draw_curve(left, recommendation)
     draw_passes(right, recommendation)
     return save_png(figure, path)
 
 
-def draw_uniformity(axes: Axes, answer: Recommendation) -> None:
+def draw_curve(axes: Axes, answer: Recommendation) -> None:
     """Draw sigma_n over the index with its minima, the tolerance and the recommended index."""
     quiet(axes, 'index [mm]', r'$\sigma_N$ [%]', 'Evenness over the index, eq. (5)')
     top = 1.08 * PERCENT * float(answer.curve.sigma_n.max())
