@@ -60,7 +60,7 @@ def read_readings(path: str | Path) -> Readings:
 
     Args:
         path: CSV with ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
-            ``group`` and ``nx,ny,nz``; other columns are left alone. Without ``point``, readings
+            ``group`` and ``nx,ny,nz``; other columns are ignored. Without ``point``, readings
             at exactly one place are repeats.
 
     Raises:
@@ -117,7 +117,7 @@ def _normals(table: Table) -> np.ndarray | None:
 
 
 def read_table(path: Path) -> Table:
-    """A CSV file with a line of names; blank lines and comments (#) are passed over.
+    """A CSV file that begins with column names; blank lines and comments (#) are skipped.
 
     Raises:
         ReadingsError: no file, no rows, a column missing or there twice, or a ragged line.

@@ -55,8 +55,8 @@ def history_as_list(
 ) -> list[dict[str, Any]]:
     """What was added to a model and the errors it left.
 
-    Errors are comparable within a campaign only, so each step names its own, with the noise of
-    its gauge. The model started from is the last of the older steps: fitted anew to the same
+    Errors can be compared within one campaign only, so each step names its campaign, with the
+    noise of its gauge. The model started from is the last of the older steps: fitted anew to the same
     campaign it replaces that step, fitted to another one it follows it.
 
     Args:

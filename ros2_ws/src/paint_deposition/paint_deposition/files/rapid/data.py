@@ -157,7 +157,7 @@ class RapidData:
                 f'{reference.name} is not declared in this module'
             )  # fmt: skip
             self.fail(line, what)
-        value = self._values[reference.name]
+        value: Any = self._values[reference.name]
         for index in self._path(reference, line):
             if not _has(value, index):
                 self.fail(line, f'{reference.name} has no such part')

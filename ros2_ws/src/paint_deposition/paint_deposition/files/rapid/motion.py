@@ -32,7 +32,7 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
     """Poses along a program, from the end of its first move on, at the programmed speeds.
 
     Joint moves are taken as straight, zones and acceleration are not: what that leaves out is in
-    the trajectory's notes. A program that knows no gun sprays all the way.
+    the trajectory's notes. A program that never switches the gun sprays throughout.
 
     Raises:
         RecordingError: there is no second move, or one without a speed.
@@ -113,13 +113,13 @@ def program_as_text(program: RapidProgram) -> str:
 
 
 def _assumptions(program: RapidProgram, gun_known: bool) -> list[str]:
-    notes = ['speeds are taken as programmed, reached at once']
+    notes = ['speeds are taken as programmed; acceleration is left out']
     if any(move.zone_m for move in program.moves):
         notes.append('zones are not followed: corners are sharp')
     if any('j' in move.instruction for move in program.moves[1:]):
         notes.append('joint moves are taken as straight')
     if not gun_known:
-        notes.append('nothing in the program switches the gun: it sprays all the way')
+        notes.append('nothing in the program switches the gun: it is taken as spraying throughout')
     return notes
 
 

@@ -25,7 +25,7 @@ TRIGGERS = ('triggio', 'triggequip')
 
 @dataclass(frozen=True)
 class GunSwitch:
-    """A change of the gun on the way: so far from the start or before the end of the move."""
+    """The gun switched during a move, so far after its start or before its end."""
 
     distance_m: float
     from_start: bool
@@ -40,10 +40,10 @@ class RapidMove:
         instruction: RAPID's name in lower case. line: where it stands.
         position_m, quaternion_xyzw: pose of the TCP at the end, in the world (or in the work
             object, where the module does not define that).
-        via_m: (3,) point on the way of a circular move, None for others.
+        via_m: (3,) point that a circular move passes through, None for others.
         speed_m_per_s: programmed speed; zone_m: radius in which the corner is cut, 0: stop.
         spraying: whether the gun is on as the move begins.
-        switches: changes on the way, in the order written.
+        switches: of the gun during the move, in the order written.
     """
 
     instruction: str
