@@ -57,7 +57,10 @@ def test_a_program_without_a_gun_sprays_all_the_way_and_says_so(motion, shared_d
     path, counts = spray_path(trajectory)
     assert path.spraying_time_s == pytest.approx(expected_s, rel=1e-9)
     assert counts.rejected == counts.gaps == 0
-    assert 'nothing in the program switches the gun: it is taken as spraying throughout' in trajectory.notes
+    assert (
+        'nothing in the program switches the gun: it is taken as spraying throughout'
+        in trajectory.notes
+    )
     assert 'joint moves are taken as straight' in trajectory.notes
 
 
