@@ -299,6 +299,6 @@ def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
     write_report(tmp_path / 'report.html', other.study, models[:1], other, library={wake.id: wake})
     text = page_of(tmp_path / 'report.html').text
     assert text.count(wake.__doc__) == 2
-    assert f'It shows as {wake.signature}.' in text
+    assert f'How it shows: {wake.signature}.' in text
     assert 'loss 2 × 10⁻⁹ per m/s (1 × 10⁻⁹ to 3 × 10⁻⁹)' in text
     assert 'loss 0.05 per m/s' in text

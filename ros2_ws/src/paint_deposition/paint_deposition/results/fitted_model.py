@@ -56,8 +56,8 @@ def history_as_list(
     """What was added to a model and the errors it left.
 
     Errors can be compared within one campaign only, so each step names its campaign, with the
-    noise of its gauge. The model started from is the last of the older steps: fitted anew to the same
-    campaign it replaces that step, fitted to another one it follows it.
+    noise of its gauge. The model started from is the last of the older steps: fitted anew to the
+    same campaign it replaces that step, fitted to another one it follows it.
 
     Args:
         study: the readings.

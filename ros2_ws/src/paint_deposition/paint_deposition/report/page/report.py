@@ -65,7 +65,7 @@ def report_html(data: ReportData) -> str:
     )  # fmt: skip
     filters: dict[str, Callable[..., str]] = {
         'um': lambda value: words.minus(f'{value:.2f}'),
-        'signed': lambda value: words.minus(f'{value:+.2f}'),
+        'signed': lambda value: words.micrometres(value, signed=True).removesuffix(' µm'),
         'whole': lambda value: words.minus(f'{value:.0f}'),
         'p': words.p_words,
         'in_print': words.in_print,
