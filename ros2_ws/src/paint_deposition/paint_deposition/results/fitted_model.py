@@ -85,29 +85,21 @@ def history_as_list(
 
 def _rounded(fit: Fit) -> DepositionModel:
     """The fitted model with what was fitted at few digits, within its bounds."""
-    model = fit.model
-    pattern = {name: _few_digits(getattr(model.planar, name)) for name in PATTERN_NAMES}
+    pattern = {name: _few_digits(getattr(fit.model.planar, name)) for name in PATTERN_NAMES}
     effects = []
-    for effect in model.effects:
-        known = effect.parameters()
+    for effect in fit.model.effects:
         values = {
-            name: np.clip(
-                _few_digits(getattr(effect, name)), known[name]['low'], known[name]['high']
-            ).item()
-            for owner, name in fit.unknowns.varied
-            if owner == effect.id
+            name: _few_digits(getattr(effect, name), info['low'], info['high'])
+            for name, info in effect.parameters().items()
+            if (effect.id, name) in fit.unknowns.varied
         }
         effects.append(effect.model_copy(update=values))
-    return model.model_copy(
-        update={
-            'planar': model.planar.model_copy(update=pattern),
-            'effects': tuple(effects),
-        }
-    )
+    planar = fit.model.planar.model_copy(update=pattern)
+    return fit.model.model_copy(update={'planar': planar, 'effects': tuple(effects)})
 
 
-def _few_digits(value: float) -> float:
-    return float(f'{value:.{DIGITS}g}')
+def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:
+    return min(max(float(f'{value:.{DIGITS}g}'), low), high)
 
 
 def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:

@@ -84,27 +84,21 @@ class RapidData:
 
     def frame(self, value: object, line: int) -> tuple[np.ndarray, Rotation]:
         """Position [m] and orientation of [[x, y, z] in mm, [q1, q2, q3, q4] scalar first]."""
-        if not (
-            isinstance(value, list)
-            and len(value) == 2
-            and _are_numbers(value[0], 3)
-            and _are_numbers(value[1], 4)
-        ):
+        position, quaternion = value if isinstance(value, list) and len(value) == 2 else ([], [])
+        if not (_are_numbers(position, 3) and _are_numbers(quaternion, 4)):
             self.fail(line, f'{value} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]')
-        w, x, y, z = value[1]
+        w, x, y, z = quaternion
         norm = float(np.linalg.norm([w, x, y, z]))
         if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-            self.fail(line, f'quaternion {value[1]} has the norm {norm:.4f} instead of 1')
-        return np.array(value[0]) * 1e-3, Rotation.from_quat([x, y, z, w])
+            self.fail(line, f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
+        return np.array(position) * 1e-3, Rotation.from_quat([x, y, z, w])
 
     def speed_m_per_s(self, expression: object, line: int) -> float:
         """Speed of the TCP of a speeddata."""
-        name = expression.name if isinstance(expression, Reference) else ''
-        if name not in self._values:
-            if name == 'vmax':
-                return VMAX_M_PER_S
-            if predefined := re.fullmatch(r'v(\d+)', name):
-                return float(predefined[1]) * 1e-3
+        if self._predefined(expression) == 'vmax':
+            return VMAX_M_PER_S
+        if speed := re.fullmatch(r'v(\d+)', self._predefined(expression)):
+            return float(speed[1]) * 1e-3
         value = self.value(expression, line)
         if not (isinstance(value, list) and len(value) == 4 and _is_number(value[0])):
             self.fail(line, 'a speeddata expected')
@@ -112,12 +106,10 @@ class RapidData:
 
     def zone_m(self, expression: object, line: int) -> float:
         """Radius of a zonedata in which the corner is cut; 0 for a stop point."""
-        name = expression.name if isinstance(expression, Reference) else ''
-        if name not in self._values:
-            if name == 'fine':
-                return 0.0
-            if predefined := re.fullmatch(r'z(\d+)', name):
-                return max(float(predefined[1]), 0.3) * 1e-3  # z0 is 0.3 mm
+        if self._predefined(expression) == 'fine':
+            return 0.0
+        if zone := re.fullmatch(r'z(\d+)', self._predefined(expression)):
+            return max(float(zone[1]), 0.3) * 1e-3  # z0 is 0.3 mm
         value = self.value(expression, line)
         if not (isinstance(value, list) and len(value) == 7):
             self.fail(line, 'a zonedata expected')
@@ -141,6 +133,11 @@ class RapidData:
         return not isinstance(value, list) or value[0] is not False
 
     # --- names and functions
+
+    def _predefined(self, expression: object) -> str:
+        """The name of what the controller predefines, '' where the module has its own value."""
+        name = expression.name if isinstance(expression, Reference) else ''
+        return '' if name in self._values else name
 
     def _path(self, reference: Reference, line: int) -> list[int]:
         path = [int(self.number(index, line, 'an index')) - 1 for index in reference.indexes]

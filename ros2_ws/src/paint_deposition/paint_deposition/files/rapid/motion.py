@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -46,7 +47,7 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         if not move.speed_m_per_s > 0.0:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
-        length_m = _length_m(before.position_m, move)
+        length_m, place_at = _track(before.position_m, move)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
         duration_s = max(length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S)
         if duration_s > LONGEST_MOVE_S:
@@ -58,7 +59,7 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         changes += [(times_s[-1] + at * duration_s, on) for at, on in _switches(move, length_m)]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
-        positions += list(_on_the_way(before.position_m, move, share))
+        positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
         times_s += (times_s[-1] + share * duration_s).tolist()
     if program.gun_signal or any(on for _, on in changes):
@@ -157,20 +158,18 @@ def _arc(
     return begin_m + to_centre, -to_centre, along, angle_rad
 
 
-def _length_m(begin_m: np.ndarray, move: RapidMove) -> float:
-    if move.via_m is not None:
-        _, radius, _, angle_rad = _arc(begin_m, move.via_m, move.position_m)
-        if angle_rad:
-            return float(np.linalg.norm(radius)) * angle_rad
-    return float(np.linalg.norm(move.position_m - begin_m))
-
-
-def _on_the_way(begin_m: np.ndarray, move: RapidMove, share: np.ndarray) -> np.ndarray:
-    """(N, 3) places at these shares of a move [m]."""
-    share = share[:, np.newaxis]
+def _track(begin_m: np.ndarray, move: RapidMove) -> tuple[float, Callable]:
+    """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m]."""
     if move.via_m is not None:
         centre, radius, along, angle_rad = _arc(begin_m, move.via_m, move.position_m)
         if angle_rad:
-            turned = share * angle_rad
-            return centre + np.cos(turned) * radius + np.sin(turned) * along
-    return begin_m + share * (move.position_m - begin_m)
+            return (
+                float(np.linalg.norm(radius)) * angle_rad,
+                lambda share: (
+                    centre
+                    + np.outer(np.cos(share * angle_rad), radius)
+                    + np.outer(np.sin(share * angle_rad), along)
+                ),
+            )
+    straight = move.position_m - begin_m
+    return float(np.linalg.norm(straight)), lambda share: begin_m + np.outer(share, straight)
