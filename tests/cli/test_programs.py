@@ -54,7 +54,7 @@ def test_a_program_paints_like_the_recording_of_its_motion(tmp_path):
     program, recording = figures
     assert program['mean_um'] == pytest.approx(recording['mean_um'], rel=1e-4)
     assert program['spraying_time_s'] == pytest.approx(recording['spraying_time_s'], rel=1e-5)
-    assert 'speeds are taken as programmed, reached at once' in program['notes']
+    assert 'speeds are taken as programmed; acceleration is left out' in program['notes']
 
 
 def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):

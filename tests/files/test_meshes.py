@@ -188,7 +188,7 @@ def test_the_painted_mesh_carries_the_film(tmp_path):
     film = np.linspace(0.0, 25.0, len(surface.vertices_m))
     colours = np.full((len(film), 3), [10, 200, 30], dtype=np.uint8)
     painted = tmp_path / 'film.ply'
-    write_mesh_ply(painted, surface, film, colours)
+    write_mesh_ply(painted, surface, colours, thickness_um=film)
     again = trimesh.load(painted, process=False)
     np.testing.assert_allclose(again.vertices, surface.vertices_m, atol=1e-7)
     np.testing.assert_array_equal(again.faces, surface.faces)

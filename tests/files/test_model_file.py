@@ -7,6 +7,7 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from ruamel.yaml.error import YAMLError
 
 from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS
@@ -131,6 +132,7 @@ def test_what_is_left_out_has_its_default(written):
          'Gaussian [1] (and 1 more)'),
         ('planar: {K1: 2}', "planar: unknown key 'K1'; did you mean 'K1_cm3_per_s'"),
         ('planar: {sigma_1_m: 2}', "did you mean 'sigma1_m'"),
+        ('planar: {K2: yes}', "K2 is 'yes'; expected a number"),
         ('planar: {1: 2}', 'planar: unknown key 1; expected names of parameters'),
         ('planar: [1]', 'planar is [1]; expected a mapping (key: value)'),
         ('planr: {}', "unknown key 'planr'; did you mean 'planar'"),
@@ -149,7 +151,7 @@ def test_what_is_left_out_has_its_default(written):
         ('history: {}', 'history is {}; expected a list'),
         ('history: [{}, 3]', 'history, entry 2 is 3; expected a mapping'),
         ('', 'holds no model; expected the keys planar and projection'),
-        ('planar: {K2: .1, K2: .2}', "cannot be read as YAML (line 1: 'K2' is given twice)"),
+        ('planar: {K2: .1, K2: .2}', 'cannot be read as YAML (line 1: found duplicate key "K2"'),
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
     ],
 )  # fmt: skip
@@ -168,7 +170,7 @@ def test_a_failed_write_leaves_the_old_file(tmp_path: Path):
     path = tmp_path / 'model.yaml'
     write_model(path, DepositionModel())
     before = path.read_text()
-    with pytest.raises(yaml.YAMLError):
+    with pytest.raises(YAMLError):
         write_model(path, DepositionModel(), history=[{'what': object()}])
     assert path.read_text() == before
     assert list(tmp_path.iterdir()) == [path]

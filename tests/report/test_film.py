@@ -9,7 +9,9 @@ from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.report.pictures.film import View, write_door_picture
+from paint_deposition.report.pictures.chart import new_figure
+from paint_deposition.report.pictures.film import draw_film, write_door_picture
+from paint_deposition.report.pictures.view import View
 
 X, Y, Z = np.eye(3)
 
@@ -67,3 +69,14 @@ def test_the_film_is_coloured_and_bare_metal_is_grey(tmp_path):
 def test_a_bare_part_is_drawn_too(tmp_path):
     picture = draw(tmp_path, np.zeros(len(door().vertices_m)), SprayPath.empty())
     assert (np.ptp(picture, axis=2) < 4).mean() > 0.8
+
+
+def test_labels_on_contours_are_level():
+    surface = door()
+    figure = new_figure(9.0, 6.0)
+    axes = figure.subplots()
+    draw_film(axes, surface, 30.0 - 20.0 * surface.vertices_m[:, 0])
+    figure.canvas.draw()
+    labels = [text for text in axes.texts if text.get_text().isdigit()]
+    assert len(labels) > 1
+    assert all(label.get_rotation() == 0.0 for label in labels)

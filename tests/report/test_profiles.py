@@ -6,8 +6,8 @@ from PIL import Image
 from paint_deposition.comparison.comparison import compare
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.study import Study
-from paint_deposition.report.page.style import ACCENT
 from paint_deposition.report.pictures.profiles import write_comparison_picture
+from paint_deposition.report.style import ACCENT
 from small_campaign import small_campaign
 
 

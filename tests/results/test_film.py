@@ -62,6 +62,6 @@ def test_a_folder_that_cannot_be_is_named(painted, tmp_path):
 
 
 def test_json_fails_before_it_writes(tmp_path):
-    with pytest.raises(TypeError):
+    with pytest.raises(ValueError, match='cannot be written as JSON'):
         write_json(tmp_path / 'x.json', {'object': object()})
     assert list(tmp_path.iterdir()) == []

@@ -57,7 +57,10 @@ def test_a_program_without_a_gun_sprays_all_the_way_and_says_so(motion, shared_d
     path, counts = spray_path(trajectory)
     assert path.spraying_time_s == pytest.approx(expected_s, rel=1e-9)
     assert counts.rejected == counts.gaps == 0
-    assert 'nothing in the program switches the gun: it sprays all the way' in trajectory.notes
+    assert (
+        'nothing in the program switches the gun: it is taken as spraying throughout'
+        in trajectory.notes
+    )
     assert 'joint moves are taken as straight' in trajectory.notes
 
 
@@ -131,3 +134,9 @@ def test_a_written_plan_is_flown_as_planned(tmp_path):
     assert path.spray_pass.max() == 1
     sprayed = path.position_m[path.flow > 0.0]
     assert set(np.round(sprayed[:, 1], 9)) == {0.0, 0.3}
+
+
+def test_a_move_that_would_take_for_ever_is_refused(motion):
+    begin, end = target(0), target('1e12')
+    with pytest.raises(RecordingError, match=r'line 4: a move of 1e\+09 m at 0.1 m/s takes .* h'):
+        motion(f'MoveL {begin},v100,fine,tool0;\nMoveL {end},v100,fine,tool0;')

@@ -297,3 +297,35 @@ def test_a_program_ends_with_the_gun_off():
 def test_what_no_robot_could_run_is_refused(moves, options, says):
     with pytest.raises(PlanError, match=says):
         module_text(moves, **options)
+
+
+WOBJ = 'PERS wobjdata w:=[FALSE,TRUE,"",[{position},{rotation}],[[0,0,0],[1,0,0,0]]];'
+AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
+
+
+@pytest.mark.parametrize(
+    ('body', 'data', 'message'),
+    [
+        (AT_W, WOBJ.format(position='[1,2]', rotation='[1,0,0,0]'), 'is no position [x, y'),
+        (AT_W, WOBJ.format(position='[1,2,3]', rotation='[1,0,0,0,0]'), 'is no position [x, y'),
+        (AT_W, WOBJ.format(position='3', rotation='[1,0,0,0]'), 'is no position [x, y'),
+        (AT_W, WOBJ.format(position='[1,2,"x"]', rotation='[1,0,0,0]'), 'is no position [x, y'),
+        (AT_W, 'PERS wobjdata w:=[FALSE,TRUE,"",3,4];', 'is no position [x, y'),
+        (f'MoveL {target("1e400")},v100,z10,tool0;', '', 'is no position [x, y'),
+        ('n:=1/0;', 'VAR num n;', 'line 4: division by zero'),
+        ('n:=a{[1]};', 'VAR num n; VAR num a{2}:=[1,2];', 'an index is [1.0]; a number expected'),
+        ('a{0}:=3;', 'VAR num a{2}:=[1,2];', 'a has no such part to assign to'),
+        ('SetBrush;', '', 'setbrush needs a number'),
+        ('SetBrush "one";', '', "what setbrush takes is 'one'; a number"),
+        ('TriggIO t\\DOp:=doGun;', 'VAR triggdata t;', 'triggio needs a number'),
+        (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', '', 'speed is [1.0]; a number expected'),
+        (f'MoveL {target(0)},v100,zz,tool0;', 'VAR zonedata zz:=[FALSE,[1],1,1,1,1,1];',
+         'the radius of the zone is [1.0]; a number expected'),
+        (f'MoveL {target(0)},v100,z1,tool0;MoveL {target(9)},v100\\T:=0,z1,tool0;', '',
+         'line 4: a duration of 0 s; give one above 0'),
+        (f'MoveL Offs({target(0)},0,0,[1]),v100,z10,tool0;', '',
+         'a displacement of offs is [1.0]; a number'),
+    ],
+)  # fmt: skip
+def test_values_of_the_wrong_shape_are_refused_in_a_line(read, body, data, message):
+    assert message in refusal(read, body, data)

@@ -215,7 +215,7 @@ def _write_diagnosis(
     write_residuals(output / 'residuals.csv', study, comparisons[-1][1])
     _write_pictures(output, study, comparisons)
     write_report(output / 'report.html', study, comparisons, diagnosis, places, sprays,
-                 start.history)  # fmt: skip
+                 start.history, library)  # fmt: skip
     return content
 
 

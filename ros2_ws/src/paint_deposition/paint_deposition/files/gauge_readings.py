@@ -1,7 +1,9 @@
 """Tables of gauge readings, CSV: read, checked, and written with predictions."""
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +62,7 @@ def read_readings(path: str | Path) -> Readings:
 
     Args:
         path: CSV with ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
-            ``group`` and ``nx,ny,nz``; other columns are left alone. Without ``point``, readings
+            ``group`` and ``nx,ny,nz``; other columns are ignored. Without ``point``, readings
             at exactly one place are repeats.
 
     Raises:
@@ -117,7 +119,7 @@ def _normals(table: Table) -> np.ndarray | None:
 
 
 def read_table(path: Path) -> Table:
-    """A CSV file with a line of names; blank lines and comments (#) are passed over.
+    """A CSV file that begins with column names; blank lines and comments (#) are skipped.
 
     Raises:
         ReadingsError: no file, no rows, a column missing or there twice, or a ragged line.
@@ -181,14 +183,11 @@ def write_predictions(
     write_table(path, lines)
 
 
-def write_table(path: str | Path, lines: list[list[str]]) -> None:
+def write_table(path: str | Path, lines: Sequence[Sequence[object]]) -> None:
     """Write lines of values as CSV, whole or not at all."""
-    with_commas = [','.join(_quoted(str(value)) for value in line) for line in lines]
-    write_text(path, '\n'.join(with_commas) + '\n')
-
-
-def _quoted(value: str) -> str:
-    return '"' + value.replace('"', '""') + '"' if any(c in value for c in ',"\n') else value
+    text = StringIO(newline='')
+    csv.writer(text, lineterminator='\n').writerows(lines)
+    write_text(path, text.getvalue())
 
 
 def _is_blank(line: list[str]) -> bool:

@@ -51,21 +51,21 @@ def read_mesh(
     vertices = vertices * scale
     _check_extent(path, vertices[faces.ravel()])
     vertices, faces = weld(vertices, faces)
-    notes = []
+    notes: list[str] = []
     faces = _without_degenerate(path, vertices, faces, notes)
     faces = _oriented(vertices, faces, notes)
     return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
 
 
 def write_mesh_ply(
-    path: str | Path, surface: Surface, film_um: np.ndarray, colours: np.ndarray
+    path: str | Path, surface: Surface, colours: np.ndarray, **properties: np.ndarray
 ) -> None:
-    """Write the refined mesh with ``thickness_um`` at each vertex, replacing the file at once.
+    """Write a surface with its normals as PLY, replacing the file at once.
 
     Args:
         path: where to.
-        film_um: (V,) film [um].
         colours: (V, 3) or (V, 4) uint8, shown by viewers.
+        properties: (V,) values of the vertices by name, such as ``thickness_um``.
     """
     from trimesh import Trimesh
 
@@ -74,12 +74,14 @@ def write_mesh_ply(
         surface.faces,
         vertex_normals=surface.normals,
         vertex_colors=colours,
-        vertex_attributes={'thickness_um': np.asarray(film_um, dtype=np.float32)},
+        vertex_attributes={
+            name: np.asarray(values, dtype=np.float32) for name, values in properties.items()
+        },
         process=False,
         validate=False,
     )
     with replacing(path) as temporary:
-        temporary.write_bytes(painted.export(file_type='ply', vertex_normal=True))
+        painted.export(temporary, file_type='ply', vertex_normal=True)
 
 
 def _require_positive(name: str, value: float, meaning: str) -> None:

@@ -2,12 +2,14 @@
 
 import os
 from collections.abc import Mapping
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import yaml
 from pydantic import BaseModel
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -39,28 +41,44 @@ def model_text(
         name: what the user calls the model.
         extras: plain values by top-level key, left out where empty.
     """
-    lines = [f'# {line}'.rstrip() for line in header_comment.splitlines()]
-    if name:
-        lines.append(f'name: {_plain_yaml(name)}')
+    text = CommentedMap({'name': name} if name else {})
+    if header_comment:
+        text.yaml_set_start_comment(header_comment)
     for key, comment in SECTION_COMMENTS.items():
-        lines += [_commented(f'{key}:', comment), *_fields(getattr(model, key), '  ')]
-    lines += _effects(model.effects, folder)
+        text[key] = _fields(getattr(model, key))
+        _comment(text, key, comment)
+    text['effects'] = [_effect(effect, folder) for effect in model.effects]
     for key, value in extras.items():
         if value:
-            lines += [_commented(f'{key}:', EXTRA_COMMENTS[key]), _block(value)]
-    return '\n'.join(lines) + '\n'
+            text[key] = _plain(value)
+            _comment(text, key, EXTRA_COMMENTS[key])
+    stream = StringIO()
+    writer = YAML()
+    writer.width = 10_000
+    writer.indent(sequence=4, offset=2)
+    writer.dump(text, stream)
+    return stream.getvalue()
 
 
-def _effects(effects: tuple[Effect, ...], folder: Path) -> list[str]:
-    if not effects:
-        return ['effects: []']
-    lines = ['effects:']
-    for effect in effects:
-        source = f'id: {effect.id}'
-        if effect.file is not None:
-            source = f'file: {_plain_yaml(_relative(effect.file, folder))}'
-        lines += [_commented(f'  - {source}', effect.family), *_fields(effect, '    ')]
-    return lines
+def _effect(effect: Effect, folder: Path) -> CommentedMap:
+    source = {'id': effect.id}
+    if effect.file is not None:
+        source = {'file': _relative(effect.file, folder)}
+    text = _fields(effect, source)
+    _comment(text, next(iter(source)), effect.family)
+    return text
+
+
+def _fields(values: BaseModel, before: Mapping[str, str] | None = None) -> CommentedMap:
+    text = CommentedMap({**(before or {}), **_plain(dict(values))})
+    for name, info in type(values).model_fields.items():
+        _comment(text, name, info.description)
+    return text
+
+
+def _comment(text: CommentedMap, key: str, comment: str | None) -> None:
+    if comment:
+        text.yaml_add_eol_comment(comment, key, COMMENT_COLUMN)
 
 
 def _relative(file: Path, folder: Path) -> str:
@@ -68,27 +86,6 @@ def _relative(file: Path, folder: Path) -> str:
         return Path(os.path.relpath(file, folder.resolve())).as_posix()
     except ValueError:  # another drive
         return file.as_posix()
-
-
-def _fields(values: BaseModel, indent: str) -> list[str]:
-    return [
-        _commented(f'{indent}{name}: {_plain_yaml(getattr(values, name))}', info.description)
-        for name, info in type(values).model_fields.items()
-    ]
-
-
-def _commented(text: str, comment: str | None) -> str:
-    return f'{text:<{COMMENT_COLUMN}} # {comment}' if comment else text
-
-
-def _plain_yaml(value: Any) -> str:
-    """A scalar that reads back as exactly this value."""
-    return yaml.safe_dump(_plain(value), width=10_000, allow_unicode=True).split('\n')[0]
-
-
-def _block(value: Any) -> str:
-    text = yaml.safe_dump(_plain(value), sort_keys=False, allow_unicode=True, width=99)
-    return '\n'.join(f'  {line}' for line in text.splitlines())
 
 
 def _plain(value: Any) -> Any:

@@ -19,17 +19,21 @@ def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
     """
     first, others = error.errors()[0], error.error_count() - 1
     more = f' (and {others} more)' if others else ''
+    if not first['loc']:
+        return f'{where} is {first["input"]!r}; expected the keys {", ".join(model.model_fields)}'
     key = '.'.join(str(part) for part in first['loc'])
     if first['type'] == 'extra_forbidden':
         return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
-    field = model.model_fields.get(key)
+    field = model.model_fields.get(str(first['loc'][0]))
     if field is None:
         return f'{where}: {first["msg"]}{more}'
+    if first['type'] == 'missing':
+        return f'{where} has no {key!r}; give {_expected(field)}{more}'
     return f'{where}: {key} is {first["input"]!r}; expected {_expected(field)}{more}'
 
 
 def boolean_number(model: type[BaseModel], where: str, values: dict[str, Any]) -> str | None:
-    """One line where true, yes or on stands for a number, which would pass as 1; else None."""
+    """One line where true stands for a number, which would pass as 1; else None."""
     for key, value in values.items():
         field = model.model_fields.get(key)
         if field is not None and field.annotation is float and isinstance(value, bool):
@@ -40,6 +44,8 @@ def boolean_number(model: type[BaseModel], where: str, values: dict[str, Any]) -
 def _expected(field: FieldInfo) -> str:
     if field.annotation is bool:
         return f'true or false: {field.description}'
+    if field.annotation is not float:
+        return str(field.description)
     limits = {
         kind: getattr(bound, name)
         for bound in field.metadata

@@ -52,7 +52,7 @@ def write_film(
         folder.mkdir(parents=True, exist_ok=True)
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
-        write_mesh_ply(paths[0], surface, film_um, colours)
+        write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
         write_film_csv(paths[1], surface.vertices_m, film_um)
         write_json(paths[2], {**statistics.as_dict(), **(details or {})})
     except OSError as error:

@@ -4,13 +4,18 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.diagnosis.verdict import Step
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import PATTERN_NAMES
 from paint_deposition.fitting.study import Study
 
+# So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
+DIGITS = 8
 # What a step of the history added, where it was no effect.
 PATTERN, REFIT = 'pattern', 'refit'
 
@@ -24,6 +29,8 @@ def write_fitted(
 ) -> None:
     """Write the last step's model; an older file is replaced at once.
 
+    Fitted numbers are rounded to ``DIGITS`` significant digits, all others stay as given.
+
     Args:
         path: YAML.
         study: the readings that it was fitted to.
@@ -32,16 +39,14 @@ def write_fitted(
             stay where the fit has no newer ones.
         header_comment: lines to put at the top.
     """
-    name, older_uncertainty, older = '', {}, ()
-    if start is not None:
-        name, older_uncertainty, older = start.name, start.uncertainty, start.history
+    start = start or ModelFile(steps[0].model)
     write_model(
         path,
-        steps[-1].model,
+        _rounded(steps[-1].fit),
         header_comment,
-        history_as_list(study, steps, older),
-        _uncertainty(steps[-1].fit, older_uncertainty),
-        name,
+        history_as_list(study, steps, start.history),
+        _uncertainty(steps[-1].fit, start.uncertainty),
+        start.name,
     )
 
 
@@ -50,9 +55,9 @@ def history_as_list(
 ) -> list[dict[str, Any]]:
     """What was added to a model and the errors it left.
 
-    Errors are comparable within a campaign only, so each step names its own, with the noise of
-    its gauge. The model started from is the last of the older steps: fitted anew to the same
-    campaign it replaces that step, fitted to another one it follows it.
+    Errors can be compared within one campaign only, so each step names its campaign, with the
+    noise of its gauge. The model started from is the last of the older steps: fitted anew to the
+    same campaign it replaces that step, fitted to another one it follows it.
 
     Args:
         study: the readings.
@@ -76,6 +81,25 @@ def history_as_list(
     else:
         found[0]['added'] = REFIT if kept or steps[0].model.effects else PATTERN
     return [*kept, *found]
+
+
+def _rounded(fit: Fit) -> DepositionModel:
+    """The fitted model with what was fitted at few digits, within its bounds."""
+    pattern = {name: _few_digits(getattr(fit.model.planar, name)) for name in PATTERN_NAMES}
+    effects = []
+    for effect in fit.model.effects:
+        values = {
+            name: _few_digits(getattr(effect, name), info['low'], info['high'])
+            for name, info in effect.parameters().items()
+            if (effect.id, name) in fit.unknowns.varied
+        }
+        effects.append(effect.model_copy(update=values))
+    planar = fit.model.planar.model_copy(update=pattern)
+    return fit.model.model_copy(update={'planar': planar, 'effects': tuple(effects)})
+
+
+def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:
+    return min(max(float(f'{value:.{DIGITS}g}'), low), high)
 
 
 def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:

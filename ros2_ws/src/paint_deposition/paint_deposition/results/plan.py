@@ -1,14 +1,14 @@
 """A plan on disk: bag, table, robot program, figures, and the film that is to be expected."""
 
-import csv
 import shutil
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import replacing, write_text
+from paint_deposition.files.atomic import write_text
+from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -64,23 +64,21 @@ def write_plan(
 
 def write_passes_csv(path: str | Path, plan: Plan) -> Path:
     """Write the TCP's moves as a table: where each ends, how fast, and whether the gun is on."""
-    number = 0
-    with replacing(path) as temporary, temporary.open('w', newline='') as file:
-        table = csv.writer(file)
-        table.writerow(COLUMNS)
-        was_spraying = False
-        for move in planned_moves(plan.passes, plan.style):
-            number += move.spraying and not was_spraying
-            was_spraying = move.spraying
-            table.writerow(
-                [
-                    max(number, 1),
-                    *(f'{value:.6f}' for value in move.position_m),
-                    *(f'{value:.8f}' for value in move.quaternion_xyzw),
-                    f'{move.speed_m_per_s:.6g}',
-                    int(move.spraying),
-                ]
-            )
+    number, was_spraying = 0, False
+    lines: list[Sequence[object]] = [COLUMNS]
+    for move in planned_moves(plan.passes, plan.style):
+        number += move.spraying and not was_spraying
+        was_spraying = move.spraying
+        lines.append(
+            [
+                max(number, 1),
+                *(f'{value:.6f}' for value in move.position_m),
+                *(f'{value:.8f}' for value in move.quaternion_xyzw),
+                f'{move.speed_m_per_s:.6g}',
+                int(move.spraying),
+            ]
+        )
+    write_table(path, lines)
     return Path(path)
 
 

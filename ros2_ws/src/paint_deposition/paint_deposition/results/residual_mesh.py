@@ -7,7 +7,7 @@ import numpy as np
 
 from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.comparison.residual_field import point_residuals_um, spread_over_surface
-from paint_deposition.files.atomic import replacing
+from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.film.colour_scales import residual_scale
 from paint_deposition.fitting.study import Study
 
@@ -18,8 +18,6 @@ def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparis
     Residual = measured minus predicted, interpolated between readings; grey and NaN where no
     reading is near. All experiments share one scale of colours.
     """
-    from trimesh import Trimesh
-
     fields = []
     for experiment, residual in zip(
         study.campaign.experiments, point_residuals_um(study, comparison), strict=True
@@ -35,21 +33,11 @@ def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparis
     scale = residual_scale(everything[np.isfinite(everything)])
     paths: list[Path] = []
     for experiment, field in zip(study.campaign.experiments, fields, strict=True):
-        surface = experiment.surface
-        mesh = Trimesh(
-            surface.vertices_m,
-            surface.faces,
-            vertex_normals=surface.normals,
-            vertex_colors=scale.rgba(field, np.isfinite(field)),
-            vertex_attributes={'residual_um': field.astype(np.float32)},
-            process=False,
-            validate=False,
-        )
         path = Path(folder) / f'residual_{file_name(experiment.name)}.ply'
         if path in paths:
             path = path.with_stem(f'{path.stem}_{len(paths) + 1}')
-        with replacing(path) as temporary:
-            temporary.write_bytes(mesh.export(file_type='ply', vertex_normal=True))
+        colours = scale.rgba(field, np.isfinite(field))
+        write_mesh_ply(path, experiment.surface, colours, residual_um=field)
         paths.append(path)
     return paths
 

@@ -54,60 +54,66 @@ class RapidData:
             return self._look_up(expression, line)
         return expression
 
+    def number(self, expression: object, line: int, name: str) -> float:
+        """The number that an expression stands for; `name` tells it in the refusal."""
+        value = self.value(expression, line)
+        if not _is_number(value):
+            self.fail(line, f'{name} is {value!r}; a number expected')
+        return value
+
     def assign(self, target: Reference, value: object, line: int) -> None:
         if not (target.indexes or target.components):
             self._values[target.name] = value
             return
         place: Any = self._values.get(target.name)
-        path = self._path(target, line)
-        for index in path[:-1]:
-            place = place[index] if isinstance(place, list) else None
-        if not isinstance(place, list) or path[-1] >= len(place):
+        *path, last = self._path(target, line)
+        for index in path:
+            place = place[index] if _has(place, index) else None
+        if not _has(place, last):
             self.fail(line, f'{target.name} has no such part to assign to')
-        place[path[-1]] = value
+        place[last] = value
 
     # --- motion data
 
     def target(self, expression: object, line: int) -> tuple[np.ndarray, Rotation]:
         """Position [m] and orientation of a robtarget, in its work object."""
         value = self.value(expression, line)
-        if not (isinstance(value, list) and len(value) == 4 and self._is_frame(value[:2])):
+        if not (isinstance(value, list) and len(value) == 4):
             self.fail(line, 'a robtarget expected')
         return self.frame(value[:2], line)
 
-    def frame(self, value: list, line: int) -> tuple[np.ndarray, Rotation]:
+    def frame(self, value: object, line: int) -> tuple[np.ndarray, Rotation]:
         """Position [m] and orientation of [[x, y, z] in mm, [q1, q2, q3, q4] scalar first]."""
-        w, x, y, z = value[1]
+        position, quaternion = value if isinstance(value, list) and len(value) == 2 else ([], [])
+        if not (_are_numbers(position, 3) and _are_numbers(quaternion, 4)):
+            self.fail(line, f'{value} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]')
+        w, x, y, z = quaternion
         norm = float(np.linalg.norm([w, x, y, z]))
         if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-            self.fail(line, f'quaternion {value[1]} has the norm {norm:.4f} instead of 1')
-        return np.array(value[0]) * 1e-3, Rotation.from_quat([x, y, z, w])
+            self.fail(line, f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
+        return np.array(position) * 1e-3, Rotation.from_quat([x, y, z, w])
 
     def speed_m_per_s(self, expression: object, line: int) -> float:
         """Speed of the TCP of a speeddata."""
-        name = expression.name if isinstance(expression, Reference) else ''
-        if name not in self._values:
-            if name == 'vmax':
-                return VMAX_M_PER_S
-            if predefined := re.fullmatch(r'v(\d+)', name):
-                return float(predefined[1]) * 1e-3
+        if self._predefined(expression) == 'vmax':
+            return VMAX_M_PER_S
+        if speed := re.fullmatch(r'v(\d+)', self._predefined(expression)):
+            return float(speed[1]) * 1e-3
         value = self.value(expression, line)
-        if not (isinstance(value, list) and len(value) == 4 and isinstance(value[0], float)):
+        if not (isinstance(value, list) and len(value) == 4 and _is_number(value[0])):
             self.fail(line, 'a speeddata expected')
         return value[0] * 1e-3
 
     def zone_m(self, expression: object, line: int) -> float:
         """Radius of a zonedata in which the corner is cut; 0 for a stop point."""
-        name = expression.name if isinstance(expression, Reference) else ''
-        if name not in self._values:
-            if name == 'fine':
-                return 0.0
-            if predefined := re.fullmatch(r'z(\d+)', name):
-                return max(float(predefined[1]), 0.3) * 1e-3  # z0 is 0.3 mm
+        if self._predefined(expression) == 'fine':
+            return 0.0
+        if zone := re.fullmatch(r'z(\d+)', self._predefined(expression)):
+            return max(float(zone[1]), 0.3) * 1e-3  # z0 is 0.3 mm
         value = self.value(expression, line)
         if not (isinstance(value, list) and len(value) == 7):
             self.fail(line, 'a zonedata expected')
-        return 0.0 if value[0] else value[1] * 1e-3
+        return 0.0 if value[0] else self.number(value[1], line, 'the radius of the zone') * 1e-3
 
     def work_object(self, name: str, line: int) -> tuple[np.ndarray, Rotation] | None:
         """Object frame in the world [m]; None when the module does not define it."""
@@ -128,12 +134,13 @@ class RapidData:
 
     # --- names and functions
 
-    @staticmethod
-    def _is_frame(value: list) -> bool:
-        return all(isinstance(part, list) for part in value) and list(map(len, value)) == [3, 4]
+    def _predefined(self, expression: object) -> str:
+        """The name of what the controller predefines, '' where the module has its own value."""
+        name = expression.name if isinstance(expression, Reference) else ''
+        return '' if name in self._values else name
 
     def _path(self, reference: Reference, line: int) -> list[int]:
-        path = [int(self.value(index, line)) - 1 for index in reference.indexes]
+        path = [int(self.number(index, line, 'an index')) - 1 for index in reference.indexes]
         for component in reference.components:
             if component not in COMPONENTS:
                 self.fail(line, f'component {component} of {reference.name} is not known')
@@ -147,25 +154,42 @@ class RapidData:
                 f'{reference.name} is not declared in this module'
             )  # fmt: skip
             self.fail(line, what)
-        value = self._values[reference.name]
+        value: Any = self._values[reference.name]
         for index in self._path(reference, line):
-            if not isinstance(value, list) or not 0 <= index < len(value):
+            if not _has(value, index):
                 self.fail(line, f'{reference.name} has no such part')
             value = value[index]
         return copy.deepcopy(value)
 
     def _call(self, call: Call, line: int) -> object:
         arguments = [self.value(argument, line) for argument in call.arguments]
-        if call.function in ARITHMETIC and all(isinstance(a, float) for a in arguments):
+        if call.function in ARITHMETIC and all(map(_is_number, arguments)):
+            if call.function == '/' and arguments[1] == 0.0:
+                self.fail(line, 'division by zero')
             return ARITHMETIC[call.function](*arguments)
         if call.function not in ('offs', 'reltool') or len(arguments) != 4 or call.options:
             self.fail(line, f'{call.function} is not evaluated here; write its value instead')
         return self._displaced(call.function, arguments[0], arguments[1:], line)
 
-    def _displaced(self, function: str, target: Any, step_mm: list, line: int) -> list:
+    def _displaced(self, function: str, target: Any, displacement: list, line: int) -> list:
         _, rotation = self.target(target, line)
+        step_mm = [
+            self.number(value, line, f'a displacement of {function}') for value in displacement
+        ]
         if function == 'reltool':
             step_mm = rotation.apply(step_mm).tolist()
         moved = copy.deepcopy(target)
         moved[0] = [value + step for value, step in zip(moved[0], step_mm, strict=True)]
         return moved
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, float) and np.isfinite(value)
+
+
+def _are_numbers(value: object, count: int) -> bool:
+    return isinstance(value, list) and len(value) == count and all(map(_is_number, value))
+
+
+def _has(value: object, index: int) -> bool:
+    return isinstance(value, list) and 0 <= index < len(value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -17,6 +18,8 @@ from paint_deposition.motion.trajectory import Trajectory
 
 SUFFIXES = ('.mod', '.prg')
 POSE_PERIOD_S = 0.02
+# No move of a paint cell takes longer; one that does has a wrong number in it.
+LONGEST_MOVE_S = 3600.0
 # What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
 REORIENTATION_RAD_PER_S = math.radians(500.0)
 
@@ -30,13 +33,13 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
     """Poses along a program, from the end of its first move on, at the programmed speeds.
 
     Joint moves are taken as straight, zones and acceleration are not: what that leaves out is in
-    the trajectory's notes. A program that knows no gun sprays all the way.
+    the trajectory's notes. A program that never switches the gun sprays throughout.
 
     Raises:
         RecordingError: there is no second move, or one without a speed.
     """
     if len(program.moves) < 2:
-        raise RecordingError(f'{program.module} has a single move; give a program with a way')
+        raise RecordingError(f'{program.module} has a single move; give a program that travels')
     first = program.moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
     changes: list[tuple[float, bool]] = []
@@ -44,14 +47,19 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         if not move.speed_m_per_s > 0.0:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
-        length_m = _length_m(before.position_m, move)
+        length_m, place_at = _track(before.position_m, move)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
         duration_s = max(length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S)
+        if duration_s > LONGEST_MOVE_S:
+            raise RecordingError(
+                f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
+                f'{duration_s / 3600.0:.3g} h; check its target and speed'
+            )
         changes.append((times_s[-1], move.spraying))
         changes += [(times_s[-1] + at * duration_s, on) for at, on in _switches(move, length_m)]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
-        positions += list(_on_the_way(before.position_m, move, share))
+        positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
         times_s += (times_s[-1] + share * duration_s).tolist()
     if program.gun_signal or any(on for _, on in changes):
@@ -106,13 +114,13 @@ def program_as_text(program: RapidProgram) -> str:
 
 
 def _assumptions(program: RapidProgram, gun_known: bool) -> list[str]:
-    notes = ['speeds are taken as programmed, reached at once']
+    notes = ['speeds are taken as programmed; acceleration is left out']
     if any(move.zone_m for move in program.moves):
         notes.append('zones are not followed: corners are sharp')
     if any('j' in move.instruction for move in program.moves[1:]):
         notes.append('joint moves are taken as straight')
     if not gun_known:
-        notes.append('nothing in the program switches the gun: it sprays all the way')
+        notes.append('nothing in the program switches the gun: it is taken as spraying throughout')
     return notes
 
 
@@ -130,12 +138,14 @@ def _switches(move: RapidMove, length_m: float) -> list[tuple[float, bool]]:
     return sorted(switches, key=lambda switch: switch[0])
 
 
-def _arc(begin_m: np.ndarray, move: RapidMove) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+def _arc(
+    begin_m: np.ndarray, via_m: np.ndarray, end_m: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
     """Centre, two radii square to each other from the beginning on, and the angle swept [rad].
 
     The angle is 0 where begin, middle and end lie on a line.
     """
-    to_via, to_end = np.subtract(move.via_m, begin_m), move.position_m - begin_m
+    to_via, to_end = via_m - begin_m, end_m - begin_m
     normal = np.cross(to_via, to_end)
     square = normal @ normal
     if square <= 1e-12 * (to_via @ to_via) * (to_end @ to_end):
@@ -148,20 +158,18 @@ def _arc(begin_m: np.ndarray, move: RapidMove) -> tuple[np.ndarray, np.ndarray, 
     return begin_m + to_centre, -to_centre, along, angle_rad
 
 
-def _length_m(begin_m: np.ndarray, move: RapidMove) -> float:
+def _track(begin_m: np.ndarray, move: RapidMove) -> tuple[float, Callable]:
+    """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m]."""
     if move.via_m is not None:
-        _, radius, _, angle_rad = _arc(begin_m, move)
+        centre, radius, along, angle_rad = _arc(begin_m, move.via_m, move.position_m)
         if angle_rad:
-            return float(np.linalg.norm(radius)) * angle_rad
-    return float(np.linalg.norm(move.position_m - begin_m))
-
-
-def _on_the_way(begin_m: np.ndarray, move: RapidMove, share: np.ndarray) -> np.ndarray:
-    """(N, 3) places at these shares of a move [m]."""
-    share = share[:, np.newaxis]
-    if move.via_m is not None:
-        centre, radius, along, angle_rad = _arc(begin_m, move)
-        if angle_rad:
-            turned = share * angle_rad
-            return centre + np.cos(turned) * radius + np.sin(turned) * along
-    return begin_m + share * (move.position_m - begin_m)
+            return (
+                float(np.linalg.norm(radius)) * angle_rad,
+                lambda share: (
+                    centre
+                    + np.outer(np.cos(share * angle_rad), radius)
+                    + np.outer(np.sin(share * angle_rad), along)
+                ),
+            )
+    straight = move.position_m - begin_m
+    return float(np.linalg.norm(straight)), lambda share: begin_m + np.outer(share, straight)

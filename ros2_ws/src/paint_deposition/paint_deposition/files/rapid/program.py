@@ -25,7 +25,7 @@ TRIGGERS = ('triggio', 'triggequip')
 
 @dataclass(frozen=True)
 class GunSwitch:
-    """A change of the gun on the way: so far from the start or before the end of the move."""
+    """The gun switched during a move, so far after its start or before its end."""
 
     distance_m: float
     from_start: bool
@@ -40,10 +40,10 @@ class RapidMove:
         instruction: RAPID's name in lower case. line: where it stands.
         position_m, quaternion_xyzw: pose of the TCP at the end, in the world (or in the work
             object, where the module does not define that).
-        via_m: (3,) point on the way of a circular move, None for others.
+        via_m: (3,) point that a circular move passes through, None for others.
         speed_m_per_s: programmed speed; zone_m: radius in which the corner is cut, 0: stop.
         spraying: whether the gun is on as the move begins.
-        switches: changes on the way, in the order written.
+        switches: of the gun during the move, in the order written.
     """
 
     instruction: str
@@ -170,7 +170,7 @@ class _Run:
             target: Any = i.arguments[0].value
             self._data.assign(target, self._data.value(i.arguments[1].value, i.line), i.line)
         elif i.name == 'setbrush':
-            self._brush = float(self._data.value(i.arguments[0].value, i.line))
+            self._brush = self._number(i, 0)
         elif i.name in TRIGGERS and self._is_gun(i):
             self._triggers[_name(i.arguments[0].value)] = self._switch(i)
         elif self._is_gun(i):
@@ -178,6 +178,12 @@ class _Run:
 
     def _is_gun(self, i: Instruction) -> bool:
         return self._signal is not None and _signal_of(i) == self._signal
+
+    def _number(self, i: Instruction, index: int) -> float:
+        """An argument that has to be a number."""
+        if len(i.arguments) <= index:
+            self._data.fail(i.line, f'{i.name} needs a number as argument {index + 1}')
+        return self._data.number(i.arguments[index].value, i.line, f'what {i.name} takes')
 
     def _level(self, i: Instruction) -> bool:
         if i.name in ('set', 'reset'):
@@ -188,8 +194,7 @@ class _Run:
         options = i.options()
         if options.get('time'):
             self._data.fail(i.line, f'{i.name} by time is not followed; give a distance')
-        distance_m = float(self._data.value(i.arguments[1].value, i.line)) * 1e-3
-        return GunSwitch(distance_m, bool(options.get('start')), self._level(i))
+        return GunSwitch(self._number(i, 1) * 1e-3, bool(options.get('start')), self._level(i))
 
     # --- moves
 
@@ -241,9 +246,11 @@ class _Run:
     def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
         options = i.options()
         if 'v' in options:
-            return float(self._data.value(options['v'], i.line)) * 1e-3
+            return self._data.number(options['v'], i.line, 'the speed') * 1e-3
         if 't' in options and self._position_m is not None:
-            duration_s = float(self._data.value(options['t'], i.line))
+            duration_s = self._data.number(options['t'], i.line, 'the duration')
+            if not duration_s > 0.0:
+                self._data.fail(i.line, f'a duration of {duration_s:g} s; give one above 0')
             return float(np.linalg.norm(position_m - self._position_m)) / duration_s
         if _name(value) == 'vmax':
             self._note("vmax is the robot's own; 5 m/s assumed")

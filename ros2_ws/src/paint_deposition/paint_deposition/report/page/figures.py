@@ -5,21 +5,16 @@ from typing import Any
 import numpy as np
 from scipy.stats import binned_statistic
 
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.style import (
-    ACCENT,
-    BEFORE,
-    GRID,
-    INK,
-    MUTED,
-    TWO_SIDED_95,
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import (
     axis,
     base_layout,
     chart_title,
     figure,
     grid_domains,
 )
-from paint_deposition.report.page.words import covariate_label, p_words, step_words
+from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED, TWO_SIDED_95
+from paint_deposition.report.words import covariate_label, p_words, step_words
 
 COVARIATES_A_ROW = 4
 MOST_COVARIATES = 8
@@ -59,12 +54,15 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     return figure('parity', traces, layout, 420)
 
 
-def _before_and_after(data: ReportData, values: list[np.ndarray]):
-    small = {'size': 5.5, 'color': BEFORE, 'opacity': 0.9}
-    strong = {'size': 5.5, 'color': ACCENT, 'opacity': 0.9}
-    if not data.improved:
-        return [('model', values[0], strong)]
-    return [('model before', values[0], small), ('model after', values[-1], strong)]
+def _before_and_after(
+    data: ReportData, values: list[np.ndarray]
+) -> list[tuple[str, np.ndarray, dict[str, Any]]]:
+    """Name, values and marker of each model, the last one in the strong colour."""
+    colours = (BEFORE, ACCENT) if data.improved else (ACCENT,)
+    return [
+        (name, value, {'size': 5.5, 'color': colour, 'opacity': 0.9})
+        for name, value, colour in zip(data.model_names, values, colours, strict=True)
+    ]
 
 
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
@@ -112,7 +110,14 @@ def _conditions(data: ReportData) -> dict[str, np.ndarray]:
     return values | {'spray_pass': values['spray_pass'] + 1.0}
 
 
-def _dependence_traces(x, residual, label, marker, where, first) -> list[dict]:
+def _dependence_traces(
+    x: np.ndarray,
+    residual: np.ndarray,
+    label: str,
+    marker: dict[str, Any],
+    where: dict[str, Any],
+    first: bool,
+) -> list[dict]:
     common = where | {'type': 'scatter', 'legendgroup': label, 'name': label}
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
     traces = [common | {
@@ -170,8 +175,8 @@ def unknown_figure(data: ReportData) -> dict[str, Any] | None:
     unknown = data.diagnosis.unknown if data.diagnosis else None
     if unknown is None or len(unknown.curve) < 2:
         return None
-    (_, x), (_, y) = list(unknown.curve.items())[:2]
-    x = np.add(x, 1.0 if unknown.covariate == 'spray_pass' else 0.0)
+    covariate, y = list(unknown.curve.values())[:2]
+    x = np.add(covariate, 1.0 if unknown.covariate == 'spray_pass' else 0.0)
     hover = {'hovertemplate': '%{y:.2f} µm at %{x:.3g}<extra></extra>'}
     traces = [
         hover | {

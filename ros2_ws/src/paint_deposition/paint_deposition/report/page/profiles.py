@@ -5,30 +5,19 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.comparison.profiles import Profile
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.style import (
-    ACCENT,
-    BEFORE,
-    INK,
-    MUTED,
-    TWO_SIDED_95,
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import (
     axis,
     base_layout,
     chart_title,
     figure,
     grid_domains,
 )
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
 ROW_PX, TOP_PX, BOTTOM_PX = 300, 56, 40
 # Share of a chart's height that the residual takes, and the gap above it.
 RESIDUAL_SHARE, GAP_SHARE = 0.26, 0.05
-
-
-def charts_a_row(count: int) -> int:
-    """Two to four, so that few places stay empty."""
-    if count < 5:
-        return count if count < 4 else 2
-    return min((3, 4), key=lambda columns: -count % columns)
 
 
 def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
@@ -60,15 +49,9 @@ def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
             'residual' if first else '', domain=[y[0], cut], anchor=f'x{film}',
             range=residual_range, nticks=4, zeroline=True, zerolinecolor=MUTED, zerolinewidth=1,
         )  # fmt: skip
-        text = f'<b>{_escaped(profile.label)}</b>  {errors_in_words(data, profile.rows)}'
+        text = f'<b>{_escaped(profile.label)}</b>  {data.errors_in_words(profile.rows)}'
         layout['annotations'].append(chart_title(text, x[0], y[1]))
     return figure(f'profiles-{index}', traces, layout, inner + TOP_PX + BOTTOM_PX)
-
-
-def errors_in_words(data: ReportData, rows: np.ndarray) -> str:
-    """RMSE of these points for each model."""
-    errors = [f'{np.sqrt(np.mean(r[rows] ** 2)):.2f}' for r in data.residuals_um]
-    return f'RMSE {" → ".join(errors)} µm'
 
 
 def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], list[float]]:
@@ -94,9 +77,8 @@ def _film_traces(data: ReportData, p: Profile, x: str, y: str, first: bool) -> l
         for number, single in enumerate(p.passes_um)
     ]  # fmt: skip
     # The thin line lies over the bold one, so that both are seen where they agree.
-    for k in reversed(range(len(data.models))):
+    for k, name in reversed(list(enumerate(data.model_names))):
         last = k == len(data.models) - 1
-        name = 'model' if not data.improved else 'model after' if last else 'model before'
         trace = common | {
             'name': name, 'legendgroup': name, 'showlegend': first, 'legendrank': 2 + k,
             'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',

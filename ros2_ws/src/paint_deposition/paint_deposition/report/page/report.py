@@ -1,7 +1,7 @@
 """The report: one HTML file that needs no network, for the browser and for paper."""
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,17 @@ import numpy as np
 from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.provenance import git_version, package_version
 from paint_deposition.fitting.study import Study
+from paint_deposition.report import words
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
-from paint_deposition.report.page import tables, words
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.headline import headline
+from paint_deposition.report.page import tables
+from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.profiles import profile_figure
 from paint_deposition.report.page.scene import places_scene, scene_data
 
@@ -34,6 +37,7 @@ def write_report(
     places: Sequence[Place] = (),
     sprays: Sequence[Spray] = (),
     older: Sequence[Mapping[str, Any]] = (),
+    library: Mapping[str, type[Effect]] = EFFECTS,
 ) -> None:
     """Write the report as one HTML file, whole or not at all.
 
@@ -44,8 +48,9 @@ def write_report(
         diagnosis: None after a comparison alone.
         places, sprays: what to measure and spray next.
         older: history of the model that a diagnosis started from, as in its file.
+        library: the effects that were looked for, by id, users' own among them.
     """
-    data = ReportData.of(study, models, diagnosis, places, sprays, older)
+    data = ReportData.of(study, models, diagnosis, places, sprays, older, library)
     write_text(path, report_html(data))
 
 
@@ -58,19 +63,21 @@ def report_html(data: ReportData) -> str:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters |= {
-        'um': lambda value: f'{value:.2f}'.replace('-', '−'),
-        'signed': lambda value: f'{value:+.2f}'.replace('-', '−'),
-        'whole': lambda value: f'{value:.0f}'.replace('-', '−'),
+    filters: dict[str, Callable[..., str]] = {
+        'um': lambda value: words.minus(f'{value:.2f}'),
+        'signed': lambda value: words.micrometres(value, signed=True).removesuffix(' µm'),
+        'whole': lambda value: words.minus(f'{value:.0f}'),
         'p': words.p_words,
         'in_print': words.in_print,
         'effect': words.effect_name,
     }
+    environment.filters.update(filters)
     scenes = [scene_data(data, k) for k in range(len(data.experiments))]
     figures = _figures(data)
     return environment.get_template('report.html.j2').render(
         data=data,
         headline=headline(data),
+        key_figures=key_figures(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
@@ -97,8 +104,8 @@ def report_html(data: ReportData) -> str:
 
 
 def _figures(data: ReportData) -> list[dict[str, Any]]:
-    found = [profile_figure(data, k) for k in range(len(data.experiments))]
-    found += [
+    found = [
+        *(profile_figure(data, k) for k in range(len(data.experiments))),
         charts.parity_figure(data),
         charts.covariate_figure(data),
         charts.history_figure(data),

@@ -1,4 +1,4 @@
-"""The part in 3D: film, residual before and after, passes of the gun, points to measure.
+"""The part in 3D: film, residual before and after, spray passes, points to measure.
 
 The mesh is kept once; traces name the geometry that the page's script hands to them.
 """
@@ -10,18 +10,13 @@ import numpy as np
 from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.film.colour_scales import round_up
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.style import (
-    ACCENT,
-    FILM_COLOURS,
-    INK,
-    MUTED,
-    RESIDUAL_COLOURS,
-    SURFACE,
-    base_layout,
-)
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, base_layout
+from paint_deposition.report.style import ACCENT, INK, MUTED
 
+SURFACE = '#c3c9cf'
 # Few readings beyond the end of the colours do not take the contrast from all others.
 SHOWN_SHARE = 0.98
 POINTS_A_PASS = 60
@@ -128,7 +123,7 @@ def _view(key: str, label: str, bar: str, titles: list[str]) -> dict[str, Any]:
     return {'key': key, 'label': label, 'bar': bar, 'titles': titles}
 
 
-def _geometry(surface, near: np.ndarray) -> dict[str, Any]:
+def _geometry(surface: Surface, near: np.ndarray) -> dict[str, Any]:
     kind = np.uint16 if len(surface.vertices_m) < 2**16 else np.int32
     faces = {'all': surface.faces, 'near': surface.faces[near], 'far': surface.faces[~near]}
     return {'vertices': _xyz(surface.vertices_m)} | {
@@ -148,7 +143,7 @@ def _mesh(faces: str, views: list[str], **more: Any) -> dict[str, Any]:
     return trace | more
 
 
-def _readings(data: ReportData, lifted_m, rows: slice, k: int) -> dict[str, Any]:
+def _readings(data: ReportData, lifted_m: np.ndarray, rows: slice, k: int) -> dict[str, Any]:
     residual = data.residuals_um[k][rows]
     measured = data.study.measured_um[rows]
     return {

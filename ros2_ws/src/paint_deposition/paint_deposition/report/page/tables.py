@@ -5,17 +5,18 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.diagnosis.verdict import Interval
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.parameters import PATTERN_NAMES
-from paint_deposition.report.page.data import ReportData
-from paint_deposition.report.page.words import (
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.words import (
     SYMBOLS,
-    effect_class_of,
     effect_meaning,
     effect_name,
     in_unit,
     number,
+    parameter_words,
     percent,
     percent_words,
     step_words,
@@ -23,65 +24,57 @@ from paint_deposition.report.page.words import (
 
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
-    """Candidate causes with their probability, rivals and parameters."""
+    """Candidate causes with their probability, confounded effects and parameters."""
     if data.diagnosis is None:
         return []
     rows = []
-    for found in data.diagnosis.classes:
-        effect = effect_class_of(found.best, *data.models)
+    for candidate in data.diagnosis.classes:
+        effect = data.effect_class(candidate.best)
         rows.append(
             {
-                'name': effect_name(found.best),
-                'id': found.best,
-                'others': [effect_name(m) for m in found.members if m != found.best],
-                'accepted': found.best in data.diagnosis.accepted,
-                'probability': percent(found.probability),
-                'probability_words': percent_words(found.probability),
-                'share': round(100.0 * found.probability, 1),
+                'name': effect_name(candidate.best),
+                'id': candidate.best,
+                'others': [effect_name(m) for m in candidate.members if m != candidate.best],
+                'accepted': candidate.best in data.diagnosis.accepted,
+                'probability': percent(candidate.probability),
+                'probability_words': percent_words(candidate.probability),
+                'share': round(100.0 * candidate.probability, 1),
                 'meaning': effect_meaning(effect),
                 'signature': effect.signature if effect else '',
                 'parameters': [
-                    _interval(effect, name, value) for name, value in found.parameters.items()
+                    _parameter(effect, name, found.value, found)
+                    for name, found in candidate.parameters.items()
                 ],
-                'holdout': found.holdout_rmse_um,
+                'holdout': candidate.holdout_rmse_um,
             }
         )
     return rows
 
 
-def _interval(effect: type[Effect] | None, name: str, value) -> dict[str, str]:
+def _parameter(
+    effect: type[Effect] | None, name: str, value: float, interval: Interval | None = None
+) -> dict[str, str]:
+    """A parameter in words, with its 95 % interval if there is one."""
     unit = effect.parameters()[name]['unit'] if effect else ''
-    shown, shown_unit = in_unit(value.value, unit)
-    factor = {'mm': 1e3, 'ms': 1e3}.get(shown_unit, 1.0)
-    return {
-        'name': name,
-        'words': _parameter_words(name),
-        'value': shown,
-        'low': number(factor * value.low),
-        'high': number(factor * value.high),
-        'unit': shown_unit,
-    }
-
-
-def _parameter_words(name: str) -> str:
-    for ending in ('_um', '_m', '_s', '_rad', '_per_pass'):
-        if name.endswith(ending):
-            name = name.removesuffix(ending)
-            break
-    return name.replace('_', ' ')
+    shown, shown_unit = in_unit(value, unit)
+    row = {'words': parameter_words(name, unit), 'value': shown, 'unit': shown_unit}
+    if interval is None:
+        return row
+    factor = 1e3 if shown_unit in ('mm', 'ms') else 1.0
+    low, high = number(factor * interval.low), number(factor * interval.high)
+    return row | {'low': low, 'high': high}
 
 
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
     intervals = _pattern_intervals(data)
-    rows = []
+    rows: list[dict[str, str]] = []
     for name in PATTERN_NAMES:
         symbol, words, unit = SYMBOLS[name]
         factor, shown = (1e3, 'mm') if unit == 'm' else (1.0, unit)
         row = {
             'symbol': symbol,
             'words': words,
-            'name': name,
             'unit': shown,
             'value': number(factor * getattr(data.model.planar, name), 4),
         }
@@ -104,15 +97,10 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for effect in data.model.effects:
         parameters = []
-        for name, info in type(effect).parameters().items():
-            value = known.get(effect.id, {}).get(name)
-            if value is not None:
-                parameters.append(_interval(type(effect), name, value))
-            else:
-                shown, unit = in_unit(getattr(effect, name), info['unit'])
-                parameters.append(
-                    {'name': name, 'words': _parameter_words(name), 'value': shown, 'unit': unit}
-                )
+        for name in effect.parameters():
+            found = known.get(effect.id, {}).get(name)
+            value = found.value if found else getattr(effect, name)
+            parameters.append(_parameter(type(effect), name, value, found))
         rows.append(
             {
                 'name': effect_name(effect.id),
@@ -128,16 +116,16 @@ def blind_rows(data: ReportData) -> list[dict[str, Any]]:
     """Effects that these readings could not show, and what would have been seen of others."""
     if data.diagnosis is None:
         return []
-    rows = []
+    rows: list[dict[str, Any]] = []
     accepted = set(data.diagnosis.accepted)
     for effect_id in (*data.diagnosis.not_testable, *data.diagnosis.detectable):
         if effect_id in accepted or effect_id in [row['id'] for row in rows]:
             continue
-        effect = effect_class_of(effect_id, *data.models)
+        effect = data.effect_class(effect_id)
         seen = data.diagnosis.detectable.get(effect_id, {})
         amplitudes = [
             {
-                'words': _parameter_words(name),
+                'words': parameter_words(name, info['unit']),
                 'least': _size(seen.get(name), info['unit']),
                 'usual': _size(info['typical'], info['unit']),
             }

@@ -1,21 +1,20 @@
-"""What charts drawn with matplotlib share: colours, quiet axes, and how they reach a file."""
+"""What charts drawn with matplotlib share: quiet axes, and how they reach a file."""
 
 from pathlib import Path
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from paint_deposition.files.atomic import replacing
-from paint_deposition.report.page.style import ACCENT, BEFORE, GRID, INK, MUTED
+from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED
 
 DOTS_PER_INCH = 150
+MM = 1e3
 MEASURED = INK
 MODEL = ACCENT
 COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
-MARK = '#c0392b'
-BAND = '#d9ecf0'
-__all__ = ('ACCENT', 'BAND', 'BEFORE', 'COMPONENTS', 'INK', 'MARK', 'MEASURED', 'MODEL', 'MUTED')
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
@@ -25,21 +24,19 @@ def new_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def quiet(axes: Axes, x_label: str, y_label: str, title: str = '') -> None:
-    """Thin grid, no box, labels in the muted colour."""
+def quiet(axes: Axes, x_label: str, y_label: str, title: str = '', size: float = 10.0) -> None:
+    """Thin grid, no box, labels in the muted colour and this size [pt]."""
     axes.grid(True, color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-    for side in ('top', 'right'):
-        axes.spines[side].set_visible(False)
-    for side in ('left', 'bottom'):
-        axes.spines[side].set_color(BEFORE)
-    axes.tick_params(colors=MUTED, labelsize=9)
-    axes.set_xlabel(x_label, color=MUTED, fontsize=10)
-    axes.set_ylabel(y_label, color=MUTED, fontsize=10)
-    axes.set_title(title, loc='left', fontsize=11, color=INK)
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.spines[['left', 'bottom']].set_color(BEFORE)
+    axes.tick_params(colors=MUTED, labelsize=size - 1.0)
+    axes.set_xlabel(x_label, color=MUTED, fontsize=size)
+    axes.set_ylabel(y_label, color=MUTED, fontsize=size)
+    axes.set_title(title, loc='left', fontsize=size + 1.0, color=INK)
 
 
-def legend(axes: Axes, **options: object) -> None:
+def legend(axes: Axes, **options: Any) -> None:
     """A legend without a frame."""
     axes.legend(frameon=False, fontsize=9, labelcolor=INK, **options)
 
@@ -47,5 +44,5 @@ def legend(axes: Axes, **options: object) -> None:
 def save_png(figure: Figure, path: str | Path) -> Path:
     """Write the figure, replacing an older file at once."""
     with replacing(path) as temporary:
-        figure.savefig(temporary, format='png', dpi=DOTS_PER_INCH)
+        figure.savefig(temporary, format='png', dpi=DOTS_PER_INCH, facecolor='white')
     return Path(path)

@@ -1,6 +1,5 @@
 """The painted part from the front: film as colour on the shaded surface, and the tool path."""
 
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,56 +16,26 @@ from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 
 from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
-from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import INK, MUTED, new_figure, save_png
+from paint_deposition.report.pictures.chart import new_figure, save_png
+from paint_deposition.report.pictures.view import SNAP_COSINE, View
+from paint_deposition.report.style import INK, MUTED
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].
 PART_IN = (7.6, 7.6)
 LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.75, 2.45, 0.6, 0.75
 LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.25, 0.24, 3.2
-# A view this close to an axis of the mesh is along it and has the mesh's coordinates.
-SNAP_COSINE = 0.9
-# Way of the gun around the part that is still shown [m].
+# Tool path around the part that is still shown [m].
 MARGIN_M = 0.18
 # Light from above left; how much a lean of the surface brightens or darkens it.
 LIGHT, CONTRAST = (-0.45, 0.75), 0.5
 DARKEST, BRIGHTEST = 0.55, 1.18
 ARROW_EVERY_M = 0.45
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
-
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
-
-
-@dataclass(frozen=True)
-class View:
-    """The directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer.
-
-    Attributes:
-        labels: names of the axes to the right and up.
-    """
-
-    right: np.ndarray
-    up: np.ndarray
-    toward: np.ndarray
-    labels: tuple[str, str]
-
-    @staticmethod
-    def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':
-        """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
-        toward, down = _snapped(outward), _snapped(down)
-        up = -down + (down @ toward) * toward
-        if np.linalg.norm(up) < 0.1:  # a part seen from straight above: its y is up
-            up = np.eye(3)[1] - toward[1] * toward
-        up /= np.linalg.norm(up)
-        right = np.cross(up, toward)
-        return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
-
-    def flat(self, points_m: np.ndarray) -> np.ndarray:
-        """(..., 2) where points (..., 3) lie in the picture [m]."""
-        return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
 
 
 def write_door_picture(
@@ -78,25 +47,18 @@ def write_door_picture(
     title: str = 'Film',
     subtitle: str = '',
 ) -> Path:
-    """Draw a painted part, replacing an older picture at once.
+    """Draw a painted part with the figures of its film, replacing an older picture at once.
 
     Args:
         path: PNG to write.
         film_um: (V,) film at the vertices of the surface [um].
-        spray: the way of the gun.
+        spray: the tool path.
         statistics: of the film.
         title, subtitle: what to write above.
     """
-    view = View.of_front(surface.outward, surface.down)
-    scale = film_scale(film_um)
-    corners = view.flat(surface.vertices_m)
-    low, high = _window(corners, view.flat(spray.position_m[spray.flow > 0.0]))
+    low, high = _window(surface, spray, View.of_surface(surface))
     figure, axes = _canvas(high - low)
-    _draw_surface(axes, surface, film_um, view, scale, statistics.painted_above_um)
-    _draw_gun(axes, spray, view, low, high)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    _dress(axes, view)
+    scale = draw_film(axes, surface, film_um, spray, statistics.painted_above_um)
     axes.set_title(title, loc='left', fontsize=13, color=INK, pad=24)
     axes.annotate(
         subtitle, (0.0, 1.0), xytext=(0, 9), xycoords='axes fraction',
@@ -105,6 +67,33 @@ def write_door_picture(
     bare = bool(np.any(film_um <= statistics.painted_above_um))
     _draw_legend(figure, scale, statistics, bare)
     return save_png(figure, path)
+
+
+def draw_film(
+    axes: Axes,
+    surface: Surface,
+    film_um: np.ndarray,
+    spray: SprayPath | None = None,
+    painted_above_um: float = DEFAULT_PAINTED_ABOVE_UM,
+) -> ColourScale:
+    """Draw a painted part on axes of your own, seen from the gun's side.
+
+    Args:
+        axes: their limits, aspect and labels are set.
+        film_um: (V,) film at the vertices of the surface [um].
+        spray: the tool path, drawn over the part if given.
+        painted_above_um: film that counts as painted; less is shown as bare metal.
+
+    Returns:
+        The scale of the colours.
+    """
+    view, spray = View.of_surface(surface), spray or SprayPath.empty()
+    scale = film_scale(film_um)
+    low, high = _window(surface, spray, view)
+    _dress(axes, view, low, high)
+    _draw_surface(axes, surface, film_um, view, scale, painted_above_um)
+    _draw_gun(axes, spray, view, low, high)
+    return scale
 
 
 def _canvas(extent_m: np.ndarray) -> tuple[Figure, Axes]:
@@ -118,8 +107,10 @@ def _canvas(extent_m: np.ndarray) -> tuple[Figure, Axes]:
     return figure, figure.add_axes((*(corner / size), width / size[0], height / size[1]))
 
 
-def _window(corners: np.ndarray, gun: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _window(surface: Surface, spray: SprayPath, view: View) -> tuple[np.ndarray, np.ndarray]:
     """Lowest and highest corner of the picture: the part, and the gun not far from it."""
+    corners = view.flat(surface.vertices_m)
+    gun = view.flat(spray.position_m[spray.flow > 0.0])
     low, high = corners.min(axis=0), corners.max(axis=0)
     if len(gun):
         low = np.maximum(np.minimum(low, gun.min(axis=0)), low - MARGIN_M)
@@ -139,16 +130,15 @@ def _draw_surface(
     normals = face_normals(surface.vertices_m, surface.faces)
     front = np.flatnonzero(normals @ view.toward > 0.0)
     depth = surface.vertices_m[surface.faces[front]].mean(axis=1) @ view.toward
-    triangles = Triangulation(
-        *view.flat(surface.vertices_m).T, surface.faces[front[np.argsort(depth)]]
-    )
+    right_m, up_m = view.flat(surface.vertices_m).T
+    triangles = Triangulation(right_m, up_m, surface.faces[front[np.argsort(depth)]])
     colours = scale.rgba(film_um, film_um > painted_above_um) / 255.0
     lean = surface.normals @ (LIGHT[0] * view.right + LIGHT[1] * view.up)
     shade = np.clip(1.0 + CONTRAST * lean, DARKEST, BRIGHTEST)[:, np.newaxis]
     colours[:, :3] = np.clip(colours[:, :3] * shade, 0.0, 1.0)
     axes.add_collection(TriMesh(triangles, facecolor=colours), autolim=False)
     _draw_contours(axes, triangles, film_um, scale)
-    axes.add_collection(LineCollection(view.flat(surface.rim_m), colors=INK, linewidths=0.8))
+    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.8))
 
 
 def _draw_contours(
@@ -161,7 +151,8 @@ def _draw_contours(
         return
     lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
     for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
-        label.set_path_effects(PALE_HALO)
+        # Level, or labels on upright lines would read upward here and downward there.
+        label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
 
 
 def _draw_gun(axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray) -> None:
@@ -192,19 +183,20 @@ def _draw_arrows(axes: Axes, line: np.ndarray) -> None:
     count = max(1, round(along[-1] / ARROW_EVERY_M))
     for middle in along[-1] * (np.arange(count) + 0.5) / count:
         row = max(1, int(np.searchsorted(along, middle)))
-        way = line[row] - line[row - 1]
-        turn = Affine2D().rotate(float(np.arctan2(way[1], way[0])) - 0.5 * np.pi)
+        right, up = line[row] - line[row - 1]
+        turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
         axes.plot(
             *line[row], marker=MarkerStyle('^', transform=turn), markersize=9,
             markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
         )  # fmt: skip
 
 
-def _dress(axes: Axes, view: View) -> None:
+def _dress(axes: Axes, view: View, low: np.ndarray, high: np.ndarray) -> None:
     axes.set_aspect('equal')
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
     axes.set_facecolor('white')
-    for side in ('top', 'right'):
-        axes.spines[side].set_visible(False)
+    axes.spines[['top', 'right']].set_visible(False)
     axes.tick_params(colors=MUTED, labelsize=9)
     axes.set_xlabel(view.labels[0], color=MUTED)
     axes.set_ylabel(view.labels[1], color=MUTED)
@@ -233,11 +225,11 @@ def _draw_legend(
     )
     bar.set_label('film thickness [µm]', color=MUTED)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.outline.set_visible(False)
+    bar.ax.spines['outline'].set_visible(False)
     top = (BOTTOM_IN + text_in) / height
     if bare:
         figure.legend(
-            handles=[Patch(color=np.array(BARE_RGB) / 255.0)],
+            handles=[Patch(color='#{:02x}{:02x}{:02x}'.format(*BARE_RGB))],
             labels=[f'below {statistics.painted_above_um:g} µm'],
             loc='upper left', bbox_to_anchor=((left - 0.1) / width, top), frameon=False,
             fontsize=9, labelcolor=MUTED, handlelength=1.2, handleheight=1.0, borderpad=0.2,
@@ -260,16 +252,3 @@ def _figures(s: FilmStatistics) -> list[str]:
             f'{100 * s.within_target:.0f} % within {s.target_um:g} ± {s.target_tolerance_um:g} µm'
         )
     return lines
-
-
-def _snapped(direction: np.ndarray) -> np.ndarray:
-    largest = int(np.abs(direction).argmax())
-    if abs(direction[largest]) < SNAP_COSINE:
-        return direction
-    return np.sign(direction[largest]) * np.eye(3)[largest]
-
-
-def _name(direction: np.ndarray, otherwise: str) -> str:
-    largest = int(np.abs(direction).argmax())
-    on_axis = abs(direction[largest]) > 1.0 - 1e-9
-    return f'{"xyz"[largest]} [m]' if on_axis else f'{otherwise} [m]'

@@ -1,4 +1,4 @@
-"""Colours and layout that all charts of the report share."""
+"""Layout that all charts of the report page share."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -6,16 +6,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.film.colour_tables import COOLWARM, VIRIDIS
+from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
 
-INK = '#1f2933'
-MUTED = '#616e7c'
-GRID = '#e4e7eb'
-BEFORE = '#9aa5b1'
-ACCENT = '#00708c'
-SURFACE = '#c3c9cf'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
-# 95 % of normally distributed readings lie within so many standard deviations.
-TWO_SIDED_95 = 1.96
 
 
 def plotly_scale(table: bytes, steps: int = 32) -> list[list[Any]]:

@@ -1,7 +1,7 @@
 """Figures and arrays that the report shows, computed once from the inference's results."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -12,6 +12,8 @@ from paint_deposition.comparison.profiles import Profile, profiles_of
 from paint_deposition.comparison.residual_field import point_residuals_um
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.study import Study
@@ -47,6 +49,7 @@ class ReportData:
         diagnosis: or None after a comparison alone.
         places, sprays: what to measure and spray next.
         history: of the model, oldest first, as in its file.
+        library: the effects that were looked for, by id, users' own among them.
     """
 
     study: Study
@@ -56,6 +59,7 @@ class ReportData:
     places: tuple[Place, ...] = ()
     sprays: tuple[Spray, ...] = ()
     history: tuple[Mapping[str, Any], ...] = ()
+    library: Mapping[str, type[Effect]] = field(default_factory=lambda: EFFECTS)
 
     @staticmethod
     def of(
@@ -65,6 +69,7 @@ class ReportData:
         places: Sequence[Place] = (),
         sprays: Sequence[Spray] = (),
         older: Sequence[Mapping[str, Any]] = (),
+        library: Mapping[str, type[Effect]] = EFFECTS,
     ) -> 'ReportData':
         """Put the results together; models between the first and the last are history."""
         chosen = [models[0], models[-1]] if len(models) > 1 else [models[0]]
@@ -76,7 +81,13 @@ class ReportData:
             tuple(places),
             tuple(sprays),
             tuple(history_as_list(study, diagnosis.history, older)) if diagnosis else (),
+            library,
         )
+
+    def effect_class(self, effect_id: str) -> type[Effect] | None:
+        """An effect of the library or of the models; None if it is neither."""
+        owned = {e.id: type(e) for model in self.models for e in model.effects}
+        return {**owned, **self.library}.get(effect_id)
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
@@ -93,6 +104,11 @@ class ReportData:
         """The best model."""
         return self.models[-1]
 
+    @property
+    def model_names(self) -> tuple[str, ...]:
+        """What the models are called where both are shown."""
+        return ('model before', 'model after') if self.improved else ('model',)
+
     @cached_property
     def residuals_um(self) -> list[np.ndarray]:
         """For each model (P,) at the points, averaged over repeats [um]."""
@@ -102,6 +118,11 @@ class ReportData:
     def rmse_um(self) -> list[float]:
         """For each model, over the points [um]."""
         return [float(np.sqrt(np.mean(r**2))) for r in self.residuals_um]
+
+    def errors_in_words(self, rows: np.ndarray) -> str:
+        """RMSE of each model at these points of the study."""
+        errors = [f'{np.sqrt(np.mean(r[rows] ** 2)):.2f}' for r in self.residuals_um]
+        return f'RMSE {" → ".join(errors)} µm'
 
     @cached_property
     def chi_square_per_point(self) -> list[float]:
@@ -162,9 +183,7 @@ def _change(difference_um: np.ndarray, area_m2: np.ndarray) -> Change:
     order = np.argsort(difference_um)
     share = np.cumsum(area_m2[order]) / area_m2.sum()
     tail = 0.5 * (1.0 - MOST_OF_THE_SURFACE)
-    least, most = (
-        float(difference_um[order[min(np.searchsorted(share, at), len(order) - 1)]])
-        for at in (tail, 1.0 - tail)
-    )
+    ends = np.minimum(np.searchsorted(share, [tail, 1.0 - tail]), len(order) - 1)
+    least, most = difference_um[order[ends]].tolist()
     rms = float(np.sqrt(np.average(difference_um**2, weights=area_m2)))
     return Change(min(least, 0.0), max(most, 0.0), rms)

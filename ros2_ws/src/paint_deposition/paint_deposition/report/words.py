@@ -5,16 +5,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.fitting.study import Study
 from paint_deposition.results.fitted_model import PATTERN, REFIT
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
     'incidence_deg': ('Incidence angle', 'deg'),
-    'standoff_ratio': ('Distance over Omega', '1'),
+    'standoff_ratio': ('Distance as a multiple of Omega', '1'),
     'curvature_per_m': ('Curvature, + concave', '1/m'),
     'edge_closeness': ('Closeness to an edge', '1'),
-    'sky_view_factor': ('Openness to the booth', '1'),
+    'sky_view_factor': ('Sky view factor', '1'),
     'height_fraction': ('Height on the part', '1'),
     'across_m': ('Position across', 'm'),
     'spray_pass': ('Pass that painted it', '1'),
@@ -26,7 +25,7 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
     'tool_y_m': ('Place in the pattern, y', 'm'),
     'film_um': ('Film predicted', 'µm'),
 }
-UNITS = {'um': 'µm', '1': '', 'cm3/s': 'cm³/s', '1/m': '1/m'}
+SUPERSCRIPTS = str.maketrans('-+0123456789', '⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹')
 SYMBOLS = {
     'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
     'K2': ('K2', 'weight of the centred Gaussian', ''),
@@ -57,18 +56,23 @@ def step_words(step: Mapping[str, Any]) -> str:
     return known.get(added) or f'+ {effect_name(added)}'
 
 
-def effect_class_of(effect_id: str, *models) -> type[Effect] | None:
-    """From the catalogue, or a user's own from the models in which it is."""
-    if effect_id in EFFECTS:
-        return EFFECTS[effect_id]
-    owners = (model.effect(effect_id) for model in models)
-    return next((type(effect) for effect in owners if effect is not None), None)
-
-
 def effect_meaning(effect: type[Effect] | None) -> str:
-    """The first line of what an effect says of itself."""
-    lines = (effect.__doc__ or '').strip().splitlines() if effect else []
-    return lines[0].strip() if lines else ''
+    """A sentence on an effect: the first line of its docstring, or what else it says of itself."""
+    if effect is None:
+        return ''
+    if effect.__doc__:
+        return effect.__doc__.strip().splitlines()[0]
+    described = [info['description'].split(' [')[0] for info in effect.parameters().values()]
+    return capital(next(filter(None, [effect.signature, *described]), '').rstrip('.') + '.')
+
+
+def parameter_words(name: str, unit: str) -> str:
+    """'shift_down_m' as 'shift down': its unit stands behind the value."""
+    units = {'per', *re.findall(r'[a-z]+\d*', unit)}
+    words = name.split('_')
+    while len(words) > 1 and words[-1] in units:
+        words.pop()
+    return ' '.join(words)
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -77,24 +81,41 @@ def number(value: float, digits: int = 3) -> str:
         return '0'
     text = f'{value:.{digits}g}'
     if 'e' in text and 1e-4 <= abs(value) < 1e6:
-        text = f'{value:.6f}'.rstrip('0').rstrip('.') if abs(value) < 1 else f'{value:.0f}'
+        return minus(f'{value:.0f}')
+    mantissa, _, exponent = text.partition('e')
+    power = f' × 10{str(int(exponent)).translate(SUPERSCRIPTS)}' if exponent else ''
+    return minus(mantissa) + power
+
+
+def minus(text: str) -> str:
+    """A number with the sign for minus."""
     return text.replace('-', '−')
+
+
+def capital(text: str) -> str:
+    """With a capital letter at the beginning."""
+    return text[:1].upper() + text[1:]
 
 
 def micrometres(value: float, signed: bool = False) -> str:
     """'2.31 µm'; with a sign if asked."""
     text = f'{value:+.2f}' if signed and abs(value) >= 0.005 else f'{value:.2f}'
     text = '0' if float(text) == 0.0 else text
-    return f'{text.replace("-", "−")} µm'
+    return f'{minus(text)} µm'
 
 
 def in_unit(value: float, unit: str) -> tuple[str, str]:
     """A parameter as number and unit; small lengths and times in mm and ms."""
-    if unit == 'm' and abs(value) < 1.0:
-        return number(1e3 * value), 'mm'
-    if unit == 's' and abs(value) < 1.0:
-        return number(1e3 * value), 'ms'
-    return number(value), UNITS.get(unit, unit)
+    if unit in ('m', 's') and abs(value) < 1.0:
+        return number(1e3 * value), f'm{unit}'
+    return number(value), unit_words(unit)
+
+
+def unit_words(unit: str) -> str:
+    """A unit as it is printed: 'um' as 'µm', '1/pass' as 'per pass', '' for a mere number."""
+    words = re.sub(r'\bum\b', 'µm', unit).replace('2', '²').replace('3', '³')
+    inverse = re.fullmatch(r'1/\(?(.+?)\)?', words)
+    return f'per {inverse[1]}' if inverse else words.removeprefix('1')
 
 
 def p_words(p_value: float) -> str:

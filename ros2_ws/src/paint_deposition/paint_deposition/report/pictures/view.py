@@ -1,0 +1,57 @@
+"""From where a picture shows a part: from the gun's side, gravity down."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.part.surface import Surface
+
+# A view this close to an axis of the mesh is along it and has the mesh's coordinates.
+SNAP_COSINE = 0.9
+
+
+@dataclass(frozen=True)
+class View:
+    """The directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer.
+
+    Attributes:
+        labels: names of the axes to the right and up.
+    """
+
+    right: np.ndarray
+    up: np.ndarray
+    toward: np.ndarray
+    labels: tuple[str, str]
+
+    @staticmethod
+    def of_surface(surface: Surface) -> 'View':
+        """From the gun's side of a part."""
+        return View.of_front(surface.outward, surface.down)
+
+    @staticmethod
+    def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':
+        """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
+        toward, down = _snapped(outward), _snapped(down)
+        up = -down + (down @ toward) * toward
+        if np.linalg.norm(up) < 0.1:  # a part seen from straight above: its y is up
+            up = np.eye(3)[1] - toward[1] * toward
+        up /= np.linalg.norm(up)
+        right = np.cross(up, toward)
+        return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
+
+    def flat(self, points_m: np.ndarray) -> np.ndarray:
+        """(..., 2) where points (..., 3) lie in the picture [m]."""
+        return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
+
+
+def _snapped(direction: np.ndarray) -> np.ndarray:
+    largest = int(np.abs(direction).argmax())
+    if abs(direction[largest]) < SNAP_COSINE:
+        return direction
+    return np.sign(direction[largest]) * np.eye(3)[largest]
+
+
+def _name(direction: np.ndarray, otherwise: str) -> str:
+    largest = int(np.abs(direction).argmax())
+    on_axis = abs(direction[largest]) > 1.0 - 1e-9
+    return f'{"xyz"[largest]} [m]' if on_axis else f'{otherwise} [m]'

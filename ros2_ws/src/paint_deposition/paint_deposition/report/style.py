@@ -1,0 +1,16 @@
+"""Colours and arrangement that the pictures and the report page share."""
+
+INK = '#1f2933'
+MUTED = '#616e7c'
+GRID = '#e4e7eb'
+BEFORE = '#9aa5b1'
+ACCENT = '#00708c'
+# 95 % of normally distributed readings lie within so many standard deviations.
+TWO_SIDED_95 = 1.96
+
+
+def charts_a_row(count: int) -> int:
+    """Two to four small charts in a row, so that few places stay empty."""
+    if count < 5:
+        return count if count < 4 else 2
+    return min((3, 4), key=lambda columns: -count % columns)
