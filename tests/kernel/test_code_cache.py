@@ -5,7 +5,7 @@ import pytest
 from numba import njit
 from numba.core.caching import IndexDataCacheFile
 
-from paint_deposition.kernel.code_cache import CodeCache, identity
+from paint_deposition.kernel.code_cache import identity, kept_on_disk
 
 RATE = 2.0
 
@@ -39,6 +39,20 @@ def test_the_name_covers_code_numbers_and_variant(monkeypatch):
     assert identity([law_that_names_a_number]) != before
 
 
+def calling(called):
+    @njit
+    def caller(x):
+        return called(x) + 1.0
+
+    return caller.py_func
+
+
+def test_the_name_covers_compiled_functions_that_are_called():
+    doubled, tripled = njit(lambda x: 2.0 * x), njit(lambda x: 3.0 * x)
+    assert identity([calling(doubled)]) == identity([calling(doubled)])
+    assert identity([calling(doubled)]) != identity([calling(tripled)])
+
+
 def scaling(factor):
     """A compiled function of its own for each factor, all of one name."""
 
@@ -46,8 +60,7 @@ def scaling(factor):
     def scaled(x):
         return factor * x
 
-    scaled._cache = CodeCache(scaled.py_func, identity([], factor))
-    return scaled
+    return kept_on_disk(scaled, [], factor)
 
 
 @pytest.fixture

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from paint_deposition.kernel.code_cache import CodeCache, identity
+from paint_deposition.kernel.code_cache import kept_on_disk
 from paint_deposition.kernel.fast_math import exp2
 from paint_deposition.kernel.laws import Law, product
 from paint_deposition.kernel.ray import Ray
@@ -164,6 +164,4 @@ def _compile(flux_factors, pattern_scales, shadowed, real):
 
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
-    name = identity(laws, counts, shadowed, real.__name__)
-    accumulate._cache = CodeCache(accumulate.py_func, name)
-    return accumulate
+    return kept_on_disk(accumulate, laws, counts, shadowed, real.__name__)

@@ -3,7 +3,7 @@
 import hashlib
 import inspect
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
@@ -14,7 +14,7 @@ import numpy as np
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 
-def identity(laws: list[Callable[..., float]], *variant: object) -> str:
+def identity(laws: Sequence[Callable[..., float]], *variant: object) -> str:
     """A name for the code of laws, of everything that is compiled with them, and the variant.
 
     Compiled code refers to the laws' modules by name, so those names are part of it: the module
@@ -67,6 +67,23 @@ def _fingerprint(code: CodeType) -> bytes:
     return code.co_code + repr((code.co_consts, code.co_names, code.co_varnames)).encode()
 
 
+def kept_on_disk(
+    compiled: Any, laws: Sequence[Callable[..., Any]] | None = None, *variant: object
+) -> Any:
+    """Keep a compiled function on disk, under a name that covers all that is compiled with it.
+
+    What it calls must be defined before it.
+
+    Args:
+        compiled: what ``numba.njit`` made.
+        laws: functions whose code tells this one from others of its file; default: its own.
+        variant: what else tells it from them.
+    """
+    functions = [compiled.py_func] if laws is None else laws
+    compiled._cache = CodeCache(compiled.py_func, identity(functions, *variant))
+    return compiled
+
+
 class CodeCache(FunctionCache):
     """Numba's cache on disk, for a function that depends on laws as well as on its own code.
 
@@ -84,7 +101,9 @@ class CodeCache(FunctionCache):
         super().__init__(function)
         self._identity = name
         stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(self._cache_path, f'kernel-{name}', stamp)
+        self._cache_file = IndexDataCacheFile(
+            self._cache_path, f'{function.__name__}-{name}', stamp
+        )
 
     def _index_key(self, sig: Any, codegen: Any) -> Any:
         return sig, codegen.magic_tuple(), self._identity

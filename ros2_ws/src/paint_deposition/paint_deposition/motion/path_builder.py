@@ -6,14 +6,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion import strokes
 from paint_deposition.motion.flow_schedule import FlowSchedule
 from paint_deposition.motion.look_ahead import look_ahead
 from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.screening import PoseScreen
+from paint_deposition.motion.spray_pass import first_pass, follow_passes
+from paint_deposition.motion.stroke import first_stroke, follow_strokes
 from paint_deposition.motion.sub_steps import split_segments
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.motion.trigger import first_trigger, follow_trigger
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
@@ -64,7 +66,7 @@ class PathBuilder:
         self._integrated_ns: int | None = None
         self._finished: list[SprayPath] = []
         self._gap_before_next = False
-        self._state: np.ndarray | None = None
+        self._states: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._held: list[SprayPath] = []
 
     @property
@@ -167,11 +169,17 @@ class PathBuilder:
         velocity: np.ndarray,
         after_gap: np.ndarray,
     ) -> None:
-        if self._state is None:
-            self._state = strokes.new_state(0.0 if self._flow else 1.0)
-        stroke, spray_pass, open_flow, since_on, since_off, from_turn = strokes.follow(
-            self._state, position, rotation[:, :, 2], velocity, dwell, flow, after_gap
+        if self._states is None:
+            flow_before = 0.0 if self._flow else 1.0
+            self._states = first_stroke(), first_pass(flow_before), first_trigger(flow_before)
+            after_gap[0] = False  # Nothing came before the first.
+        strokes, passes, trigger = self._states
+        normal = rotation[:, :, 2]
+        stroke, from_turn, heading, step = follow_strokes(
+            strokes, position, normal, velocity, dwell, after_gap
         )
+        spray_pass = follow_passes(passes, position, normal, heading, step, flow, after_gap)
+        open_flow, since_on, since_off = follow_trigger(trigger, dwell, flow, after_gap)
         unknown = np.full(len(stamp), np.inf)
         path = SprayPath(
             stamp_ns=stamp,

@@ -1,8 +1,21 @@
-"""The trigger: what a cell's report of its atomizer means for the flow."""
+"""The trigger: what a cell's report of its atomizer means for the flow, and when it changed."""
 
 import math
 
+import numpy as np
+from numba import njit
+
 from paint_deposition.errors import RecordingError
+
+TRIGGER_STATE = np.dtype(
+    [
+        ('flow', 'f8'),
+        ('open_flow', 'f8'),
+        ('dwell_s', 'f8'),
+        ('since_on_s', 'f8'),
+        ('since_off_s', 'f8'),
+    ]
+)
 
 
 def relative_flow(spraying: bool, flow: float = math.nan) -> float:
@@ -22,3 +35,44 @@ def relative_flow(spraying: bool, flow: float = math.nan) -> float:
     if flow < 0.0 or math.isinf(flow):
         raise RecordingError(f'atomizer flow is {flow}: give 1 for the calibrated flow, or NaN')
     return float(flow)
+
+
+def first_trigger(flow_before: float) -> np.ndarray:
+    """State before the first sub-step: (1,) record, from the flow that was on until then."""
+    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf)], TRIGGER_STATE)
+
+
+@njit(cache=True)
+def follow_trigger(states, dwell, flow, after_gap):
+    """Measure back to the last opening and closing of the gun; a gap forgets them.
+
+    Args:
+        states: (1,) record of dtype TRIGGER_STATE, updated in place.
+        dwell: (M,) duration of the sub-steps [s].
+        flow: (M,) relative to the calibrated flow; 0 is gun off.
+        after_gap: (M,) bool, whether poses are missing before the sub-step.
+
+    Returns:
+        open_flow (M,) of the opening that runs or ran last; since_on_s and since_off_s (M,) to
+        the middle of the sub-step, inf where there is nothing to measure to.
+    """
+    count = len(dwell)
+    open_flow, since_on, since_off = np.empty(count), np.empty(count), np.empty(count)
+    state = states[0]
+    for i in range(count):
+        if after_gap[i]:
+            state.flow = 0.0
+            state.since_on_s = state.since_off_s = np.inf
+        elapsed = 0.5 * (state.dwell_s + dwell[i])
+        state.since_on_s += elapsed
+        state.since_off_s += elapsed
+        if flow[i] > 0.0 and state.flow == 0.0:
+            state.since_on_s = 0.5 * dwell[i]
+        if flow[i] == 0.0 and state.flow > 0.0:
+            state.since_off_s = 0.5 * dwell[i]
+        if flow[i] > 0.0:
+            state.open_flow = flow[i]
+        state.flow, state.dwell_s = flow[i], dwell[i]
+        open_flow[i] = state.open_flow
+        since_on[i], since_off[i] = state.since_on_s, state.since_off_s
+    return open_flow, since_on, since_off

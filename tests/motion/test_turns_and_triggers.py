@@ -1,4 +1,4 @@
-"""Strokes and passes, and the distances to turns and trigger changes."""
+"""Strokes and passes of whole motions, and the distances to turns and trigger changes."""
 
 import numpy as np
 import pytest
