@@ -14,15 +14,19 @@ from paint_deposition.diagnosis.next_experiment import (
     propose_for,
 )
 from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Interval, Step
+from paint_deposition.effects.base import PathContext
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
+from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.effects.library.tcp_tilt import TcpTilt
+from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.fitting.parameters import Unknowns
 from paint_deposition.fitting.study import Study
+from paint_deposition.model.projection import Projection
 from paint_deposition.readings.campaign import Campaign
 
 ROLLED = 'the same passes with the gun rolled 180 deg about its axis'
@@ -125,3 +129,13 @@ def test_the_rivals_are_the_leading_explanations(study, fit):
     for diagnosis in (diagnosed(study, fit), diagnosed(study, fit, alone), settled):
         assert propose_for(diagnosis, EFFECTS) == ([], [])
     assert propose_for(diagnosed(study, fit, both), {}) == ([], [])
+
+
+@pytest.mark.parametrize('lag', [TriggerLag(rise_s=0.05, fall_s=0.05), PoseLag(lag_s=0.02)])
+def test_at_half_the_flow_the_tails_of_a_lag_are_half_too(study, lag):
+    experiment = study.campaign.experiments[0]
+    changed = MENU['the same passes at half the flow'](experiment.path, experiment)
+    surface = experiment.surface
+    context = PathContext(Projection(), surface.down, surface.outward, surface.centre_m)
+    usual = lag.on_path(experiment.path, context)
+    np.testing.assert_array_equal(lag.on_path(changed, context).flow, 0.5 * usual.flow)

@@ -188,7 +188,7 @@ def _single_passes_um(
     for number in np.unique(path.spray_pass[path.spray_pass >= 0]):
         inside = path.spray_pass == number
         integrator.reset()
-        integrator.add(path.with_(flow=path.flow * inside, open_flow=path.open_flow * inside))
+        integrator.add(path.with_flow_scaled(inside))
         yield integrator.raw_um
 
 

@@ -212,7 +212,7 @@ def _moved_off(distance_m: float) -> Callable[[SprayPath, Experiment], SprayPath
 
 
 def _half_flow(path: SprayPath, experiment: Experiment) -> SprayPath:
-    return path.with_(flow=0.5 * path.flow)
+    return path.with_flow_scaled(0.5)
 
 
 MENU: dict[str, Callable[[SprayPath, Experiment], SprayPath]] = {

@@ -57,6 +57,13 @@ class SprayPath:
         """Time sprayed, weighted by the relative flow [s]: K1 times this was emitted."""
         return float(np.sum(self.dwell_s * self.flow))
 
+    def with_flow_scaled(self, factor: float | np.ndarray) -> 'SprayPath':
+        """The same motion at another flow, times a factor or (M,) factors.
+
+        The flow of the opening is scaled too: what still flows after a closing tails off from it.
+        """
+        return self.with_(flow=factor * self.flow, open_flow=factor * self.open_flow)
+
     def select(self, rows: slice | np.ndarray) -> 'SprayPath':
         """The chosen rows, by mask, slice or indices."""
         return SprayPath(*(getattr(self, item.name)[rows] for item in fields(self)))

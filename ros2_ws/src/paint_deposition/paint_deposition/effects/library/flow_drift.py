@@ -33,4 +33,4 @@ class FlowDrift(Effect):
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         passes_before = np.maximum(path.spray_pass, 0)
         growth = (1.0 + self.drift_per_pass) ** (passes_before - MIDDLE_PASS)
-        return path.with_(flow=path.flow * growth)
+        return path.with_flow_scaled(growth)
