@@ -117,14 +117,3 @@ def test_what_the_screen_hides_loses_its_share(strength):
     assert hidden.sum() > 40
     np.testing.assert_allclose(film[hidden], (1.0 - strength) * plain[hidden], rtol=1e-9)
     np.testing.assert_allclose(film[seen], plain[seen], rtol=1e-9)
-
-
-def test_full_occlusion_is_the_model_with_shadows():
-    part, path = panel_with_screen(), path_of(serpentine((0.05,)))
-    shadows = MODEL.model_copy(
-        update={'projection': MODEL.projection.model_copy(update={'occlusion': True})}
-    )
-    np.testing.assert_array_equal(
-        painted(part, path, Occlusion(strength=1.0)).raw_um,
-        painted(part, path, model=shadows).raw_um,
-    )

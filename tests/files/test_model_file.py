@@ -12,11 +12,16 @@ from ruamel.yaml.error import YAMLError
 from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
-from paint_deposition.files.model_file import read_model, read_model_file, write_model
+from paint_deposition.files.model_file import (
+    ProjectionSection,
+    read_model,
+    read_model_file,
+    write_model,
+)
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
 
 
 @pytest.fixture
@@ -49,7 +54,7 @@ def test_the_default_model_is_that_of_the_configuration(repository: Path):
 
 def test_the_configuration_explains_every_parameter(repository: Path):
     lines = (repository / 'config' / 'model.yaml').read_text().splitlines()
-    for name in (*PlanarPattern.model_fields, *Projection.model_fields):
+    for name in (*PlanarPattern.model_fields, *ProjectionSection.model_fields):
         (line,) = [line for line in lines if line.strip().startswith(f'{name}:')]
         assert '#' in line, name
 
@@ -64,16 +69,26 @@ def test_every_effect_reads_back(effect, tmp_path: Path):
 NUMBERS = st.floats(1e-12, 1.0)
 
 
-@given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(0.0, 0.1), st.booleans())
-def test_numbers_read_back_to_the_bit(tmp_path_factory, k1, k2, sigma, shift, occlusion):
+@given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(0.0, 0.1))
+def test_numbers_read_back_to_the_bit(tmp_path_factory, k1, k2, sigma, shift):
     model = DepositionModel(
         planar=PlanarPattern(K1_cm3_per_s=k1, K2=k2, sigma1_m=sigma),
-        projection=Projection(occlusion=occlusion),
         effects=(EFFECTS['air_drift'](shift_down_m=shift),),
     )
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
     write_model(path, model)
     assert read_model(path) == model
+
+
+@pytest.mark.parametrize(
+    ('word', 'effects'), [('true', (Occlusion(strength=1.0),)), ('false', ())]
+)
+def test_shadows_of_the_projection_are_the_effect(tmp_path: Path, word, effects):
+    path = tmp_path / 'model.yaml'
+    path.write_text(f'projection: {{occlusion: {word}}}')
+    assert read_model(path) == DepositionModel(effects=effects)
+    write_model(path, read_model(path))
+    assert read_model(path) == DepositionModel(effects=effects)
 
 
 def test_the_text_is_plain_yaml_with_a_comment_on_every_number(tmp_path: Path):
@@ -137,6 +152,8 @@ def test_what_is_left_out_has_its_default(written):
         ('planar: [1]', 'planar is [1]; expected a mapping (key: value)'),
         ('planr: {}', "unknown key 'planr'; did you mean 'planar'"),
         ('projection: {occlusion: maybe}', "occlusion is 'maybe'; expected true or false"),
+        ('projection: {oclusion: true}', "unknown key 'oclusion'; did you mean 'occlusion'"),
+        ('{projection: {occlusion: true}, effects: [{id: occlusion}]}', 'keep the effect'),
         ('effects: {id: sag}', "effects is {'id': 'sag'}; expected a list"),
         ('effects: [sag]', "effects, entry 1 is 'sag'; expected a mapping"),
         ('effects: [{run_m: 0.1}]', 'effects, entry 1: has no id; give one of id, file'),

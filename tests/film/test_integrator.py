@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from booth import LOOKING_ALONG_Y, SAMPLES
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection, flux_um_per_s
+from paint_deposition.model.projection import flux_um_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -35,7 +36,7 @@ MODEL = DepositionModel()
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
 )
-SHADED = DepositionModel(projection=Projection(occlusion=True))
+SHADED = DepositionModel(effects=(Occlusion(strength=1.0),))
 
 
 def painted(points, motion, model=MODEL, precision='double', occluder=None):

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import NEAREST_M, Projection, flux_um_per_s
 from scenes import rotation_matrix
@@ -206,7 +207,7 @@ def test_the_model_joins_them():
     model = DepositionModel(planar=NARROW, projection=PROJECTION)
     assert model.reach_m == NARROW.radius_of_flux_m(1e-6)
     assert model.shadow == 0.0
-    assert DepositionModel(projection=Projection(occlusion=True)).shadow == 1.0
+    assert DepositionModel(effects=(Occlusion(strength=0.7),)).shadow == 0.7
     assert not model.needs_whole_strokes
     assert model.max_step_m == pytest.approx(0.0025)
     assert DepositionModel().max_step_m == pytest.approx(0.008)

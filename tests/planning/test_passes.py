@@ -12,7 +12,7 @@ from paint_deposition.planning.passes import (
     plan_pass,
     plan_passes,
 )
-from paint_deposition.planning.surface_map import SurfaceMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 from planning.test_surface_map import sheet
 
 STYLE = PassStyle(0.25, 0.3, acceleration_m_per_s2=2.0, overspray_m=0.2)
@@ -22,7 +22,7 @@ LINES_M = np.array([0.3, 0.0, -0.3])
 @pytest.fixture(scope='module')
 def bowed():
     surface = sheet(lambda x, z: 0.3 * x**2 + 0.2 * z**2)
-    return SurfaceMap(surface, part_axes(surface), 0.1)
+    return SurfaceMap(surface, pass_axes(surface), 0.1)
 
 
 @pytest.fixture(scope='module')

@@ -5,7 +5,7 @@ import pytest
 
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.surface_map import SurfaceMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
 
 def sheet(height, half_m=0.5, count=41) -> Surface:
@@ -24,25 +24,25 @@ def sheet(height, half_m=0.5, count=41) -> Surface:
 
 def test_axes_of_a_standing_part_seen_from_its_gun():
     surface = sheet(lambda x, z: 0.0 * x)
-    axes = part_axes(surface)
+    axes = pass_axes(surface)
     np.testing.assert_allclose(axes.outward, [0.0, -1.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(axes.travel, [1.0, 0.0, 0.0], atol=1e-9)
     np.testing.assert_allclose(axes.across, [0.0, 0.0, -1.0], atol=1e-9)
     np.testing.assert_allclose(np.cross(-axes.outward, axes.travel), axes.across, atol=1e-12)
-    vertical = part_axes(surface, 'vertical')
+    vertical = pass_axes(surface, 'vertical')
     np.testing.assert_allclose(vertical.travel, [0.0, 0.0, -1.0], atol=1e-9)
     np.testing.assert_allclose(np.cross(-vertical.outward, vertical.travel), vertical.across)
 
 
 def test_coordinates_go_there_and_back():
-    axes = part_axes(sheet(lambda x, z: 0.1 * x))
+    axes = pass_axes(sheet(lambda x, z: 0.1 * x))
     points = np.random.default_rng(0).normal(size=(20, 3))
     np.testing.assert_allclose(axes.points_m(axes.coordinates_m(points)), points, atol=1e-12)
 
 
 def test_a_plane_keeps_its_place_and_normal_to_its_edges():
     surface = sheet(lambda x, z: 0.2 * x - 0.1 * z)
-    surface_map = SurfaceMap(surface, part_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)
+    surface_map = SurfaceMap(surface, pass_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)
     u, v = (grid.ravel() for grid in np.meshgrid(*2 * [np.linspace(-0.45, 0.45, 15)]))
     places = surface_map.axes.points_m(np.stack([u, v, surface_map.height_m(u, v)], axis=1))
     deviation = places[:, 1] - (0.2 * places[:, 0] - 0.1 * places[:, 2])
@@ -56,11 +56,11 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
     ripple = sheet(lambda x, z: 0.004 * np.sin(2.0 * np.pi * x / 0.06), count=121)
     bow = sheet(lambda x, z: 0.5 * x**2)
     u = np.linspace(-0.35, 0.35, 200)
-    flat = SurfaceMap(ripple, part_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(
+    flat = SurfaceMap(ripple, pass_axes(ripple, outward=(0.0, -1.0, 0.0)), 0.15).height_m(
         u, 0.0 * u
     )
     assert np.ptp(flat) < 0.0015
-    surface_map = SurfaceMap(bow, part_axes(bow), 0.15)
+    surface_map = SurfaceMap(bow, pass_axes(bow), 0.15)
     height = surface_map.height_m(u, 0.0 * u)
     # Curved by 1/m toward the gun's far side; a Gaussian of half the radius lowers it evenly.
     assert height[0] - height[100] == pytest.approx(-0.5 * 0.35**2, rel=0.05)
@@ -68,7 +68,7 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
 
 def test_past_the_edge_height_and_normal_are_held():
     surface = sheet(lambda x, z: 0.3 * np.abs(x))
-    surface_map = SurfaceMap(surface, part_axes(surface), 0.08)
+    surface_map = SurfaceMap(surface, pass_axes(surface), 0.08)
     out = np.linspace(0.6, 2.0, 30)
     heights, normals = surface_map.height_m(out, 0.0 * out), surface_map.normals(out, 0.0 * out)
     assert np.ptp(heights) < 1e-3
@@ -83,7 +83,7 @@ def test_hidden_and_averted_surface_is_not_painted():
         np.concatenate([front.faces, back.faces + len(front.vertices_m)]),
         0.1,
     )
-    surface_map = SurfaceMap(both, part_axes(both), 0.1)
+    surface_map = SurfaceMap(both, pass_axes(both), 0.1)
     y = both.vertices_m[:, 1]
     assert surface_map.painted[y < 0.1].all()
     assert not surface_map.painted[y > 0.1].any()
@@ -93,7 +93,7 @@ def test_ends_of_a_slanted_part_follow_the_pass():
     surface = sheet(lambda x, z: 0.0 * x)
     cut = surface.faces[surface.vertices_m[surface.faces].mean(axis=1) @ [1.0, 0.0, 1.0] < 0.0]
     part = Surface.from_triangles(surface.vertices_m, cut, 0.05)
-    surface_map = SurfaceMap(part, part_axes(part), 0.05)
+    surface_map = SurfaceMap(part, pass_axes(part), 0.05)
     low, high = (np.ptp(surface_map.extent_near_m(z, 0.01)) for z in (0.4, -0.3))
     assert low > high + 0.4
 
@@ -101,17 +101,17 @@ def test_ends_of_a_slanted_part_follow_the_pass():
 def test_impossible_parts_are_refused():
     surface = sheet(lambda x, z: 0.0 * x)
     with pytest.raises(PlanError, match='horizontal or vertical'):
-        part_axes(surface, 'diagonal')
+        pass_axes(surface, 'diagonal')
     with pytest.raises(PlanError, match='length 0'):
-        part_axes(surface, outward=(0.0, 0.0, 0.0))
+        pass_axes(surface, outward=(0.0, 0.0, 0.0))
     with pytest.raises(PlanError, match='gravity points along the gun'):
-        part_axes(surface, outward=(0.0, 0.0, 1.0))
+        pass_axes(surface, outward=(0.0, 0.0, 1.0))
     with pytest.raises(PlanError, match='no surface faces the gun'):
-        SurfaceMap(surface, part_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
+        SurfaceMap(surface, pass_axes(surface, outward=(0.0, 1.0, 0.0)), 0.1)
     with pytest.raises(PlanError, match='smoothing_radius_m is 0'):
-        SurfaceMap(surface, part_axes(surface), 0.0)
+        SurfaceMap(surface, pass_axes(surface), 0.0)
     box = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
     faces = [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1],
              [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4], [1, 5, 7], [1, 7, 3]]  # fmt: skip
     with pytest.raises(PlanError, match='closed'):
-        part_axes(Surface.from_triangles(box, np.array(faces), 0.5))
+        pass_axes(Surface.from_triangles(box, np.array(faces), 0.5))

@@ -13,6 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.study import Study
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.axes import across_axis
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import STENCIL_M, Experiment
 
@@ -98,10 +99,7 @@ def _axes(experiment: Experiment, members: np.ndarray) -> tuple[np.ndarray, np.n
     surface = experiment.surface
     positions = experiment.points.positions_m[members]
     height = -positions @ surface.down - (-surface.vertices_m @ surface.down).min()
-    across = np.cross(surface.outward, surface.down)
-    length = np.linalg.norm(across)
-    across = across / length if length > 1e-3 else np.array([1.0, 0.0, 0.0])
-    return height, (positions - surface.centre_m) @ across
+    return height, (positions - surface.centre_m) @ across_axis(surface.outward, surface.down)
 
 
 def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray]]:

@@ -11,6 +11,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from paint_deposition.kernel.ray import Ray as Ray
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
@@ -36,20 +37,12 @@ class PathContext:
     @property
     def across(self) -> np.ndarray:
         """(3,) horizontal unit vector along the part, to the right as the gun sees it."""
-        across = np.cross(self.outward, self.down)
-        length = np.linalg.norm(across)
-        if length > 1e-3:
-            return across / length
-        # A part that lies flat has no right side: take the mesh's x, or y if x is vertical.
-        axis = np.eye(3)[0] if abs(self.down[0]) < 0.9 else np.eye(3)[1]
-        level = axis - (axis @ self.down) * self.down
-        return level / np.linalg.norm(level)
+        return across_axis(self.outward, self.down)
 
     @property
     def downhill(self) -> np.ndarray:
         """(3,) unit vector down along the part, at right angles to ``across`` and ``outward``."""
-        downhill = np.cross(self.across, self.outward)
-        return downhill / np.linalg.norm(downhill)
+        return downhill_axis(self.outward, self.down)
 
 
 def parameter(

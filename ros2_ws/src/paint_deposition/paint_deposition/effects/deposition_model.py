@@ -40,8 +40,7 @@ class DepositionModel(BaseModel):
     @property
     def shadow(self) -> float:
         """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
-        strengths = [effect.shadow() for effect in self.effects]
-        return 1.0 if self.projection.occlusion else max(strengths, default=0.0)
+        return max((effect.shadow() for effect in self.effects), default=0.0)
 
     @property
     def max_step_m(self) -> float:

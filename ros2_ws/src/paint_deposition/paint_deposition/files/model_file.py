@@ -5,11 +5,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, TypeVar
 
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, Field, ValidationError
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
@@ -19,12 +20,19 @@ from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 
-SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
 WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
-KEYS = ('name', *SECTIONS, 'effects', 'uncertainty', 'history')
+KEYS = ('name', 'planar', 'projection', 'effects', 'uncertainty', 'history')
 
 LoadEffect = Callable[[Path], type[Effect]]
 Made = TypeVar('Made', bound=BaseModel)
+
+
+class ProjectionSection(Projection):
+    """Eq. (2) as a file gives it, with a key that stands for an effect."""
+
+    occlusion: bool = Field(
+        False, description='whether the effect occlusion is added, at full strength'
+    )
 
 
 @dataclass(frozen=True)
@@ -97,10 +105,16 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     for key in content:
         if key not in KEYS:
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
-    sections = {key: _section(key, content.get(key)) for key in SECTIONS}
+    planar = _section(PlanarPattern, 'planar', content)
+    projection = _section(ProjectionSection, 'projection', content)
     effects = _effects(content.get('effects'), load)
+    if projection.occlusion:
+        if any(effect.id == Occlusion.id for effect in effects):
+            raise ModelError('occlusion is given in projection and in effects; keep the effect')
+        effects = (*effects, Occlusion(strength=1.0))
+    eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     return ModelFile(
-        DepositionModel(**sections, effects=effects),
+        DepositionModel(planar=planar, projection=eq_2, effects=effects),
         _of_type('name', content.get('name'), str, ''),
         _of_type('uncertainty', content.get('uncertainty'), dict, {}),
         _history(content.get('history')),
@@ -114,8 +128,8 @@ def _history(entries: Any) -> list[dict[str, Any]]:
     ]
 
 
-def _section(key: str, values: Any) -> BaseModel:
-    return _made(SECTIONS[key], key, _of_type(key, values, dict, {}))
+def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:
+    return _made(cls, key, _of_type(key, content.get(key), dict, {}))
 
 
 def _effects(entries: Any, load: Callable[[str], type[Effect]]) -> tuple[Effect, ...]:

@@ -10,7 +10,7 @@ NEAREST_M = 1e-3
 
 
 class Projection(BaseModel):
-    """Where the virtual emission point and the model plane lie, and whether there are shadows."""
+    """Where the virtual emission point and the model plane lie."""
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
 
@@ -20,7 +20,6 @@ class Projection(BaseModel):
     emission_offset_m: float = Field(
         0.05, ge=-1.0, le=5.0, description='emission point behind the TCP, along -z [m]'
     )
-    occlusion: bool = Field(False, description='trace line of sight from the emission point')
 
     @property
     def nominal_standoff_m(self) -> float:

@@ -27,8 +27,9 @@ class LineFilms:
     """Film at points spread evenly over the painted side, for passes along many lines.
 
     Args:
-        surface: the part. surface: its smoothed surface.
-        model: effects on the finished film are left out.
+        surface: the part.
+        surface_map: its smoothed surface.
+        model: shadows and effects on the finished film are left out.
         style: how passes are run.
         finest_m: scale on which the film changes across a pass [m].
         beyond_m: lines are laid this far past the part's edges [m].
@@ -54,10 +55,7 @@ class LineFilms:
         self.lines_m = np.linspace(
             self.low_m, self.high_m, math.ceil((self.high_m - self.low_m) / step) + 1
         )
-        bare = model.model_copy(
-            update={'projection': model.projection.model_copy(update={'occlusion': False})}
-        )
-        integrator = FilmIntegrator(points, bare)
+        integrator = FilmIntegrator(points, model)
         longest = finest_m / STEPS_PER_SIGMA
         # Slower poses would be gaps, at which the gun is off.
         rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)

@@ -25,7 +25,7 @@ from paint_deposition.planning.passes import (
     plan_passes,
 )
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.surface_map import SurfaceMap, part_axes
+from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
@@ -180,7 +180,7 @@ def plan(
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    axes = part_axes(surface, request.direction, _vector(request.outward))
+    axes = pass_axes(surface, request.direction, _vector(request.outward))
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
     (first, last), extent = surface_map.extent_m
     height = float(extent[1] - extent[0])

@@ -9,6 +9,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
 from paint_deposition.errors import PlanError
+from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 # Surface that leans further from the gun's side than this is not painted from it.
@@ -24,7 +25,7 @@ LIFT_M = 1e-3
 
 
 @dataclass(frozen=True)
-class PartAxes:
+class PassAxes:
     """Axes in which passes are laid, seen from the gun's side.
 
     Attributes:
@@ -53,9 +54,9 @@ class PartAxes:
         return np.stack([self.travel, self.across, self.outward], axis=1)
 
 
-def part_axes(
+def pass_axes(
     surface: Surface, direction: str = 'horizontal', outward: np.ndarray | None = None
-) -> PartAxes:
+) -> PassAxes:
     """Axes for horizontal or vertical passes.
 
     Args:
@@ -80,17 +81,14 @@ def part_axes(
     if not np.linalg.norm(outward) > 0.0:
         raise PlanError('outward is a vector of length 0; give the direction to the gun')
     outward = outward / np.linalg.norm(outward)
-    down = surface.down - (surface.down @ outward) * outward
-    if np.linalg.norm(down) < 0.1:
+    if np.linalg.norm(np.cross(outward, surface.down)) < 0.1:
         raise PlanError(
             'gravity points along the gun: level is not defined; give gravity in the plane of '
             'the part (down)'
         )
-    down /= np.linalg.norm(down)
-    level = np.cross(outward, down)
-    centre = 0.5 * (surface.vertices_m.min(axis=0) + surface.vertices_m.max(axis=0))
-    travel = level if direction == 'horizontal' else down
-    return PartAxes(centre, travel, np.cross(-outward, travel), outward)
+    toward = across_axis if direction == 'horizontal' else downhill_axis
+    travel = toward(outward, surface.down)
+    return PassAxes(surface.centre_m, travel, np.cross(-outward, travel), outward)
 
 
 class SurfaceMap:
@@ -105,7 +103,7 @@ class SurfaceMap:
         radius_m: what is finer than this is smoothed away [m].
     """
 
-    def __init__(self, surface: Surface, axes: PartAxes, radius_m: float) -> None:
+    def __init__(self, surface: Surface, axes: PassAxes, radius_m: float) -> None:
         if not (math.isfinite(radius_m) and radius_m > 0.0):
             raise PlanError(f'smoothing_radius_m is {radius_m:g}; give a number above 0')
         self.axes = axes
@@ -201,7 +199,7 @@ class SurfaceMap:
         return share * held + (1.0 - share) * blended
 
 
-def _in_front(surface: Surface, axes: PartAxes) -> np.ndarray:
+def _in_front(surface: Surface, axes: PassAxes) -> np.ndarray:
     """(V,) whether nothing of the part lies between the vertex and the gun's side."""
     starts = surface.vertices_m + LIFT_M * axes.outward
     directions = np.broadcast_to(axes.outward, starts.shape)

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.effects.base import PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.part.axes import across_axis
 from paint_deposition.readings.campaign import Experiment
 
 # Edge effects reach a few centimetres; the covariate flattens out beyond this length [m].
@@ -86,7 +86,6 @@ def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> li
     count = len(experiment)
     points = experiment.points.select(slice(0, count))
     path = experiment.path.select(rays.rows)
-    part = PathContext(model.projection, points.down, points.outward, points.centre_m)
     start_ns = path.stamp_ns[0] if len(path) else 0
     seconds = (path.stamp_ns - start_ns) * 1e-9
     incidence = np.degrees(np.arccos(np.clip(rays.mean(rays.cos_incidence), -1.0, 1.0)))
@@ -99,7 +98,7 @@ def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> li
         Covariate('edge_closeness', np.exp(-points.edge_distance_m / EDGE_LENGTH_M)),
         Covariate('sky_view_factor', points.sky_view_factor),
         Covariate('height_fraction', points.height_fraction),
-        Covariate('across_m', points.positions_m @ part.across),
+        Covariate('across_m', points.positions_m @ across_axis(points.outward, points.down)),
         Covariate('spray_pass', rays.mean(path.spray_pass[:, np.newaxis])),
         Covariate('time_s', rays.mean(seconds[:, np.newaxis])),
         Covariate('speed_m_per_s', rays.mean(path.speed_m_per_s[:, np.newaxis])),

@@ -8,6 +8,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import TABLE, ColourScale
+from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 STEPS = 64
@@ -16,13 +17,8 @@ LABELS = 5
 
 def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
     """A bar in the scale's colours with values beside it, upright at the side of the part."""
-    up = -surface.down
-    outward = surface.points().outward
-    across = np.cross(up, outward)
-    if np.linalg.norm(across) < 1e-3:
-        across = np.cross(up, np.eye(3)[int(np.argmin(np.abs(up)))])
-    across /= np.linalg.norm(across)
-    up = np.cross(outward, across)
+    across = across_axis(surface.outward, surface.down)
+    up = -downhill_axis(surface.outward, surface.down)
     heights, widths = surface.vertices_m @ up, surface.vertices_m @ across
     size = float(np.ptp(heights)) or float(np.ptp(widths))
     corner = (

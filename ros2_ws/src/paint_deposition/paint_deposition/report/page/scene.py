@@ -10,6 +10,7 @@ import numpy as np
 from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.film.colour_scales import round_up
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
@@ -29,6 +30,8 @@ TRUE_COLOURS = SHADED | {'ambient': 1.0, 'diffuse': 0.2}
 # Plotly's camera sees 45 deg from bottom to top.
 TAN_HALF_VIEW, ROOM_AROUND = float(np.tan(np.pi / 8.0)), 1.06
 PANE_ASPECT = 1.36
+# A part whose outward side leans less toward the vertical than this is looked at upright.
+STANDING = 0.98
 
 
 def scene_data(data: ReportData, index: int) -> dict[str, Any]:
@@ -218,12 +221,10 @@ def _scene(
         aspect: width of the pane over its height.
     """
     surface = experiment.surface
-    outward, up = surface.outward, -surface.down
-    across = np.cross(up, outward)
-    upright = np.linalg.norm(across) > 0.2
-    if not upright:
-        across = np.cross(np.eye(3)[np.argmin(np.abs(outward))], outward)
-        up = np.cross(outward, across)
+    outward, down = surface.outward, surface.down
+    upright = abs(outward @ down) < STANDING
+    across = across_axis(outward, down)
+    up = -down if upright else -downhill_axis(outward, down)
     gaze = outward + (0.16 * across + 0.10 * up if upright else -0.4 * up)
     gaze /= np.linalg.norm(gaze)
     low, high = shown_m.min(axis=0), shown_m.max(axis=0)
