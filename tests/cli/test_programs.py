@@ -10,7 +10,7 @@ from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.planning.planned_move import PlannedMove
+from paint_deposition.planning.pass_motion import PlannedMove
 from scenes import straight_pass
 
 

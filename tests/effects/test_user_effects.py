@@ -42,6 +42,25 @@ def test_the_sample_is_short_and_paints_less_the_faster_the_gun():
     np.testing.assert_allclose(film, plain * np.exp(-0.4 * 0.5), atol=1e-9 * plain.max())
 
 
+@pytest.mark.parametrize(
+    'line',
+    [
+        'from paint_deposition.film.fast_math import exp',
+        'from paint_deposition.film import fast_math',
+    ],
+)
+def test_an_import_of_a_module_that_has_moved_is_answered_with_its_new_place(own, line):
+    path = own(('from paint_deposition.kernel.fast_math import exp', line))
+    with pytest.raises(ModelError, match=r'line \d.*import paint_deposition\.kernel\.fast_math$'):
+        load_effect_file(path)
+
+
+def test_an_import_of_what_never_was_is_the_files_to_correct(own):
+    path = own(('paint_deposition.kernel.fast_math', 'paint_deposition.kernel.slow_math'))
+    with pytest.raises(ModelError, match='slow_math.*; correct the file$'):
+        load_effect_file(path)
+
+
 def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     path = own(
         ('* ray.speed_m_per_s', '* ray.standoff_ratio'),

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from paint_deposition.part.identity import mesh_id
 from paint_deposition.part.surface import Surface
 
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype=float)
@@ -13,8 +12,8 @@ FACES = np.array([[0, 1, 2], [0, 2, 3]])
 
 def test_the_same_mesh_has_the_same_name():
     one, other = (Surface.from_triangles(CORNERS, FACES, 0.2) for _ in range(2))
-    assert mesh_id(one) == mesh_id(other)
-    assert len(mesh_id(one)) == 16
+    assert one.mesh_id == other.mesh_id
+    assert len(one.mesh_id) == 16
 
 
 def test_another_refinement_place_or_winding_is_another_mesh():
@@ -24,4 +23,4 @@ def test_another_refinement_place_or_winding_is_another_mesh():
         Surface.from_triangles(CORNERS + 1e-9, FACES, 0.2),
         replace(part, faces=part.faces[:, ::-1]),
     ]
-    assert len({mesh_id(surface) for surface in (part, *others)}) == 4
+    assert len({surface.mesh_id for surface in (part, *others)}) == 4

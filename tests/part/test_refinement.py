@@ -49,7 +49,7 @@ def test_slivers_and_all_stay_one_surface(seed):
     assert not len(Edges.of(refined).clashing)
 
 
-def test_a_needle_is_cut_into_pieces_as_wide_as_itself():
+def test_a_sliver_is_cut_into_pieces_as_wide_as_itself():
     vertices = np.array([[0.0, 0, 0], [1.0, 0, 0], [1.0, 0, 0.016]])
     fine, _, faces = refine(vertices, np.tile([0.0, -1, 0], (3, 1)), np.array([[0, 1, 2]]), 0.02)
     assert face_areas_m2(fine, faces).sum() == pytest.approx(0.008)

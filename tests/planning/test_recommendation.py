@@ -107,7 +107,7 @@ def test_passes_cover_the_width_to_its_edges():
         )
         for count in (answer.passes, answer.passes - 1)
     )
-    least = answer.curve.raster.thickness_um(answer.index_m, np.linspace(0, 1, 201)).min()
+    least = answer.curve.parallel.thickness_um(answer.index_m, np.linspace(0, 1, 201)).min()
     assert film.min() >= 0.949 * least
     assert fewer.min() < 0.95 * least
     strokes = answer.passes * width + (answer.passes - 1) * answer.index_m

@@ -10,7 +10,7 @@ from paint_deposition.files.rapid.motion import program_trajectory
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.planning.planned_move import PlannedMove
+from paint_deposition.planning.pass_motion import PlannedMove
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 

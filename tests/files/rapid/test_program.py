@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.rapid.program import GunSwitch, RapidProgram, read_program
 from paint_deposition.files.rapid.writer import module_text
-from paint_deposition.planning.planned_move import PlannedMove
+from paint_deposition.planning.pass_motion import PlannedMove
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 IDENTITY = [0.0, 0.0, 0.0, 1.0]

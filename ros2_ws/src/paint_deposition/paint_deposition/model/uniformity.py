@@ -38,7 +38,7 @@ class ParallelPasses:
         return self.first is self.second
 
     def mean_um(self, index_m: float) -> float:
-        """Mean film of the raster [um]: the area of a pass spread over the index."""
+        """Mean film [um]: the area of a pass spread over the index."""
         return 0.5 * (self.first.area_um_m + self.second.area_um_m) / index_m
 
     def period_m(self, index_m: float) -> float:
@@ -78,7 +78,7 @@ class ParallelPasses:
 def sigma_n_closed_form(collapse: ThreeGaussianCollapse, index_m: float) -> float:
     """Eq. (5) for eq. (3) without quadrature.
 
-    By Poisson's sum the raster's Fourier coefficients are the collapse's spectrum at multiples of
+    By Poisson's sum the film's Fourier coefficients are the collapse's spectrum at multiples of
     2 pi / index, and by Parseval's theorem its variance is the sum of their squares.
     """
     most = math.sqrt(-2.0 * math.log(SPECTRUM_LIMIT)) / collapse.finest_m

@@ -6,7 +6,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from paint_deposition.errors import MeshError
-from paint_deposition.part.slivers import CutEdges, cut_edges, cut_needles, find_needles
+from paint_deposition.part.slivers import CutEdges, cut_edges, cut_slivers, find_slivers
 
 WELD_M = 1e-6
 MAX_TRIANGLES = 4_000_000
@@ -59,7 +59,7 @@ def refine(
     An edge is halved for both its triangles at once, so no cracks open, and a triangle only ever
     together with its own longest edge, which keeps every angle above half the smallest one given
     (Rivara, Mesh refinement processes based on the generalized bisection of simplices, 1984);
-    needles are cut across instead. Normals go along and are interpolated, so that a coarse
+    slivers are cut across instead. Normals go along and are interpolated, so that a coarse
     triangulation of a curved surface keeps the normals of the curve.
 
     Args:
@@ -85,10 +85,10 @@ def refine(
         in_step = known.max() < 0
         if in_step and not too_long.any():
             return mesh.vertices_m, mesh.normals, faces
-        thin = find_needles(length_m[of_face], max_edge_length_m)
+        thin = find_slivers(length_m[of_face], max_edge_length_m)
         if in_step and len(thin):
             cut = cut_edges(of_face[thin], length_m, max_edge_length_m, len(mesh.vertices_m))
-            pieces = cut_needles(faces[thin], of_face[thin], length_m, cut)
+            pieces = cut_slivers(faces[thin], of_face[thin], length_m, cut)
             mesh.add_cuts(edges, cut)
             faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
             continue
@@ -105,7 +105,7 @@ def refine(
 class _Growing:
     """Vertices with normals, to which middles of edges are added.
 
-    Once a needle's edge was cut ahead of its neighbour's, the middles that the neighbour has to
+    Once a sliver's edge was cut ahead of its neighbour's, the middles that the neighbour has to
     meet are remembered.
     """
 

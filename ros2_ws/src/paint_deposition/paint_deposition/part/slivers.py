@@ -1,7 +1,7 @@
-"""Cutting needles, long triangles on a short base, crosswise in one go.
+"""Cutting slivers, long triangles on a short base, crosswise in one go.
 
-Halving edges keeps a needle's pieces as thin as itself, and their number grows with the square of
-its length. Cut across into rungs, a needle gives pieces as wide as its base.
+Halving edges keeps a sliver's pieces as thin as itself, and their number grows with the square of
+its length. Cut across into rungs, a sliver gives pieces as wide as its base.
 """
 
 from dataclasses import dataclass
@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-# How many times longer than its base a needle's sides are.
+# How many times longer than its base a sliver's sides are.
 SLENDERNESS = 3.0
 
 
@@ -48,24 +48,24 @@ class CutEdges:
         return np.concatenate(lower), np.concatenate(upper), np.concatenate(middle)
 
 
-def find_needles(lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
-    """(N,) rows of (F, 3) triangle sides that are needles with both long sides too long."""
+def find_slivers(lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
+    """(N,) rows of (F, 3) triangle sides that are slivers with both long sides too long."""
     base, side, _ = np.sort(lengths_m, axis=1).T
     return np.flatnonzero(side > np.maximum(SLENDERNESS * base, max_edge_length_m))
 
 
 def cut_edges(
-    of_needles: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float, next_vertex: int
+    of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float, next_vertex: int
 ) -> CutEdges:
-    """Cut the long sides of needles into pieces about as long as their base.
+    """Cut the long sides of slivers into pieces about as long as their base.
 
     Args:
-        of_needles: (N, 3) edges of the needles.
+        of_slivers: (N, 3) edges of the slivers.
         lengths_m: (E,) lengths of all edges [m].
         max_edge_length_m: no need for shorter pieces than this [m].
         next_vertex: number that the first new vertex gets.
     """
-    in_order = np.take_along_axis(of_needles, lengths_m[of_needles].argsort(axis=1), axis=1)
+    in_order = np.take_along_axis(of_slivers, lengths_m[of_slivers].argsort(axis=1), axis=1)
     piece_m = np.maximum(lengths_m[in_order[:, :1]], max_edge_length_m)
     sides = in_order[:, 1:]
     parts = np.ones(len(lengths_m), dtype=np.int64)
@@ -74,16 +74,16 @@ def cut_edges(
     return CutEdges(parts, next_vertex + np.cumsum(parts - 1) - (parts - 1))
 
 
-def cut_needles(
-    needles: np.ndarray, of_needles: np.ndarray, lengths_m: np.ndarray, cut: CutEdges
+def cut_slivers(
+    slivers: np.ndarray, of_slivers: np.ndarray, lengths_m: np.ndarray, cut: CutEdges
 ) -> np.ndarray:
-    """Pieces (P, 3) of needles (N, 3) whose sides (N, 3) are edges of lengths_m (E,)."""
-    base = lengths_m[of_needles].argmin(axis=1)
+    """Pieces (P, 3) of slivers (N, 3) whose sides (N, 3) are edges of lengths_m (E,)."""
+    base = lengths_m[of_slivers].argmin(axis=1)
     # From the tip opposite the base, with the same winding.
     turn = (base[:, None] + np.array([2, 0, 1])) % 3
-    rows = np.arange(len(needles))[:, None]
-    tip, left, right = needles[rows, turn].T
-    sides = of_needles[rows, turn]
+    rows = np.arange(len(slivers))[:, None]
+    tip, left, right = slivers[rows, turn].T
+    sides = of_slivers[rows, turn]
     left_edge, right_edge = sides[:, 0], sides[:, 2]
     counts = np.stack([cut.parts[left_edge], cut.parts[right_edge]], axis=1)
     pieces = []

@@ -1,5 +1,6 @@
 """The part's surface as a refined triangle mesh, and where points lie on it."""
 
+import hashlib
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any
@@ -95,6 +96,14 @@ class Surface:
             notes,
             in_hem=hems.carried_over(strip, fine, len(vertices)),
         )
+
+    @cached_property
+    def mesh_id(self) -> str:
+        """Digest of the refined mesh: the same for the same vertices and faces in one order."""
+        digest = hashlib.sha256()
+        digest.update(self.vertices_m.astype('<f8').tobytes())
+        digest.update(self.faces.astype('<i8').tobytes())
+        return digest.hexdigest()[:16]
 
     @property
     def area_m2(self) -> float:

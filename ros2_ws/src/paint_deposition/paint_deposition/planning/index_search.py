@@ -1,20 +1,27 @@
-"""Evenness over the index: its curve, its minima, and the windows within a tolerance."""
+"""Evenness over the index: its curve and minima, and how far a tolerance lets it drift."""
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.planning.plane_passes import PassSetup
 
 FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
 # Where a window ends is found to this [m].
 PRECISION_M = 1e-7
+# Drift is followed as far as these shares of the right value.
+LEAST, MOST = 0.4, 1.8
+STEPS = 100
+# With effects each step costs a pass through the integrator.
+STEPS_WITH_EFFECTS = 12
 
 
 @dataclass(frozen=True)
@@ -27,29 +34,29 @@ class Minimum:
 
 @dataclass(frozen=True)
 class IndexCurve:
-    """sigma_n over the index for one raster.
+    """sigma_n over the index of parallel passes.
 
     Attributes:
-        raster: what is evaluated.
+        parallel: the passes.
         index_m: (N,) increasing [m]. sigma_n: (N,).
         minima: refined local minima inside the range, by index.
     """
 
-    raster: ParallelPasses
+    parallel: ParallelPasses
     index_m: np.ndarray
     sigma_n: np.ndarray
     minima: tuple[Minimum, ...]
 
     @staticmethod
-    def of(raster: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':
+    def of(parallel: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':
         """Sample a range finely enough to see every minimum, and refine those."""
-        finest = min(raster.first.finest_m, raster.second.finest_m)
+        finest = min(parallel.first.finest_m, parallel.second.finest_m)
         count = math.ceil((high_m - low_m) / finest * POINTS_PER_SCALE)
         index = np.linspace(low_m, high_m, min(max(count, FEWEST_POINTS), MOST_POINTS))
-        sigma = np.array([raster.sigma_n(value) for value in index])
+        sigma = np.array([parallel.sigma_n(value) for value in index])
         inside = np.flatnonzero((sigma[1:-1] < sigma[:-2]) & (sigma[1:-1] <= sigma[2:])) + 1
-        minima = tuple(_refined(raster, index[k - 1], index[k + 1]) for k in inside)
-        return IndexCurve(raster, index, sigma, minima)
+        minima = tuple(_refined(parallel, index[k - 1], index[k + 1]) for k in inside)
+        return IndexCurve(parallel, index, sigma, minima)
 
     @property
     def best_end(self) -> Minimum:
@@ -66,7 +73,7 @@ class IndexCurve:
         for (left, before), (right, after) in pairwise(knots):
             if (before <= tolerance) == (after <= tolerance):
                 continue
-            crossing = crossing_at(self.raster.sigma_n, left, right, tolerance)
+            crossing = _crossing_at(self.parallel.sigma_n, left, right, tolerance)
             if start is None:
                 start = crossing
             else:
@@ -77,9 +84,9 @@ class IndexCurve:
         return windows
 
 
-def _refined(raster: ParallelPasses, low_m: float, high_m: float) -> Minimum:
+def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
     found = minimize_scalar(
-        raster.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
+        parallel.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
     )
     return Minimum(float(found.x), float(found.fun))
 
@@ -109,23 +116,63 @@ def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
     if inside:
         return min(inside, key=lambda m: m.sigma_n)
     middle = 0.5 * (low + high)
-    return Minimum(middle, curve.raster.sigma_n(middle))
+    return Minimum(middle, curve.parallel.sigma_n(middle))
 
 
-def crossing_at(
+def index_drift_m(
+    parallel: ParallelPasses, index_m: float, tolerance: float
+) -> tuple[float, float]:
+    """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
+    return (
+        _farthest_within(parallel.sigma_n, index_m, LEAST * index_m, tolerance, STEPS),
+        _farthest_within(parallel.sigma_n, index_m, MOST * index_m, tolerance, STEPS),
+    )
+
+
+def standoff_drift_m(
+    model: DepositionModel,
+    setup: PassSetup,
+    speed_m_per_s: float,
+    index_m: float,
+    tolerance: float,
+    index_drift: tuple[float, float],
+) -> tuple[float, float]:
+    """Change of standoff, nearer (negative) and further, that keeps within the tolerance [m].
+
+    The bare projection widens a pass in proportion to its distance from the emission point,
+    which is as good as a narrower index; with effects every standoff is computed.
+    """
+    here = setup.standoff_m
+    if not model.effects:
+        distance = here + model.projection.emission_offset_m
+        nearer = distance * (index_m / index_drift[1] - 1.0)
+        return max(nearer, -here), distance * (index_m / index_drift[0] - 1.0)
+
+    both_ways = not setup.parallel_passes(model, speed_m_per_s).alike
+
+    def sigma_n(standoff_m: float) -> float:
+        there = replace(setup, standoff_m=standoff_m, one_way=setup.one_way or not both_ways)
+        return there.parallel_passes(model, speed_m_per_s).sigma_n(index_m)
+
+    nearest = _farthest_within(sigma_n, here, LEAST * here, tolerance, STEPS_WITH_EFFECTS)
+    farthest = _farthest_within(sigma_n, here, MOST * here, tolerance, STEPS_WITH_EFFECTS)
+    return nearest - here, farthest - here
+
+
+def _crossing_at(
     sigma_n: Callable[[float], float], low: float, high: float, tolerance: float
 ) -> float:
     """Where a function passes the tolerance between two places on either side of it."""
     return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=PRECISION_M))
 
 
-def farthest_within(
+def _farthest_within(
     sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float, steps: int
 ) -> float:
     """How far one may go from a good start toward a limit without breaking the tolerance."""
     value = start
     for further in np.linspace(start, limit, steps + 1)[1:].tolist():
         if sigma_n(further) > tolerance:
-            return crossing_at(sigma_n, value, further, tolerance)
+            return _crossing_at(sigma_n, value, further, tolerance)
         value = further
     return limit

@@ -1,4 +1,4 @@
-"""Films of single passes over a part, kept so that any raster of them is a sum."""
+"""Films of single passes over a part, kept so that the film of any set of passes is a sum."""
 
 import math
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from paint_deposition.planning.surface_map import SurfaceMap
 MOST_POINTS = 1500
 LINES_PER_SCALE = 5.0
 COARSEST_STEP_M = 0.02
-# Sub-steps for choosing a raster may be coarser than for its film: 1e-4 of the peak.
+# Sub-steps for placing passes may be coarser than for its film: 1e-4 of the peak.
 STEPS_PER_SIGMA = 5.0
 SLOWEST_RATE_HZ = 10.0
 

@@ -8,7 +8,6 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.passes import PassStyle, PlannedPass
-from paint_deposition.planning.planned_move import PlannedMove
 
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
 WAYPOINTS_PER_MOVE = 4
@@ -16,6 +15,23 @@ POSE_RATE_HZ = 250.0
 LEAST_TRANSFER_SPEED_M_PER_S = 0.3
 # Turn of the tool between passes is no faster than this.
 TURN_RATE_RAD_PER_S = math.radians(90.0)
+
+
+@dataclass(frozen=True)
+class PlannedMove:
+    """A straight move to a pose of the TCP, in the part's frame.
+
+    Attributes:
+        position_m: (3,) TCP at the end of the move [m].
+        quaternion_xyzw: (4,) orientation of the tool there, scalar last.
+        speed_m_per_s: speed of the TCP on the way [m/s].
+        spraying: whether the gun is on while moving there.
+    """
+
+    position_m: np.ndarray
+    quaternion_xyzw: np.ndarray
+    speed_m_per_s: float
+    spraying: bool
 
 
 def trajectory_of(

@@ -35,7 +35,7 @@ class Placing:
 
 
 def lines_of(passes: int, index_m: float | np.ndarray, middle_m: float | np.ndarray) -> np.ndarray:
-    """Lines (..., n) of rasters with indices and middles (...) [m]."""
+    """Lines (..., n) of evenly spaced passes from their indices and middles (...) [m]."""
     steps = np.arange(passes) - 0.5 * (passes - 1)
     return np.asarray(middle_m)[..., np.newaxis] + np.asarray(index_m)[..., np.newaxis] * steps
 

@@ -15,7 +15,6 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.index_request import Request
-from paint_deposition.planning.pass_count import passes_to_cover
 from paint_deposition.planning.pass_films import LineFilms
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.pass_placement import Placing, centred, place_passes
@@ -24,6 +23,7 @@ from paint_deposition.planning.passes import (
     PlannedPass,
     plan_passes,
 )
+from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
@@ -193,7 +193,7 @@ def plan(
     )  # fmt: skip
     ends = float(extent[0]), float(extent[1])
     placing = place_passes(films, ends, index_range, request.tolerance)
-    count = passes_to_cover(plane.curve.raster, plane.index_m, height)
+    count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
     on_part = centred(films, ends, count, plane.index_m)
     # Level passes go from the top down, vertical ones from the left to the right.
     lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]

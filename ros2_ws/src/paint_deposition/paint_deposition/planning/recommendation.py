@@ -10,15 +10,20 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.collapse import Collapse, half_width_m
 from paint_deposition.model.uniformity import ParallelPasses
-from paint_deposition.planning.drift import index_drift_m, standoff_drift_m
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
-from paint_deposition.planning.index_search import IndexCurve, Minimum, choose
-from paint_deposition.planning.pass_count import (
+from paint_deposition.planning.index_search import (
+    IndexCurve,
+    Minimum,
+    choose,
+    index_drift_m,
+    standoff_drift_m,
+)
+from paint_deposition.planning.plane_passes import (
+    PassSetup,
     cycle_time_s,
     passes_to_cover,
     variation_over_width,
 )
-from paint_deposition.planning.pass_setup import PassSetup
 
 # Film below this share of the mean, between passes, is a bare stripe.
 BARE = 0.01
@@ -80,7 +85,7 @@ class Recommendation:
     @property
     def collapse(self) -> Collapse:
         """Film of one pass at the speed."""
-        return self.curve.raster.first
+        return self.curve.parallel.first
 
     @property
     def sentence(self) -> str:
@@ -142,27 +147,27 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
         )
     setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
     speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
-    raster = setup.raster(model, speed)
-    width = half_width_m(raster.first)
-    curve = IndexCurve.of(raster, *request.index_range_m(width))
+    parallel = setup.parallel_passes(model, speed)
+    width = half_width_m(parallel.first)
+    curve = IndexCurve.of(parallel, *request.index_range_m(width))
     best = choose(curve, request.tolerance)
-    _refuse_stripes(raster, best, width)
+    _refuse_stripes(parallel, best, width)
     if request.speed_m_per_s is None:
         curve, best, speed = _at_target(model, setup, request, curve, best, speed)
     tolerance = request.tolerance
     index_drift = standoff_drift = None
     if tolerance is not None:
-        index_drift = index_drift_m(curve.raster, best.index_m, tolerance)
+        index_drift = index_drift_m(curve.parallel, best.index_m, tolerance)
         standoff_drift = standoff_drift_m(
             model, setup, speed, best.index_m, tolerance, index_drift
         )
     passes = cycle_time = length = over_width = None
     if request.width_m is not None:
-        passes = passes_to_cover(curve.raster, best.index_m, request.width_m)
+        passes = passes_to_cover(curve.parallel, best.index_m, request.width_m)
         length = request.length_m or request.width_m
         cycle_time = cycle_time_s(passes, length, best.index_m, speed, request.one_way)
         over_width = variation_over_width(
-            curve.raster, best.index_m, passes, request.width_m
+            curve.parallel, best.index_m, passes, request.width_m
         ).sigma_n
     return Recommendation(
         index_m=best.index_m,
@@ -171,7 +176,7 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
         tolerance=tolerance,
         windows_m=tuple(curve.windows_m(tolerance)) if tolerance is not None else (),
         minima=curve.minima,
-        mean_um=curve.raster.mean_um(best.index_m),
+        mean_um=curve.parallel.mean_um(best.index_m),
         speed_m_per_s=speed,
         target_um=request.target_um,
         passes=passes,
@@ -188,10 +193,10 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
     )
 
 
-def _refuse_stripes(raster: ParallelPasses, best: Minimum, half_width_m: float) -> None:
-    period = raster.period_m(best.index_m)
-    least = raster.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
-    if least < BARE * raster.mean_um(best.index_m):
+def _refuse_stripes(parallel: ParallelPasses, best: Minimum, half_width_m: float) -> None:
+    period = parallel.period_m(best.index_m)
+    least = parallel.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
+    if least < BARE * parallel.mean_um(best.index_m):
         raise PlanError(
             f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
             f'{half_width_m:.3f} m wide at half its height; search about that index'
@@ -210,7 +215,7 @@ def _at_target(
     assert request.target_um is not None
     low, high = float(curve.index_m[0]), float(curve.index_m[-1])
     for _ in range(SPEED_ROUNDS):
-        wanted = speed * curve.raster.mean_um(best.index_m) / request.target_um
+        wanted = speed * curve.parallel.mean_um(best.index_m) / request.target_um
         if not SLOWEST_M_PER_S <= wanted <= FASTEST_M_PER_S:
             nearest = min(max(wanted, SLOWEST_M_PER_S), FASTEST_M_PER_S)
             raise PlanError(
@@ -221,12 +226,12 @@ def _at_target(
         if abs(wanted - speed) <= 1e-9 * speed:
             break
         if not model.effects:
-            raster = curve.raster
-            first = raster.first.scaled(speed / wanted)
-            second = first if raster.alike else raster.second.scaled(speed / wanted)
-            return replace(curve, raster=ParallelPasses(first, second)), best, wanted
+            parallel = curve.parallel
+            first = parallel.first.scaled(speed / wanted)
+            second = first if parallel.alike else parallel.second.scaled(speed / wanted)
+            return replace(curve, parallel=ParallelPasses(first, second)), best, wanted
         speed = wanted
-        curve = IndexCurve.of(setup.raster(model, speed), low, high)
+        curve = IndexCurve.of(setup.parallel_passes(model, speed), low, high)
         best = choose(curve, request.tolerance)
     return curve, best, speed
 
@@ -241,7 +246,7 @@ def _notes(
 ) -> list[str]:
     notes = [setup.assumption]
     if not setup.one_way:
-        there = _held_otherwise(model, setup, curve.raster, speed).sigma_n(best.index_m)
+        there = _held_otherwise(model, setup, curve.parallel, speed).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
             how = (
                 'keeping its orientation'
@@ -256,7 +261,7 @@ def _notes(
         notes.append(
             f'the end of the range is more even still: {end.sigma_n:.4f} at {end.index_m:g} m'
         )
-    mean = curve.raster.mean_um(best.index_m)
+    mean = curve.parallel.mean_um(best.index_m)
     if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:
         right = speed * mean / request.target_um
         notes.append(f'the target of {request.target_um:g} um would need {right:.3g} m/s')
@@ -269,11 +274,11 @@ def _notes(
 
 
 def _held_otherwise(
-    model: DepositionModel, setup: PassSetup, raster: ParallelPasses, speed: float
+    model: DepositionModel, setup: PassSetup, parallel: ParallelPasses, speed: float
 ) -> ParallelPasses:
     if model.effects:
-        return replace(setup, gun_turns=not setup.gun_turns).raster(model, speed)
-    first = raster.first
+        return replace(setup, gun_turns=not setup.gun_turns).parallel_passes(model, speed)
+    first = parallel.first
     return (
         ParallelPasses.one_way(first)
         if setup.gun_turns

@@ -9,7 +9,7 @@ import numpy as np
 
 from paint_deposition.errors import PlanError
 from paint_deposition.files.rapid.data import QUATERNION_TOLERANCE
-from paint_deposition.planning.planned_move import PlannedMove
+from paint_deposition.planning.pass_motion import PlannedMove
 
 NAME = re.compile(r'[A-Za-z]\w{0,31}')
 ZONES_MM = (0, 1, 5, 10, 15, 20, 30, 40, 50, 60, 80, 100, 150, 200)

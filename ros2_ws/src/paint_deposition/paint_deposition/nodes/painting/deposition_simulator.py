@@ -31,7 +31,6 @@ from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import ColouredMesh
 from paint_deposition.nodes.runtime.process import run_node
-from paint_deposition.part.identity import mesh_id
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.results.film import write_film
@@ -85,7 +84,7 @@ class DepositionSimulator(PaintingNode):
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
         frame_id = self.frame.frame_id
-        self.mesh_id = mesh_id(surface)
+        self.mesh_id = surface.mesh_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
         self._cloud = FilmCloud(surface.vertices_m, frame_id)
         self._field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)

@@ -71,17 +71,17 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
         axes, 'across the passes [mm]', 'film [µm]',
         f'Passes at {MM * answer.index_m:.0f} mm and {answer.speed_m_per_s:.3g} m/s, eq. (4)',
     )  # fmt: skip
-    raster, index = answer.curve.raster, answer.index_m
+    parallel, index = answer.curve.parallel, answer.index_m
     x = np.linspace(-1.5 * index, 1.5 * index, POINTS)
     for number in range(-4, 5):
-        one = raster.second if number % 2 else raster.first
+        one = parallel.second if number % 2 else parallel.first
         film = one.thickness_um(x - number * index)
         if film.max() > 1e-3 * answer.mean_um:
             axes.plot(
                 MM * x, film, color=MUTED, linewidth=1.0, alpha=0.8,
                 label='single pass' if number == 0 else None,
             )  # fmt: skip
-    total = raster.thickness_um(index, x)
+    total = parallel.thickness_um(index, x)
     axes.plot(MM * x, total, color=MODEL, linewidth=1.8, label='sum of passes')
     axes.axhline(
         answer.mean_um, color=INK, linewidth=0.9, linestyle='--',

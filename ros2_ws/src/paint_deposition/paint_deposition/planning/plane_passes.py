@@ -1,15 +1,19 @@
-"""How the gun is held and moved over a plane, pass after pass."""
+"""Parallel passes over a plane: how the gun runs along them, how many it takes, and how long."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.model.collapse import Collapse
+from paint_deposition.model.uniformity import ParallelPasses, Variation, variation
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
+# Share by which the film at the part's edge may fall below the least film inside.
+EDGE_LOSS = 0.05
 
 
 @dataclass(frozen=True)
@@ -46,8 +50,8 @@ class PassSetup:
             return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
-    def raster(self, model: DepositionModel, speed_m_per_s: float) -> ParallelPasses:
-        """The endless raster of these passes at a speed [m/s]."""
+    def parallel_passes(self, model: DepositionModel, speed_m_per_s: float) -> ParallelPasses:
+        """Endlessly many of these passes at a speed [m/s]."""
         options = {'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad}
         first = sampled_collapse(model, speed_m_per_s, **options)
         if self.one_way:
@@ -66,3 +70,48 @@ class PassSetup:
         if difference <= ALIKE * first.film_um.max():
             return ParallelPasses.one_way(first)
         return ParallelPasses(first, second)
+
+
+def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) -> int:
+    """Fewest passes, set evenly about the middle, that cover a width to its edges.
+
+    Covered is where the film is at most EDGE_LOSS below the least of endlessly many passes.
+    """
+    period = np.linspace(0.0, parallel.period_m(index_m), 65)
+    enough = (1.0 - EDGE_LOSS) * parallel.thickness_um(index_m, period).min()
+    across = np.linspace(-0.5 * width_m, 0.5 * width_m, 65)
+    reach = max(parallel.first.reach_m, parallel.second.reach_m)
+    most = math.ceil((width_m + 2.0 * reach) / index_m) + 2
+    for count in range(max(1, math.floor(width_m / index_m)), most):
+        film = np.zeros(len(across))
+        for collapse, line_m in _laid_evenly(parallel, index_m, count):
+            film += collapse.thickness_um(across - line_m)
+        if film.min() >= enough:
+            return count
+    return most
+
+
+def variation_over_width(
+    parallel: ParallelPasses, index_m: float, passes: int, width_m: float
+) -> Variation:
+    """Mean and sigma_n over the whole width, its edges included, of so many passes."""
+    return variation(_laid_evenly(parallel, index_m, passes), -0.5 * width_m, 0.5 * width_m)
+
+
+def _laid_evenly(
+    parallel: ParallelPasses, index_m: float, passes: int
+) -> list[tuple[Collapse, float]]:
+    """Collapse and line of each pass, about the middle."""
+    lines = (np.arange(passes) - 0.5 * (passes - 1)) * index_m
+    return [
+        (parallel.second if number % 2 else parallel.first, float(line))
+        for number, line in enumerate(lines)
+    ]
+
+
+def cycle_time_s(
+    passes: int, length_m: float, index_m: float, speed_m_per_s: float, one_way: bool
+) -> float:
+    """Time from the first opening of the gun to its last closing, at an even speed [s]."""
+    between = math.hypot(length_m, index_m) if one_way else index_m
+    return (passes * length_m + (passes - 1) * between) / speed_m_per_s
