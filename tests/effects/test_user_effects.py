@@ -57,7 +57,7 @@ def test_an_import_of_a_module_that_has_moved_is_answered_with_its_new_place(own
 
 def test_an_import_of_what_never_was_is_the_files_to_correct(own):
     path = own(('paint_deposition.kernel.fast_math', 'paint_deposition.kernel.slow_math'))
-    with pytest.raises(ModelError, match='slow_math.*; correct the file$'):
+    with pytest.raises(ModelError, match=r'slow_math.*; correct the file$'):
         load_effect_file(path)
 
 

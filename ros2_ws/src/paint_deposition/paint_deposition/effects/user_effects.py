@@ -104,7 +104,8 @@ def _run(path: Path, source: bytes, digest: str) -> ModuleType:
 def _new_place(error: Exception) -> str | None:
     """What to import instead, where the file imports a module that lies elsewhere by now."""
     wanted = re.search(
-        r"named 'paint_deposition\.(?:\w+\.)*(\w+)'|name '(\w+)' from 'paint_deposition", str(error)
+        r"named 'paint_deposition\.(?:\w+\.)*(\w+)'|name '(\w+)' from 'paint_deposition",
+        str(error),
     )
     if not isinstance(error, ImportError) or wanted is None:
         return None

@@ -11,12 +11,13 @@ kept on disk, under a name that covers the laws' code.
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
+from types import FunctionType
 
 import numpy as np
 from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
-from paint_deposition.kernel.code_cache import kept_on_disk
+from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.fast_math import exp2
 from paint_deposition.kernel.laws import Law, product
 from paint_deposition.kernel.ray import Ray
@@ -71,97 +72,114 @@ def within_reach(sphere, step, c):
     return x * x + y * y < limit * limit
 
 
+# What a variant is compiled with; ``compile_kernel`` puts the variant's own in their place.
+real: type = np.float32
+factor = scale = product([], real)
+moves_pattern = shadowed = False
+parameter_count = 0
+
+
+def paint_block(
+    block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters
+):
+    """Paint one block; arguments as those of ``accumulate``."""
+    sphere, part = spheres[block], slice(bounds[block], bounds[block + 1])
+    px, py, pz = p[0, part], p[1, part], p[2, part]
+    nx, ny, nz = n[0, part], n[1, part], n[2, part]
+    settled, newest = film[part], recent[part]
+    omega, ring, centre, r = c[OMEGA], c[RING], c[CENTRE], c[RADIUS]
+    narrow1, narrow2, cos, sin = c[NARROW1], c[NARROW2], c[COS], c[SIN]
+    nearest, shadow = c[NEAREST], c[SHADOW]
+    one, zero, tiny = real(1.0), real(0.0), real(1e-30)
+    law = to_fixed_tuple(parameters, parameter_count)
+    for m in range(len(steps)):
+        if (done + m) & (FLUSH - 1) == 0:
+            for i in range(len(newest)):
+                settled[i] += newest[i]
+                newest[i] = zero
+        step = steps[m]
+        if not within_reach(sphere, step, c):
+            continue
+        ox, oy, oz = step[ORIGIN], step[ORIGIN + 1], step[ORIGIN + 2]
+        xx, xy, xz = step[AXIS_X], step[AXIS_X + 1], step[AXIS_X + 2]
+        yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
+        zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
+        shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
+        weight = step[WEIGHT]
+        seen = visible[sight[m], part]
+        for i in range(len(newest)):
+            dx, dy, dz = px[i] - ox, py[i] - oy, pz[i] - oz
+            along = dx * zx + dy * zy + dz * zz
+            facing = -(dx * nx[i] + dy * ny[i] + dz * nz[i])
+            lit = (along > nearest) & (facing > zero)
+            distance = along if along > nearest else one
+            nearness = one / distance
+            x = (dx * xx + dy * xy + dz * xz) * nearness - shift_x
+            y = (dx * yx + dy * yy + dz * yz) * nearness - shift_y
+            magnification = facing * nearness * nearness * nearness
+            ray_length = np.sqrt(dx * dx + dy * dy + dz * dz)
+            ray = Ray(x, y, distance / omega, facing / (ray_length + tiny), speed)
+            if moves_pattern:
+                s = scale(ray, law)
+                x, y, magnification = x * s, y * s, magnification * s * s
+            rho2 = x * x + y * y + tiny
+            per_rho = one / np.sqrt(rho2)
+            rho = rho2 * per_rho
+            f = one + (y * cos - x * sin) * per_rho
+            g1 = exp2(ring - narrow1 * (rho - r) ** 2) + exp2(ring - narrow1 * (rho + r) ** 2)
+            g2 = exp2(centre - narrow2 * rho2)
+            flux = (f * g1 + g2) * weight * magnification * factor(ray, law)
+            if shadowed:
+                flux *= one - shadow * (one - seen[i])
+            newest[i] += flux if lit else zero
+
+
+def accumulate(p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters):
+    """Add the path's film to ``film``.
+
+    The newest contributions stay in ``recent``, in the points' precision, and move into
+    ``film`` every FLUSH sub-steps of the whole path, wherever the calls were cut.
+
+    Args:
+        p, n: (3, V) points and outward normals, single or double precision, in blocks.
+        visible: (S, V) uint8 lines of sight, points in blocks.
+        film: (V,) float64 [um], updated in place.
+        recent: (V,) [um], updated in place; the film is the sum of both.
+        done: sub-steps of the path in earlier calls.
+        spheres: (B, 4) centre and radius of each block [m].
+        bounds: (B + 1,) first point of each block.
+        steps: (M, 16) sub-steps, from ``layout.step_rows``.
+        sight: (M,) row of ``visible`` for each sub-step.
+        c: (11,) constants, from ``layout.model_constants``.
+        parameters: of the laws, or one unused number.
+    """
+    for block in prange(len(spheres)):
+        paint_block(
+            block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c,
+            parameters,
+        )  # fmt: skip
+
+
 @lru_cache(maxsize=64)
 def _compile(flux_factors, pattern_scales, shadowed, real):
     first_scale = sum(count for _, count in flux_factors)
-    parameter_count = first_scale + sum(count for _, count in pattern_scales)
-    factor = product(flux_factors, real)
-    scale = product(pattern_scales, real, first_scale)
-    moves_pattern = bool(pattern_scales)
-
-    @njit(fastmath=True, error_model='numpy')
-    def paint_block(
-        block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters
-    ):
-        """Paint one block; arguments as those of ``accumulate``."""
-        sphere, part = spheres[block], slice(bounds[block], bounds[block + 1])
-        px, py, pz = p[0, part], p[1, part], p[2, part]
-        nx, ny, nz = n[0, part], n[1, part], n[2, part]
-        settled, newest = film[part], recent[part]
-        omega, ring, centre, r = c[OMEGA], c[RING], c[CENTRE], c[RADIUS]
-        narrow1, narrow2, cos, sin = c[NARROW1], c[NARROW2], c[COS], c[SIN]
-        nearest, shadow = c[NEAREST], c[SHADOW]
-        one, zero, tiny = real(1.0), real(0.0), real(1e-30)
-        law = to_fixed_tuple(parameters, parameter_count)
-        for m in range(len(steps)):
-            if (done + m) & (FLUSH - 1) == 0:
-                for i in range(len(newest)):
-                    settled[i] += newest[i]
-                    newest[i] = zero
-            step = steps[m]
-            if not within_reach(sphere, step, c):
-                continue
-            ox, oy, oz = step[ORIGIN], step[ORIGIN + 1], step[ORIGIN + 2]
-            xx, xy, xz = step[AXIS_X], step[AXIS_X + 1], step[AXIS_X + 2]
-            yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
-            zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
-            shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
-            weight = step[WEIGHT]
-            seen = visible[sight[m], part]
-            for i in range(len(newest)):
-                dx, dy, dz = px[i] - ox, py[i] - oy, pz[i] - oz
-                along = dx * zx + dy * zy + dz * zz
-                facing = -(dx * nx[i] + dy * ny[i] + dz * nz[i])
-                lit = (along > nearest) & (facing > zero)
-                distance = along if along > nearest else one
-                nearness = one / distance
-                x = (dx * xx + dy * xy + dz * xz) * nearness - shift_x
-                y = (dx * yx + dy * yy + dz * yz) * nearness - shift_y
-                magnification = facing * nearness * nearness * nearness
-                ray_length = np.sqrt(dx * dx + dy * dy + dz * dz)
-                ray = Ray(x, y, distance / omega, facing / (ray_length + tiny), speed)
-                if moves_pattern:
-                    s = scale(ray, law)
-                    x, y, magnification = x * s, y * s, magnification * s * s
-                rho2 = x * x + y * y + tiny
-                per_rho = one / np.sqrt(rho2)
-                rho = rho2 * per_rho
-                f = one + (y * cos - x * sin) * per_rho
-                g1 = exp2(ring - narrow1 * (rho - r) ** 2) + exp2(ring - narrow1 * (rho + r) ** 2)
-                g2 = exp2(centre - narrow2 * rho2)
-                flux = (f * g1 + g2) * weight * magnification * factor(ray, law)
-                if shadowed:
-                    flux *= one - shadow * (one - seen[i])
-                newest[i] += flux if lit else zero
-
-    @njit(parallel=True, nogil=True, fastmath=True, error_model='numpy')
-    def accumulate(
-        p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters
-    ):
-        """Add the path's film to ``film``.
-
-        The newest contributions stay in ``recent``, in the points' precision, and move into
-        ``film`` every FLUSH sub-steps of the whole path, wherever the calls were cut.
-
-        Args:
-            p, n: (3, V) points and outward normals, single or double precision, in blocks.
-            visible: (S, V) uint8 lines of sight, points in blocks.
-            film: (V,) float64 [um], updated in place.
-            recent: (V,) [um], updated in place; the film is the sum of both.
-            done: sub-steps of the path in earlier calls.
-            spheres: (B, 4) centre and radius of each block [m].
-            bounds: (B + 1,) first point of each block.
-            steps: (M, 16) sub-steps, from ``layout.step_rows``.
-            sight: (M,) row of ``visible`` for each sub-step.
-            c: (11,) constants, from ``layout.model_constants``.
-            parameters: of the laws, or one unused number.
-        """
-        for block in prange(len(spheres)):
-            paint_block(
-                block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c,
-                parameters,
-            )  # fmt: skip
-
+    names = {
+        'real': real,
+        'factor': product(flux_factors, real),
+        'scale': product(pattern_scales, real, first_scale),
+        'moves_pattern': bool(pattern_scales),
+        'shadowed': shadowed,
+        'parameter_count': first_scale + sum(count for _, count in pattern_scales),
+    }
+    block = njit(fastmath=True, error_model='numpy')(_variant(paint_block, names))
+    whole = _variant(accumulate, names | {'paint_block': block})
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
-    return kept_on_disk(accumulate, laws, counts, shadowed, real.__name__)
+    whole = named_for_its_code(whole, laws, counts, shadowed, real.__name__)
+    options = {'parallel': True, 'nogil': True, 'fastmath': True, 'error_model': 'numpy'}
+    return njit(cache=True, **options)(whole)
+
+
+def _variant(template: FunctionType, names: dict[str, object]) -> FunctionType:
+    """The function with other values for names of this module."""
+    return FunctionType(template.__code__, template.__globals__ | names, template.__name__)

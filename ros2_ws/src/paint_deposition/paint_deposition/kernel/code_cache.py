@@ -7,11 +7,12 @@ from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from types import CodeType, FunctionType, ModuleType
-from typing import Any
+from typing import Any, TypeVar
 
 import numba
 import numpy as np
-from numba.core.caching import FunctionCache, IndexDataCacheFile
+
+Compiled = TypeVar('Compiled', bound=FunctionType)
 
 
 def identity(laws: Sequence[Callable[..., float]], *variant: object) -> str:
@@ -67,43 +68,22 @@ def _fingerprint(code: CodeType) -> bytes:
     return code.co_code + repr((code.co_consts, code.co_names, code.co_varnames)).encode()
 
 
-def kept_on_disk(
-    compiled: Any, laws: Sequence[Callable[..., Any]] | None = None, *variant: object
-) -> Any:
-    """Keep a compiled function on disk, under a name that covers all that is compiled with it.
+def named_for_its_code(
+    function: Compiled, laws: Sequence[Callable[..., Any]] | None = None, *variant: object
+) -> Compiled:
+    """Name a function for all that will be compiled with it, for ``numba.njit(cache=True)``.
 
-    What it calls must be defined before it.
-
-    Args:
-        compiled: what ``numba.njit`` made.
-        laws: functions whose code tells this one from others of its file; default: its own.
-        variant: what else tells it from them.
-    """
-    functions = [compiled.py_func] if laws is None else laws
-    compiled._cache = CodeCache(compiled.py_func, identity(functions, *variant))
-    return compiled
-
-
-class CodeCache(FunctionCache):
-    """Numba's cache on disk, for a function that depends on laws as well as on its own code.
-
-    Numba tells functions apart by what they enclose, which for compiled functions differs in
-    every process, so that nothing would ever be found again. It also numbers the variants of a
-    function in one index: two processes that compile at the same time give one number to
-    different variants, and one of them is later loaded for the other. Here each has its own file.
+    Numba keeps compiled code in a file for each qualified name and compares only the time of the
+    function's own source file. With this name a change in what the function calls is seen too,
+    and processes that compile different variants at once cannot swap them. What the function
+    calls must be defined before it, and it must not enclose compiled functions: those differ in
+    every process, so that nothing would be found again.
 
     Args:
         function: what will be compiled.
-        name: its ``identity``.
+        laws: functions whose code tells this one from others of its name; default: its own.
+        variant: what else tells it from them.
     """
-
-    def __init__(self, function: Callable[..., Any], name: str) -> None:
-        super().__init__(function)
-        self._identity = name
-        stamp = self._impl.locator.get_source_stamp()
-        self._cache_file = IndexDataCacheFile(
-            self._cache_path, f'{function.__name__}-{name}', stamp
-        )
-
-    def _index_key(self, sig: Any, codegen: Any) -> Any:
-        return sig, codegen.magic_tuple(), self._identity
+    functions = [function] if laws is None else laws
+    function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'
+    return function

@@ -28,7 +28,7 @@ import math
 import numpy as np
 from numba import njit
 
-from paint_deposition.kernel.code_cache import kept_on_disk
+from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.motion.heading import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,
@@ -115,8 +115,8 @@ def _on_another_track(state):
     return cosine(between, state.carried) < COS_TRACK
 
 
-@kept_on_disk
-@njit
+@njit(cache=True)
+@named_for_its_code
 def follow_passes(states, position, normal, heading, step, flow, after_gap):
     """Number the spraying passes.
 

@@ -26,7 +26,7 @@ import math
 import numpy as np
 from numba import njit
 
-from paint_deposition.kernel.code_cache import kept_on_disk
+from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.motion.heading import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,
@@ -118,8 +118,8 @@ def _behind_turn_m(state):
     return min(behind, state.since_earlier_m, LATEST_NOTICE_M)
 
 
-@kept_on_disk
-@njit
+@njit(cache=True)
+@named_for_its_code
 def follow_strokes(states, position, normal, velocity, dwell, after_gap):
     """Number the strokes and measure back along the path to where each began.
 
