@@ -86,20 +86,20 @@ def test_beginning_again_keeps_what_came_early_for_it():
     flow = schedule([(1000, 1.0), (2000, 0.0)])
     flow.add(0, 0.0, another_stream=True)
     flow.add(50, 1.0, another_stream=True)
-    assert flow.begin_again() == 2
+    assert flow.restart() == 2
     assert flow_at(flow, [10, 60, 1500]).tolist() == [0.0, 1.0, 1.0]
-    assert flow.begin_again() == 0
+    assert flow.restart() == 0
 
 
 def test_beginning_again_with_all_changes_known_repeats_them():
     flow = schedule([(10, 1.0), (20, 0.0)])
-    flow.begin_again()
+    flow.restart()
     assert flow_at(flow, [5, 15, 25]).tolist() == [0.0, 1.0, 0.0]
 
 
 def test_beginning_again_after_forgetting_closes_the_gun():
     flow = schedule([(10, 1.0), (20, 0.0), (30, 1.0)])
     flow.forget(35)
-    flow.begin_again()
+    flow.restart()
     assert flow
     assert flow_at(flow, [0, 15, 40]).tolist() == [0.0, 0.0, 0.0]

@@ -92,7 +92,7 @@ def test_mean_film_and_speed_for_a_target():
 def test_target_beside_a_speed_is_judged_not_followed():
     answer = asked(target_um=20.0)
     assert answer.speed_m_per_s == 0.2
-    assert any('target of 20 um' in note for note in answer.notes)
+    assert any('target of 20 µm' in note for note in answer.notes)
 
 
 def test_passes_cover_the_width_to_its_edges():

@@ -9,7 +9,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.
-FAMILY_ORDER = (
+FAMILIES = (
     'incidence', 'curvature', 'boundary', 'standoff', 'lateral shift', 'order', 'level', 'time',
     'visibility',
 )  # fmt: skip
@@ -19,18 +19,12 @@ def _effects_of_the_library() -> dict[str, type[Effect]]:
     for module in pkgutil.iter_modules(library.__path__, f'{library.__name__}.'):
         importlib.import_module(module.name)
     own = [c for c in Effect.__subclasses__() if c.__module__.startswith(library.__name__)]
-    own.sort(key=lambda effect: (FAMILY_ORDER.index(effect.family), effect.id))
+    own.sort(key=lambda effect: (FAMILIES.index(effect.family), effect.id))
     return {effect.id: effect for effect in own}
 
 
-# Effect classes by id, and ids by family.
+# Effect classes by id.
 EFFECTS = MappingProxyType(_effects_of_the_library())
-FAMILIES = MappingProxyType(
-    {
-        family: tuple(name for name, effect in EFFECTS.items() if effect.family == family)
-        for family in FAMILY_ORDER
-    }
-)
 
 
 def effect_class(effect_id: str) -> type[Effect]:

@@ -90,7 +90,7 @@ class FilmIntegrator:
         laws, values = [], []
         for kind in ('flux_factor', 'pattern_scale'):
             chosen = [e for e in compiled if getattr(type(e), kind) is not None]
-            laws.append([(getattr(type(e), kind), len(e.values())) for e in chosen])
+            laws.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
             values += [value for e in chosen for value in e.values()]
         self._kernel: Any = compile_kernel(laws[0], laws[1], self._shadowed, self._real)
         self._compiled = False

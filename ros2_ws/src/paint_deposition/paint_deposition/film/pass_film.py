@@ -8,10 +8,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.collapse import (
-    NEGLIGIBLE,
-    SampledCollapse,
-)
+from paint_deposition.model.collapse import NEGLIGIBLE, SampledCollapse
 from paint_deposition.model.line_integral import line_integral_um_m_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -123,24 +120,13 @@ def _straight_pass(
     cos, sin = math.cos(roll_rad), math.sin(roll_rad)
     tool = np.stack([cos * TRAVEL - sin * ACROSS, sin * TRAVEL + cos * ACROSS, -OUTWARD], axis=1)
     time_s = along / speed
-    never = np.full(count, np.inf)
-    return SprayPath(
+    return SprayPath.of(
         stamp_ns=np.round(time_s * 1e9).astype(np.int64),
         dwell_s=length / speed,
         flow=np.ones(count),
         position_m=standoff_m * OUTWARD + way * along[:, None] * TRAVEL,
         rotation=np.tile(tool, (count, 1, 1)),
         velocity_m_per_s=np.tile(velocity_m_per_s * TRAVEL, (count, 1)),
-        pattern_shift_m=np.zeros((count, 2)),
-        stroke=np.zeros(count, dtype=np.int64),
-        spray_pass=np.zeros(count, dtype=np.int64),
-        open_flow=np.ones(count),
-        since_on_s=never,
-        since_off_s=never,
-        until_on_s=never,
-        until_off_s=never,
-        from_turn_m=never,
-        to_turn_m=never,
     )
 
 

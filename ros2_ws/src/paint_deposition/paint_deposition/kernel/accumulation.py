@@ -9,7 +9,7 @@ calls or on the number of threads.
 kept on disk, under a name that covers the laws' code.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import lru_cache
 from types import FunctionType
 
@@ -33,23 +33,6 @@ OMEGA, RING, CENTRE, RADIUS, NARROW1, NARROW2, COS, SIN, NEAREST, REACH, SHADOW 
 MODEL_CONSTANTS = 11
 # Sub-steps, a power of two, summed in the points' precision before they join the film.
 FLUSH = 32
-
-
-def compile_kernel(
-    flux_factors: Sequence[tuple[Law, int]],
-    pattern_scales: Sequence[tuple[Law, int]],
-    shadowed: bool,
-    real: type,
-) -> Callable[..., None]:
-    """The kernel with these laws inlined.
-
-    Args:
-        flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
-            passed in one flat array, those of the flux factors first.
-        shadowed: whether the visibility table is used.
-        real: precision of the points, np.float32 or np.float64.
-    """
-    return _compile(tuple(flux_factors), tuple(pattern_scales), shadowed, real)
 
 
 @njit(fastmath=True, error_model='numpy')
@@ -161,7 +144,20 @@ def accumulate(p, n, visible, film, recent, done, spheres, bounds, steps, sight,
 
 
 @lru_cache(maxsize=64)
-def _compile(flux_factors, pattern_scales, shadowed, real):
+def compile_kernel(
+    flux_factors: tuple[tuple[Law, int], ...],
+    pattern_scales: tuple[tuple[Law, int], ...],
+    shadowed: bool,
+    real: type,
+) -> Callable[..., None]:
+    """The kernel with these laws inlined.
+
+    Args:
+        flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
+            passed in one flat array, those of the flux factors first.
+        shadowed: whether the visibility table is used.
+        real: precision of the points, np.float32 or np.float64.
+    """
     first_scale = sum(count for _, count in flux_factors)
     names = {
         'real': real,

@@ -28,7 +28,7 @@ class FlowSchedule:
         Args:
             stamp_ns: the time; of two changes at one time the later to come counts.
             flow: relative; 0 is gun off.
-            another_stream: the change may belong to a stream that is about to begin again.
+            another_stream: the change may belong to a stream that is about to restart.
         """
         change = (int(stamp_ns), float(flow))
         insort(self._changes, change, key=_STAMP)
@@ -57,10 +57,10 @@ class FlowSchedule:
             del self._changes[:superseded]
             self._forgetful = True
 
-    def begin_again(self) -> int:
-        """Go back to the changes of a stream that begins again; returns how many had come early.
+    def restart(self) -> int:
+        """Go back to the changes of a restarted stream; returns how many of them had come early.
 
-        Without any the gun is off until the next change, unless nothing was forgotten: then the
+        If none had, the gun is off until the next change, unless nothing was forgotten: then the
         changes of the whole recording are still there.
         """
         early, self._of_another_stream = self._of_another_stream, []

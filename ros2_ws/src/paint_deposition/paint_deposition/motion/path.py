@@ -44,6 +44,22 @@ class SprayPath:
     from_turn_m: np.ndarray
     to_turn_m: np.ndarray
 
+    @staticmethod
+    def of(
+        stamp_ns: np.ndarray,
+        dwell_s: np.ndarray,
+        flow: np.ndarray,
+        position_m: np.ndarray,
+        rotation: np.ndarray,
+        velocity_m_per_s: np.ndarray,
+    ) -> 'SprayPath':
+        """The motion alone, as one endless pass without turns and trigger changes."""
+        numbers, never = np.zeros(len(flow), np.int64), np.full(len(flow), np.inf)
+        return SprayPath(
+            stamp_ns, dwell_s, flow, position_m, rotation, velocity_m_per_s,
+            np.zeros((len(flow), 2)), numbers, numbers, np.ones(len(flow)), *[never] * 6,
+        )  # fmt: skip
+
     def __len__(self) -> int:
         return len(self.stamp_ns)
 
@@ -75,15 +91,9 @@ class SprayPath:
     @staticmethod
     def empty() -> 'SprayPath':
         """No sub-steps."""
-        tails = {'position_m': (3,), 'rotation': (3, 3), 'velocity_m_per_s': (3,)}
-        tails['pattern_shift_m'] = (2,)
-        whole = ('stamp_ns', 'stroke', 'spray_pass')
-        return SprayPath(
-            *(
-                np.empty((0, *tails.get(c.name, ())), np.int64 if c.name in whole else float)
-                for c in fields(SprayPath)
-            )
-        )
+        none, whole = np.empty(0), np.empty(0, np.int64)
+        vectors, axes = np.empty((0, 3)), np.empty((0, 3, 3))
+        return SprayPath.of(whole, none, none, vectors, axes, vectors)
 
     @staticmethod
     def joined(paths: list['SprayPath']) -> 'SprayPath':

@@ -38,8 +38,8 @@ class PathBuilder:
     """Screens poses as they come and turns them into sub-steps.
 
     Feed it in any batches: the sub-steps depend on the poses and trigger changes alone. Which
-    poses are dropped and when a stream counts as begun again, see ``PoseScreen``; a stream begun
-    again is followed after a gap.
+    poses are dropped and when a stream counts as restarted, see ``PoseScreen``; a restarted stream
+    is followed as after a gap.
 
     Args:
         max_pose_gap_s: a longer time between two poses is gun off [s].
@@ -101,11 +101,11 @@ class PathBuilder:
             np.asarray(positions_m, dtype=float),
             np.asarray(quaternions_xyzw, dtype=float),
         )
-        going_on, *begun_again = self._screen.take(batch)
+        going_on, *restarted = self._screen.take(batch)
         self._waiting.append(going_on)
-        for stream in begun_again:
+        for stream in restarted:
             self._cut_segments(until_ns=None)
-            self.counts.late_triggers -= self._flow.begin_again()
+            self.counts.late_triggers -= self._flow.restart()
             self._integrated_ns = None
             self._gap_before_next = True
             self._waiting = [stream]
@@ -152,54 +152,37 @@ class PathBuilder:
             after_gap[0] |= self._gap_before_next
             self._gap_before_next = False
             flow = flows[np.searchsorted(cuts, stamp, side='right')]
-            self._follow(stamp, dwell, flow, position, rotation, velocity, after_gap)
+            path = SprayPath.of(stamp, dwell, flow, position, rotation, velocity)
+            self._finished.append(self._followed(path, after_gap))
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
         self._integrated_ns = int(now.stamps_ns[-1])
         self._waiting = [poses.select(slice(ready - 1, None))]
 
-    def _follow(
-        self,
-        stamp: np.ndarray,
-        dwell: np.ndarray,
-        flow: np.ndarray,
-        position: np.ndarray,
-        rotation: np.ndarray,
-        velocity: np.ndarray,
-        after_gap: np.ndarray,
-    ) -> None:
+    def _followed(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
+        """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = 0.0 if self._flow else 1.0
             self._states = first_stroke(), first_pass(flow_before), first_trigger(flow_before)
             after_gap[0] = False  # Nothing came before the first.
         strokes, passes, trigger = self._states
-        normal = rotation[:, :, 2]
+        position, normal = path.position_m, path.rotation[:, :, 2]
         stroke, from_turn, heading, step = follow_strokes(
-            strokes, position, normal, velocity, dwell, after_gap
+            strokes, position, normal, path.velocity_m_per_s, path.dwell_s, after_gap
         )
-        spray_pass = follow_passes(passes, position, normal, heading, step, flow, after_gap)
-        open_flow, since_on, since_off = follow_trigger(trigger, dwell, flow, after_gap)
-        unknown = np.full(len(stamp), np.inf)
-        path = SprayPath(
-            stamp_ns=stamp,
-            dwell_s=dwell,
-            flow=flow,
-            position_m=position,
-            rotation=rotation,
-            velocity_m_per_s=velocity,
-            pattern_shift_m=np.zeros((len(stamp), 2)),
+        spray_pass = follow_passes(passes, position, normal, heading, step, path.flow, after_gap)
+        open_flow, since_on, since_off = follow_trigger(
+            trigger, path.dwell_s, path.flow, after_gap
+        )
+        return path.with_(
             stroke=stroke,
             spray_pass=spray_pass,
             open_flow=open_flow,
             since_on_s=since_on,
             since_off_s=since_off,
-            until_on_s=unknown,
-            until_off_s=unknown,
             from_turn_m=from_turn,
-            to_turn_m=unknown,
         )
-        self._finished.append(path)
 
     def _whole_strokes(self, pieces: list[SprayPath], finish: bool) -> SprayPath:
         held = self._held + pieces

@@ -9,16 +9,17 @@ from paint_deposition.motion.trajectory import PoseCounts
 QUATERNION_TOLERANCE = 0.01
 # A number beyond this is damage too, and its square must be one in single precision [m].
 FARTHEST_M = 1e6
-# So many poses in order, over more than a gap, are no stragglers: the stream began again.
+# So many poses in order, over more than a gap, are no stragglers: the stream was restarted.
 FEWEST_OF_A_RESTART = 3
 
 
 class PoseScreen:
     """Drops and counts poses with a repeated or backward stamp, a non-finite number or a
-    quaternion that is no rotation; notices gaps and streams that begin again.
+    quaternion that is no rotation; notices gaps and restarted streams.
 
-    Poses from before the newest one wait: a few stragglers are dropped when the stream goes on,
-    but a run of them, longer than a gap, is the stream begun again, and none of it is lost.
+    Poses with stamps before the newest one wait. A few of them are stragglers and are dropped
+    when the stream goes on; a run of them that is longer than a gap is the stream restarted, and
+    none of it is lost.
 
     Args:
         max_gap_ns: a longer time between two poses is a gap [ns].
@@ -35,7 +36,7 @@ class PoseScreen:
 
         Returns:
             What to follow, stamps strictly increasing and quaternions of unit length. The first
-            batch goes on from those before; each further one is a stream begun again.
+            batch goes on from those before; each further one is a restarted stream.
         """
         poses = PoseBatch.joined([self._behind, self._rotations(poses)])
         streams: list[list[int]] = [[]]

@@ -43,7 +43,7 @@ def trajectory_of(
 ) -> Trajectory:
     """The timed motion: poses at an even rate, and the trigger.
 
-    Every pass and every way between passes starts and ends at rest; speeds are trapezoids.
+    Every pass and every transfer between passes starts and ends at rest, with trapezoidal speed.
     """
     stamps, positions, rotations, triggers = [], [], [], []
     clock = 0.0
@@ -100,12 +100,12 @@ class _Leg:
 
 
 class _Ramp:
-    """Trapezoidal speed over a way, from rest to rest."""
+    """Trapezoidal speed over a length of travel, from rest to rest."""
 
     def __init__(self, length_m: float, speed_m_per_s: float, style: PassStyle) -> None:
         self.length = length_m
         self.acceleration = style.acceleration_m_per_s2
-        # A short way is a triangle.
+        # A short travel does not reach full speed: the trapezoid is a triangle.
         self.speed = min(speed_m_per_s, math.sqrt(length_m * self.acceleration))
         self.rise_s = self.speed / self.acceleration
         self.duration_s = length_m / self.speed + self.rise_s if length_m > 0.0 else 0.0

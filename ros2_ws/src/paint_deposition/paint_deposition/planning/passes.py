@@ -47,7 +47,7 @@ class PassStyle:
 
     @property
     def lead_m(self) -> float:
-        """Way from standstill to full speed, gun off [m]."""
+        """Travel from standstill to full speed, with the gun off [m]."""
         return self.speed_m_per_s**2 / (2.0 * self.acceleration_m_per_s2) + SETTLING_M
 
 

@@ -18,11 +18,7 @@ from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.pass_films import LineFilms
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.pass_placement import Placing, centred, place_passes
-from paint_deposition.planning.passes import (
-    PassStyle,
-    PlannedPass,
-    plan_passes,
-)
+from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_passes
 from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
@@ -132,7 +128,7 @@ class Plan:
         return (
             f'{self.placing.passes} {self.request.direction} passes at '
             f'{self.placing.index_m * 1e3:.0f} mm, {self.style.speed_m_per_s:.3g} m/s: mean film '
-            f'{self.statistics.mean_um:.1f} um, sigma_n {self.sigma_n * 100:.1f} %, '
+            f'{self.statistics.mean_um:.1f} µm, sigma_n {self.sigma_n * 100:.1f} %, '
             f'{self.cycle_time_s:.1f} s'
         )
 

@@ -45,7 +45,7 @@ class Recommendation:
         mean_um: mean film at index and speed.
         speed_m_per_s: of the passes. target_um: film it was chosen for, or None.
         passes, cycle_time_s: for the width asked for, or None. The time runs from the first
-            opening of the gun to its last closing, ways between passes included.
+            opening of the gun to its last closing, transfers between passes included.
         width_m, length_m: what they were counted for.
         sigma_n_over_width: of these passes from edge to edge, or None.
         curve: sigma_n over the range.
@@ -92,7 +92,7 @@ class Recommendation:
         """The recommendation in a sentence."""
         text = (
             f'index {self.index_m * 1e3:.0f} mm: sigma_n {self.sigma_n * 100:.2f} %, '
-            f'mean film {self.mean_um:.1f} um at {self.speed_m_per_s:.3g} m/s'
+            f'mean film {self.mean_um:.1f} µm at {self.speed_m_per_s:.3g} m/s'
         )
         if self.passes:
             text += f', {self.passes} passes in {self.cycle_time_s:.1f} s'
@@ -221,7 +221,7 @@ def _at_target(
             raise PlanError(
                 f'target_um {request.target_um:g} at an index of {best.index_m:.3f} m needs '
                 f'{wanted:.3g} m/s, outside {SLOWEST_M_PER_S:g} to {FASTEST_M_PER_S:g} m/s; the '
-                f'closest is {request.target_um * wanted / nearest:.3g} um at {nearest:g} m/s'
+                f'closest is {request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s'
             )
         if abs(wanted - speed) <= 1e-9 * speed:
             break
@@ -264,7 +264,7 @@ def _notes(
     mean = curve.parallel.mean_um(best.index_m)
     if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:
         right = speed * mean / request.target_um
-        notes.append(f'the target of {request.target_um:g} um would need {right:.3g} m/s')
+        notes.append(f'the target of {request.target_um:g} µm would need {right:.3g} m/s')
     if request.width_m is not None and request.length_m is None:
         notes.append('cycle time is for passes as long as the width')
     on_film = [e.id for e in model.effects if _acts_on_film(e)]
