@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
-from types import CodeType, FunctionType, ModuleType
+from types import FunctionType, ModuleType
 from typing import Any, TypeVar
 
 import numba
@@ -39,7 +39,8 @@ def _compiled_with(value: Any, seen: set[int]) -> Iterator[bytes]:
         if id(function.__code__) in seen:
             return
         seen.add(id(function.__code__))
-        yield _fingerprint(function.__code__)
+        code = function.__code__
+        yield code.co_code + repr((code.co_consts, code.co_names, code.co_varnames)).encode()
         yield _source_of(function.__module__)
         named = inspect.getclosurevars(function)
         for name, other in sorted((dict(named.globals) | dict(named.nonlocals)).items()):
@@ -62,10 +63,6 @@ def _source_of(module: str) -> bytes:
     except OSError:
         source = b''
     return module.encode() + hashlib.sha256(source).digest()
-
-
-def _fingerprint(code: CodeType) -> bytes:
-    return code.co_code + repr((code.co_consts, code.co_names, code.co_varnames)).encode()
 
 
 def named_for_its_code(

@@ -32,11 +32,8 @@ def in_precision(law: Law, real: type) -> Law:
 
 
 def _as_real(value: object, real: type) -> object:
-    return real(value) if _is_number(value) else value
-
-
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return real(value) if is_number else value
 
 
 def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:
@@ -57,13 +54,6 @@ def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law
     (law, count), rest = laws[0], laws[1:]
     head = register_jitable(in_precision(law, real))
     end = offset + count
-    if not rest:
-
-        @register_jitable
-        def last(ray, parameters):
-            return head(ray, *parameters[offset:end])
-
-        return last
     tail = product(rest, real, end)
 
     @register_jitable
