@@ -70,7 +70,7 @@ class FilmIntegrator:
         keep_absent_laws: bool = False,
     ) -> None:
         self.points = points
-        self._real: type[np.floating] = np.float32 if precision == 'single' else np.float64
+        self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
         self._keep_absent_laws = keep_absent_laws
         self._blocks = Blocks.of(points.positions_m, points.normals, self._real)

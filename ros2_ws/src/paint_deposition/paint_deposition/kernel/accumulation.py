@@ -12,6 +12,7 @@ kept on disk, under a name that covers the laws' code.
 from collections.abc import Callable
 from functools import lru_cache
 from types import FunctionType
+from typing import Any
 
 import numpy as np
 from numba import njit, prange
@@ -176,6 +177,6 @@ def compile_kernel(
     return njit(cache=True, **options)(whole)
 
 
-def _variant(template: FunctionType, names: dict[str, object]) -> FunctionType:
+def _variant(template: Any, names: dict[str, object]) -> FunctionType:
     """The function with other values for names of this module."""
     return FunctionType(template.__code__, template.__globals__ | names, template.__name__)

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numba
 import numpy as np
 
-Compiled = TypeVar('Compiled', bound=FunctionType)
+Compiled = TypeVar('Compiled', bound=Callable[..., Any])
 
 
 def identity(laws: Sequence[Callable[..., float]], *variant: object) -> str:
