@@ -129,7 +129,7 @@ def _class_of(truth: str, diagnosis) -> set[str]:
 
 def _held_out(folder: Path, campaign, diagnosis) -> dict[str, float]:
     """RMSE on readings the diagnosis never saw, over the noise of the gauge there."""
-    from paint_deposition.files.readings_files import read_readings
+    from paint_deposition.files.gauge_readings import read_readings
     from paint_deposition.fitting.study import Study
     from paint_deposition.readings.campaign import Campaign, Experiment
 

@@ -66,7 +66,7 @@ def calibrate(
     """
     from paint_deposition.files.json_files import json_text
     from paint_deposition.files.model_file import read_model_file
-    from paint_deposition.inference import calibration as calibrating
+    from paint_deposition.fitting import calibration as calibrating
     from paint_deposition.report.pictures.calibration import write_calibration_pictures
     from paint_deposition.results.calibration import calibration_as_dict, write_calibration
 
