@@ -21,7 +21,7 @@ from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.effects.library.tcp_tilt import TcpTilt
-from paint_deposition.fitting.parameters import Unknowns
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
@@ -37,7 +37,7 @@ def study(sample):
 
 @pytest.fixture(scope='module')
 def fit(study):
-    return study.fit(Unknowns.of(DepositionModel()), starts=3)
+    return study.fit(FreeParameters.of(DepositionModel()), starts=3)
 
 
 @pytest.mark.parametrize(('rival', 'growth'), [(TcpOffset(), 5.0), (TcpTilt(), 3.0)])

@@ -86,11 +86,11 @@ def calibrate(
         click.echo(
             f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
         )
-    for agreement in result.agreements:
+    for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
         click.echo(
-            f'{agreement.experiment}: {agreement.points} points, mean '
-            f'{agreement.measured_mean_um:.2f} um measured, {agreement.predicted_mean_um:.2f} '
-            f'predicted, residual SD {agreement.residual_sd_um:.2f} um'
+            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} um '
+            f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
+            f'{found.sd_um:.2f} um'
         )
     noise = result.study.noise
     click.echo(

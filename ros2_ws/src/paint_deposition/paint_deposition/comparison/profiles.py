@@ -57,7 +57,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     """
     found = []
     for index, experiment in enumerate(study.campaign.experiments):
-        first = int(np.searchsorted(study.experiment_of, index))
+        rows = np.flatnonzero(study.campaign.experiment_of == index)
         lines = [_Line.of(experiment, label, members) for label, members in _grouped(experiment)]
         grouped = bool(lines)
         if not grouped:
@@ -67,7 +67,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
         for line in lines:
             at, lines_um, passes_um = films.get(line.label, _nothing(len(models)))
             found.append(
-                Profile(experiment.name, line.label, line.axis, first + line.members,
+                Profile(experiment.name, line.label, line.axis, rows[line.members],
                         line.position_m, at, lines_um, passes_um)
             )  # fmt: skip
     return found

@@ -40,8 +40,8 @@ class Panel:
     @staticmethod
     def of(experiment: Experiment) -> 'Panel | None':
         """The panel of an experiment, or None if part or motion are of another kind."""
-        normals = experiment.points.normals[: len(experiment)]
-        positions = experiment.points.positions_m[: len(experiment)]
+        normals = experiment.measured_points.normals
+        positions = experiment.measured_points.positions_m
         outward = normals.mean(axis=0)
         outward /= np.linalg.norm(outward)
         if (normals @ outward).min() < FLAT_COSINE:

@@ -162,9 +162,9 @@ def _broken(data: ReportData, diagnosis: Diagnosis) -> Headline:
 
 
 def _compared(data: ReportData) -> Headline:
-    regions = data.comparisons[-1].regions
+    regions, points = data.comparisons[-1].regions, data.comparisons[-1].points
     freedom = min(data.study.noise.degrees_of_freedom, 1e6)
-    chance = float(fisher.sf(data.chi_square_per_point[-1], len(data.study), freedom))
+    chance = float(fisher.sf(points.chi_square_per_reading, len(points), freedom))
     off = bool(regions) or chance < CHANCE
     if regions:
         title = 'The model misses the readings in places'
@@ -177,7 +177,7 @@ def _compared(data: ReportData) -> Headline:
     facts = (
         (
             'How far off',
-            f'RMSE {micrometres(data.rmse_um[-1])}, at worst {micrometres(worst)}; '
+            f'RMSE {micrometres(points.rmse_um)}, at worst {micrometres(worst)}; '
             f'the gauge alone gives {micrometres(data.study.noise_floor_um)}.',
         ),
         ('Where', where or 'No region stands out.'),
@@ -191,7 +191,9 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     found = []
     diagnosis = data.diagnosis
     if diagnosis is None:
-        found.append(('RMSE', '', f'{data.rmse_um[-1]:.2f}', 'µm on all points'))
+        found.append(
+            ('RMSE', '', f'{data.comparisons[-1].points.rmse_um:.2f}', 'µm on all points')
+        )
     else:
         first, last = diagnosis.history[0], diagnosis.history[-1]
         for label, before, after in (
