@@ -69,12 +69,12 @@ def run_one(job: tuple[int, str]) -> dict:
             folder,
         )  # fmt: skip
         try:
-            return _judge(folder, seed, truth, layout)
+            return _diagnosed(folder, seed, truth, layout)
         except Exception as error:  # a crash is a result too
             return {'seed': seed, 'truth': truth, 'error': f'{type(error).__name__}: {error}'}
 
 
-def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
+def _diagnosed(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
     from paint_deposition.diagnosis.procedure import diagnose
     from paint_deposition.effects.catalogue import EFFECTS
     from paint_deposition.effects.deposition_model import DepositionModel

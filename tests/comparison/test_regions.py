@@ -1,4 +1,4 @@
-"""Regions of misfit: what is planted is found and told in words, noise is not."""
+"""Regions of misfit: what is planted is found and described in words, noise is not."""
 
 import numpy as np
 import pytest
@@ -45,7 +45,7 @@ def test_a_planted_misfit_is_found_and_told(study):
     assert found.mean_residual_um == pytest.approx(4.0, abs=1.0)
     assert 'upper third' in found.description
     assert 'lower third' not in found.description
-    assert 'um low' in found.description  # measured more: the model is low
+    assert 'µm low' in found.description  # measured more: the model is low
     assert found.readings == door.means.repeats[found.rows - np.argmax(on_door)].sum()
 
 
@@ -60,7 +60,7 @@ def test_left_and_right_are_the_guns(study, side, half):
     rows = np.flatnonzero((study.campaign.experiment_of == 1) & (aside > 0.2))
     found = regions(study, planted(study, rows, -5.0))[0]
     assert half in found.description
-    assert 'um high' in found.description
+    assert 'µm high' in found.description
 
 
 def test_one_bad_reading_is_no_region(study):

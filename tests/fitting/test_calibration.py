@@ -230,7 +230,7 @@ def test_negative_film(panel):
     film = panel.means.mean_um.copy()
     film[7] = -4.5
     text = refused(with_film(panel, film))
-    assert "point 'P7' reads -4.5 um" in text
+    assert "point 'P7' reads -4.5 µm" in text
     assert 'zero the gauge' in text
 
 

@@ -168,9 +168,9 @@ def test_what_is_left_out_is_named():
     taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
     lines = left_out_lines(taken, np.array([False, True, False, False, True]))
     assert lines == [
-        "point 'a': 15.5, 26.25 um contradict each other; left out of the fit, measure there "
+        "point 'a': 15.5, 26.25 µm contradict each other; left out of the fit, measure there "
         'again',
-        "point 'b': 4 um beside 20, 20.5; left out of the fit, measure it again",
+        "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
     ]
 
 
@@ -187,7 +187,7 @@ def test_a_study_goes_without_slips_and_says_so(sample):
     study, clean = Study.of(Campaign((slipped,))), Study.of(Campaign((door,)))
     beside = ', '.join(f'{value:.4g}' for value in thickness[others])
     assert study.notes == (
-        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} um beside {beside}; "
+        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} µm beside {beside}; "
         'left out of the fit, measure it again',
     )
     assert clean.notes == ()

@@ -100,7 +100,7 @@ def _described(
 ) -> str:
     incidence = values['incidence_deg'][region]
     return (
-        f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} um '
+        f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} µm '
         f'{"low" if mean_um > 0 else "high"}, incidence {incidence.min():.0f}-'
         f'{incidence.max():.0f} deg'
     )

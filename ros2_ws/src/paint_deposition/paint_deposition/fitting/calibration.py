@@ -197,7 +197,7 @@ def _warnings(
         )
     if study.noise.source == 'assumed':
         warnings.append(
-            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} um): repeat some '
+            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} µm): repeat some '
             'readings to know it'
         )
     return warnings

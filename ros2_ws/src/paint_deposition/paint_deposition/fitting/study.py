@@ -97,7 +97,7 @@ class Study:
         if self.noise.source != 'assumed':
             return self.campaign.notes
         return (
-            'The noise of the gauge was assumed (0.7 um and 1 %); take 6 or more repeats for '
+            'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
             'p-values that can be trusted.',
             *self.campaign.notes,
         )

@@ -63,7 +63,7 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
         out, kept = taken.thickness_um[here & ~used], taken.thickness_um[here & used]
         beside = f' beside {_listed(kept)}' if len(kept) else ' contradict each other'
         lines.append(
-            f"point '{label}': {_listed(out)} um{beside}; left out of the fit, measure "
+            f"point '{label}': {_listed(out)} µm{beside}; left out of the fit, measure "
             f'{"it" if len(kept) else "there"} again'
         )
     return lines
