@@ -75,9 +75,8 @@ class Evidence:
     """
 
     def __init__(self, hypothesis: Hypothesis, freedom: float = np.inf) -> None:
-        self.freedom = freedom
-        columns = hypothesis.columns
-        self.columns = columns
+        self.hypothesis, self.freedom = hypothesis, freedom
+        self.columns = columns = hypothesis.columns
         precision = np.eye(columns.shape[1]) + columns.T @ columns
         self._lower = cholesky(precision, lower=True)
         self._log_det = 2.0 * float(np.sum(np.log(np.diag(self._lower))))

@@ -62,16 +62,16 @@ class ModelSpace:
             (), np.empty((len(null.deviation), 0)), np.empty(0), '', PRIOR['none']
         )
         singles = _singles(null, sensitivities)
-        alone = _log_bayes_factors(null, singles, freedom)
-        best = _best_shapes(singles, alone)
+        tested = [Evidence(h, freedom) for h in singles]
+        best = _best_shapes(singles, _log_bayes_factors(tested, null))
         more = [*_shapeless(null, fields, deviations), *_pairs(best)]
-        tested = [*singles, *more]
-        factors = np.concatenate([alone, _log_bayes_factors(null, more, freedom)])
+        tested += [Evidence(h, freedom) for h in more]
         mixed = _mixed(null, best, fields)
+        untested = [Evidence(h, freedom) for h in mixed]
         return ModelSpace(
-            [nothing, *tested, *mixed],
-            np.concatenate([[0.0], factors, _log_bayes_factors(null, mixed, freedom)]),
-            _p_value(null, tested, factors, freedom, seed),
+            [nothing, *singles, *more, *mixed],
+            np.concatenate([[0.0], _log_bayes_factors([*tested, *untested], null)]),
+            _p_value(tested, null, freedom, seed),
         )
 
     def posterior(self, log_bayes_factors: np.ndarray | None = None) -> np.ndarray:
@@ -86,12 +86,8 @@ class ModelSpace:
         return np.log([h.prior for h in self.hypotheses])
 
 
-def _log_bayes_factors(
-    null: NullModel, hypotheses: list[Hypothesis], freedom: float
-) -> np.ndarray:
-    return np.array(
-        [float(Evidence(h, freedom).log_bayes_factor(null.deviation)) for h in hypotheses]
-    )
+def _log_bayes_factors(evidence: list[Evidence], null: NullModel) -> np.ndarray:
+    return np.array([float(e.log_bayes_factor(null.deviation)) for e in evidence])
 
 
 def _singles(null: NullModel, sensitivities: list[Sensitivity]) -> list[Hypothesis]:
@@ -167,13 +163,11 @@ def _mixed(null: NullModel, best: list[Hypothesis], fields: list[np.ndarray]) ->
     ]
 
 
-def _p_value(
-    null: NullModel, tested: list[Hypothesis], factors: np.ndarray, freedom: float, seed: int
-) -> float:
+def _p_value(tested: list[Evidence], null: NullModel, freedom: float, seed: int) -> float:
     """Monte-Carlo p-value of the evidence of all hypotheses together (Davison & Hinkley 1997)."""
     draws = simulated(len(null.deviation), freedom, DRAWS, seed)
-    log_prior = np.log([h.prior for h in tested])
-    by_chance = np.stack([Evidence(h, freedom).log_bayes_factor(draws) for h in tested])
+    log_prior = np.log([e.hypothesis.prior for e in tested])
+    by_chance = np.stack([e.log_bayes_factor(draws) for e in tested])
     under_null = logsumexp(by_chance + log_prior[:, np.newaxis], axis=0)
-    observed = logsumexp(factors + log_prior)
+    observed = logsumexp(_log_bayes_factors(tested, null) + log_prior)
     return float((1 + np.count_nonzero(under_null >= observed)) / (1 + DRAWS))
