@@ -21,15 +21,12 @@ from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.effects.library.tcp_tilt import TcpTilt
-from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
 ROLLED = 'the same passes with the gun rolled 180 deg about its axis'
 REVERSED = 'the same passes in reverse order and direction'
-HALVED = 'the same passes at half the flow'
 
 
 @pytest.fixture(scope='module')
@@ -95,18 +92,6 @@ def test_every_spray_is_the_same_paint_another_way(study, name):
     rotation = changed.rotation
     assert np.linalg.det(rotation) == pytest.approx(np.ones(len(rotation)))
     assert np.abs(changed.position_m - experiment.path.position_m).max() <= 0.06 + 1e-9
-
-
-def test_half_the_flow_is_half_the_film_even_where_the_gun_has_just_closed(study):
-    """A lag of the trigger paints with the flow that the open gun had."""
-    experiment = study.campaign.experiments[0]
-    model = DepositionModel(effects=(TriggerLag(lag_on_s=0.1, lag_off_s=0.3),))
-    film_um = []
-    for path in (experiment.path, MENU[HALVED](experiment.path, experiment)):
-        integrator = FilmIntegrator(experiment.measured_points, model, 'double')
-        integrator.add(path)
-        film_um.append(integrator.film_um)
-    assert film_um[1] == pytest.approx(0.5 * film_um[0], rel=1e-12)
 
 
 def test_reversing_or_rolling_twice_changes_nothing(study):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from paint_deposition.diagnosis.procedure import ALPHA, SURE
+from paint_deposition.diagnosis.run import ALPHA, SURE
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows, effect_rows
@@ -172,7 +172,7 @@ def _compared(data: ReportData) -> Headline:
         title = 'The model is further off than the gauge explains'
     else:
         title = 'The model agrees with the readings'
-    worst = float(np.max(np.abs(data.residuals_um[-1])))
+    worst = float(np.abs(points.residual_um[points.worst]))
     where = ' '.join(f'{capital(in_print(region.description))}.' for region in regions[:3])
     facts = (
         (
