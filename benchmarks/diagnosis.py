@@ -17,7 +17,7 @@ import click
 import numpy as np
 from tqdm import tqdm
 
-# One thread a process: several campaigns are judged at once, and would wait for each other.
+# One thread a process: several campaigns are linear at once, and would wait for each other.
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
     os.environ.setdefault(threads, '1')
 
@@ -69,12 +69,12 @@ def run_one(job: tuple[int, str]) -> dict:
             folder,
         )  # fmt: skip
         try:
-            return _judge(folder, seed, truth, layout)
+            return _diagnosed(folder, seed, truth, layout)
         except Exception as error:  # a crash is a result too
             return {'seed': seed, 'truth': truth, 'error': f'{type(error).__name__}: {error}'}
 
 
-def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
+def _diagnosed(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict:
     from paint_deposition.diagnosis.procedure import diagnose
     from paint_deposition.effects.catalogue import EFFECTS
     from paint_deposition.effects.deposition_model import DepositionModel
@@ -88,7 +88,7 @@ def _judge(folder: Path, seed: int, truth: str, layout: tuple[str, ...]) -> dict
         'seed': seed,
         'truth': truth,
         'layout': '+'.join(layout),
-        'readings': campaign.reading_count,
+        'readings': len(campaign.readings),
         'seconds': seconds,
         **_said(diagnosis),
         'heldout': _held_out(folder, campaign, diagnosis),
@@ -129,22 +129,21 @@ def _class_of(truth: str, diagnosis) -> set[str]:
 
 def _held_out(folder: Path, campaign, diagnosis) -> dict[str, float]:
     """RMSE on readings the diagnosis never saw, over the noise of the gauge there."""
-    from paint_deposition.files.readings_files import read_readings
+    from paint_deposition.files.gauge_readings import read_readings
     from paint_deposition.fitting.study import Study
     from paint_deposition.readings.campaign import Campaign, Experiment
+    from paint_deposition.readings.residuals import root_mean_square
 
     unseen = []
     for experiment in campaign.experiments:
         table = read_readings(folder / 'truth' / f'heldout_{experiment.name}.csv')
         unseen.append(Experiment.of(experiment.name, experiment.surface, experiment.path, table))
     study = Study.of(Campaign(tuple(unseen)))
-    noise = np.hypot(0.7, 0.01 * study.measured_um)
-    noise = noise / np.sqrt(np.concatenate([e.means.repeats for e in unseen]))
-    floor = float(np.sqrt(np.mean(noise**2)))
+    noise = np.hypot(0.7, 0.01 * study.measured_um) / np.sqrt(study.campaign.means.repeats)
+    floor = root_mean_square(noise)
     found = {}
     for name, step in (('before', diagnosis.history[0]), ('after', diagnosis.history[-1])):
-        off = study.measured_um - study.forward.predict_um(step.model)
-        found[name] = float(np.sqrt(np.mean(off**2))) / floor
+        found[name] = study.residuals(study.forward.predict_um(step.model)).rmse_um / floor
     return found
 
 
@@ -169,13 +168,13 @@ def _amounts(folder: Path, truth: str, campaign, diagnosis) -> list[dict]:
 
 
 def stepwise_bic(diagnosis) -> dict:
-    """Forward selection by BIC over the same signatures: the usual way, for comparison."""
-    from paint_deposition.diagnosis.sensitivities import neutral_shapes, signature
+    """Forward selection by BIC over the same sensitivities: the usual way, for comparison."""
+    from paint_deposition.diagnosis.sensitivities import neutral_shapes, sensitivity
     from paint_deposition.effects.catalogue import EFFECTS
 
     study, fit = diagnosis.study, diagnosis.history[0].fit
-    marks = [
-        signature(study.forward, fit, shape, study.sigma_um)
+    sensitivities = [
+        sensitivity(study.forward, fit, shape, study.sigma_um)
         for effect in EFFECTS.values()
         for shape in neutral_shapes(effect)
     ]
@@ -190,15 +189,15 @@ def stepwise_bic(diagnosis) -> dict:
     value = bic(columns)
     while len(chosen) < 3:
         options = [
-            (bic(np.hstack([columns, m.columns])), k)
-            for k, m in enumerate(marks)
-            if m.id not in chosen
+            (bic(np.hstack([columns, s.columns])), k)
+            for k, s in enumerate(sensitivities)
+            if s.id not in chosen
         ]
         best, k = min(options)
         if best >= value:
             break
-        value, columns = best, np.hstack([columns, marks[k].columns])
-        chosen.append(marks[k].id)
+        value, columns = best, np.hstack([columns, sensitivities[k].columns])
+        chosen.append(sensitivities[k].id)
     return {'chosen': chosen}
 
 

@@ -139,7 +139,7 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
         lines = (done.stdout + done.stderr).splitlines()
         (told,) = (line for line in lines if 'left out of the fit' in line)
         note = told.partition(': ')[2]
-        assert note.startswith(f"door: point '{labels[slip]}': {float(text) - 11.0:.4g} um beside")
+        assert note.startswith(f"door: point '{labels[slip]}': {float(text) - 11.0:.4g} µm beside")
         if command == ['calibrate']:
             written = json.loads((output / 'calibration.json').read_text())['warnings']
             assert note in written

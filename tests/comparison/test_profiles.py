@@ -26,7 +26,8 @@ def test_every_reading_is_on_one_profile_of_its_own_experiment(study, profiles):
     rows = np.concatenate([p.rows for p in profiles])
     assert np.array_equal(np.sort(rows), np.arange(len(study)))
     for profile in profiles:
-        names = {study.campaign.experiments[k].name for k in study.experiment_of[profile.rows]}
+        campaign = study.campaign
+        names = {campaign.experiments[k].name for k in campaign.experiment_of[profile.rows]}
         assert names == {profile.experiment}
 
 

@@ -1,4 +1,4 @@
-"""Regions of misfit: what is planted is found and told in words, noise is not."""
+"""Regions of misfit: what is planted is found and described in words, noise is not."""
 
 import numpy as np
 import pytest
@@ -14,7 +14,8 @@ def study(sample):
 
 
 def regions(study, residual_um):
-    return misfit_regions(study, residual_um, study.sigma_um, DepositionModel())
+    predicted_um = study.measured_um - residual_um
+    return misfit_regions(study, study.residuals(predicted_um), DepositionModel())
 
 
 def planted(study, rows, size_um, seed=0):
@@ -35,8 +36,8 @@ def test_noise_is_no_region(study):
 
 def test_a_planted_misfit_is_found_and_told(study):
     door = study.campaign.experiments[1]
-    on_door = study.experiment_of == 1
-    height = study.positions_m[:, 2] / np.ptp(door.surface.vertices_m[:, 2])
+    on_door = study.campaign.experiment_of == 1
+    height = study.campaign.positions_m[:, 2] / np.ptp(door.surface.vertices_m[:, 2])
     rows = np.flatnonzero(on_door & (height > 0.7))
     found = regions(study, planted(study, rows, 4.0))[0]
     assert found.experiment == door.name
@@ -44,7 +45,7 @@ def test_a_planted_misfit_is_found_and_told(study):
     assert found.mean_residual_um == pytest.approx(4.0, abs=1.0)
     assert 'upper third' in found.description
     assert 'lower third' not in found.description
-    assert 'um low' in found.description  # measured more: the model is low
+    assert 'µm low' in found.description  # measured more: the model is low
     assert found.readings == door.means.repeats[found.rows - np.argmax(on_door)].sum()
 
 
@@ -55,11 +56,11 @@ def test_left_and_right_are_the_guns(study, side, half):
     looking = door.path.rotation[:, :, 2].mean(axis=0)
     assert looking[1] < -0.9
     right = np.cross(looking, [0.0, 0.0, 1.0])
-    aside = side * (study.positions_m @ right)
-    rows = np.flatnonzero((study.experiment_of == 1) & (aside > 0.2))
+    aside = side * (study.campaign.positions_m @ right)
+    rows = np.flatnonzero((study.campaign.experiment_of == 1) & (aside > 0.2))
     found = regions(study, planted(study, rows, -5.0))[0]
     assert half in found.description
-    assert 'um high' in found.description
+    assert 'µm high' in found.description
 
 
 def test_one_bad_reading_is_no_region(study):

@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from paint_deposition.diagnosis.evidence import BaseSpace, Hypothesis
+from paint_deposition.diagnosis.evidence import Hypothesis, NullModel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.least_squares import Fit
-from paint_deposition.fitting.parameters import Unknowns
+from paint_deposition.fitting.parameters import FreeParameters
 
-UNKNOWNS = Unknowns.of(DepositionModel())
+PARAMETERS = FreeParameters.of(DepositionModel())
 
 
 def linear_fit(random: np.random.Generator, count: int, data: np.ndarray | None = None) -> Fit:
@@ -18,7 +18,7 @@ def linear_fit(random: np.random.Generator, count: int, data: np.ndarray | None 
         count: of the readings.
         data: (count,) readings.
     """
-    centre, width = UNKNOWNS.prior
+    centre, width = PARAMETERS.prior
     jacobian = random.normal(size=(count, len(centre))) / width
     if data is None:
         data = jacobian @ (centre + width * random.normal(size=len(width)))
@@ -28,22 +28,26 @@ def linear_fit(random: np.random.Generator, count: int, data: np.ndarray | None 
 
 def fit_linear(jacobian: np.ndarray, data: np.ndarray) -> Fit:
     """The most probable values (ridge regression toward the priors)."""
-    centre, width = UNKNOWNS.prior
+    centre, width = PARAMETERS.prior
     precision = jacobian.T @ jacobian + np.diag(width**-2.0)
     vector = np.linalg.solve(precision, jacobian.T @ data + centre / width**2)
     predicted = jacobian @ vector
-    return Fit(UNKNOWNS, vector, DepositionModel(), predicted, data - predicted, jacobian, True)
+    nuisance = np.empty((len(data), 0))
+    residual = data - predicted
+    return Fit(
+        PARAMETERS, vector, DepositionModel(), predicted, residual, jacobian, True, nuisance
+    )
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:
     """(P, P) covariance of readings that the base model predicts before it is fitted."""
-    scaled = fit.jacobian * fit.unknowns.prior[1]
+    scaled = fit.jacobian * fit.parameters.prior[1]
     return np.eye(len(fit.residual)) + scaled @ scaled.T
 
 
 def deviation(fit: Fit) -> np.ndarray:
     """(P,) data minus prediction at the priors' centre."""
-    return fit.residual + fit.jacobian @ (fit.vector - fit.unknowns.prior[0])
+    return fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior[0])
 
 
 def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
@@ -52,8 +56,8 @@ def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
     return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)
 
 
-def hypothesis(base: BaseSpace, columns: np.ndarray, sides=None, **named) -> Hypothesis:
+def hypothesis(null: NullModel, columns: np.ndarray, sides=None, **named) -> Hypothesis:
     """Something missing along these directions of the readings."""
     sides = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)
     given = {'effects': ('x',), 'other': '', 'prior': 0.5} | named
-    return Hypothesis(columns=base.project(columns), sides=sides, **given)
+    return Hypothesis(columns=null.whiten(columns), sides=sides, **given)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from diagnosis.linear import UNKNOWNS, fit_linear, linear_fit
+from diagnosis.linear import PARAMETERS, fit_linear, linear_fit
 from paint_deposition.diagnosis.cross_validation import hold_out
 
 READINGS = 24
@@ -31,7 +31,7 @@ def test_the_linear_update_is_a_refit(fit):
 
 
 def test_everything_left_out_is_predicted_by_the_priors(fit):
-    centre, width = UNKNOWNS.prior
+    centre, width = PARAMETERS.prior
     data = fit.predicted_um + fit.residual
     left_out = hold_out(fit, np.zeros(READINGS))
     scaled = fit.jacobian * width

@@ -24,7 +24,7 @@ from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.effects.library.tcp_tilt import TcpTilt
 from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.fitting.parameters import Unknowns
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.projection import Projection
 from paint_deposition.readings.campaign import Campaign
@@ -41,7 +41,7 @@ def study(sample):
 
 @pytest.fixture(scope='module')
 def fit(study):
-    return study.fit(Unknowns.of(DepositionModel()), starts=3)
+    return study.fit(FreeParameters.of(DepositionModel()), starts=3)
 
 
 @pytest.mark.parametrize(('rival', 'growth'), [(TcpOffset(), 5.0), (TcpTilt(), 3.0)])

@@ -50,7 +50,7 @@ def test_the_sample_arrives_whole(repository):
     assert [e.name for e in campaign.experiments] == ['panel', 'door']
     assert told[0] == 'reading panel'
     door = campaign.experiments[1]
-    assert len(door.readings) == campaign.reading_count - len(campaign.experiments[0].readings)
+    assert len(door.readings) == len(campaign.readings) - len(campaign.experiments[0].readings)
     assert len(door.points) == 3 * len(door)  # each with a neighbour up and one down the surface
     assert door.files['mesh'].endswith('measured_door/door.stl')
     assert set(door.groups) - {''}

@@ -35,23 +35,25 @@ def campaign_of(painted: Painted) -> Campaign:
     return Campaign(tuple(experiments))
 
 
-def passes(heights_m, speed_m_per_s=0.15, standoff_m=0.25, turned=False) -> Trajectory:
+def passes(
+    heights_m, speed_m_per_s=0.15, standoff_m=0.25, turned=False, samples=800
+) -> Trajectory:
     """To and fro along x at these heights, gun on between x = -1.2 and 1.2 m."""
     stamps, positions, quaternions, triggers = [], [], [], []
     clock = 0.0
     # Half a turn about the gun's axis.
     half_turn = np.array([0.0, np.sqrt(0.5), -np.sqrt(0.5), 0.0])
     for number, height in enumerate(heights_m):
-        share = np.linspace(0.0, 1.0, 800)
+        share = np.linspace(0.0, 1.0, samples)
         way = 1.0 if number % 2 == 0 else -1.0
         x = way * (-1.2 + 2.4 * share)
         duration = 2.4 / speed_m_per_s
         stamps.append(clock + duration * share)
         positions.append(
-            np.stack([x, np.full(800, standoff_m), np.full(800, float(height))], axis=1)
+            np.stack([x, np.full(samples, standoff_m), np.full(samples, float(height))], axis=1)
         )
         turn = half_turn if turned and number % 2 else FACING
-        quaternions.append(np.tile(turn, (800, 1)))
+        quaternions.append(np.tile(turn, (samples, 1)))
         triggers += [clock, clock + duration]
         clock += duration + 1.0
     return Trajectory(

@@ -1,6 +1,6 @@
 """Fits of eqs. (1) to (3) to profiles measured on other people's machines, and their picture.
 
-python tests/inference/real_profiles.py DATA_FOLDER PICTURE draws them.
+python tests/fitting/real_profiles.py DATA_FOLDER PICTURE draws them.
 """
 
 import math
@@ -41,8 +41,12 @@ class Transect:
 
 
 def transect(folder: Path) -> Transect:
-    """Fit the transect; feet and inches take the places of metres and micrometres."""
-    station, depth = table(folder / 'travelling_gun_transect_1d_collapse.csv').T
+    """The measured transect and its fits."""
+    return fitted_transect(*table(folder / 'travelling_gun_transect_1d_collapse.csv').T)
+
+
+def fitted_transect(station: np.ndarray, depth: np.ndarray) -> Transect:
+    """Fit a transect; feet and inches take the places of metres and micrometres."""
     one_pass = Panel(station, np.zeros(1), np.ones(1), np.zeros(1, dtype=bool), 1.0, 0.0)
     three = fit_collapse(one_pass, depth, np.full(len(depth), 0.05))
 
@@ -74,9 +78,13 @@ class Spot:
 
 
 def spot(folder: Path) -> Spot:
-    """Fit the magnetron's profile, in hundredths of its unit."""
+    """The magnetron's profile, in hundredths of its unit, and its fit."""
     _, radius_mm, thickness = table(folder / 'magnetron_static_radial_130mm.csv').T
-    radius, thickness = radius_mm * 1e-3, thickness / 100.0
+    return fitted_spot(radius_mm * 1e-3, thickness / 100.0)
+
+
+def fitted_spot(radius: np.ndarray, thickness: np.ndarray) -> Spot:
+    """Fit eq. (1) without asymmetry to a radial profile."""
 
     def pattern(x: np.ndarray) -> PlanarPattern:
         return PlanarPattern(
@@ -117,16 +125,39 @@ class Inclined:
 
 
 def inclined(folder: Path) -> Inclined:
-    """Read the coating's thicknesses and project the axis onto surface inclined as much."""
-    rows = table(folder / 'hvof_wc17co_thickness_angle_standoff.csv')
-    lean = np.radians(90.0 - rows[:, 0])
+    """Read the coating's thicknesses and project the axis onto surfaces inclined as much."""
+    angle, standoff, thickness = table(folder / 'hvof_wc17co_thickness_angle_standoff.csv')[
+        :, :3
+    ].T
+    return Inclined(angle, standoff, thickness, share_on_the_axis(angle))
+
+
+def share_on_the_axis(angle_deg: np.ndarray) -> np.ndarray:
+    """Eq. (2) on the gun's axis at spray angles (N,), relative to the largest."""
+    lean = np.radians(90.0 - angle_deg)
     normals = np.stack([np.sin(lean), np.zeros(len(lean)), -np.cos(lean)], axis=1)
     projection = Projection()
     tcp = np.array([0.0, 0.0, -0.25])
     flux = flux_um_per_s(
         PlanarPattern(), projection, np.zeros((len(lean), 3)), normals, tcp, np.eye(3)
     )
-    return Inclined(rows[:, 0], rows[:, 1], rows[:, 2], flux / flux.max())
+    return flux / flux.max()
+
+
+def figures(folder: Path) -> dict[str, dict[str, float]]:
+    """What the fits to the measured profiles say, without the measurements themselves."""
+    moving, static, coating = transect(folder), spot(folder), inclined(folder)
+    cosine, cosine_error, standoff, standoff_error = coating.exponents
+    return {
+        'eq3': moving.three.collapse.model_dump(),
+        'eq1': static.pattern.model_dump(),
+        'eq2': {
+            'cosine_exponent': cosine,
+            'cosine_error': cosine_error,
+            'standoff_exponent': standoff,
+            'standoff_error': standoff_error,
+        },
+    }
 
 
 def draw(folder: Path, picture: Path) -> None:

@@ -19,8 +19,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.fitting.calibration import calibrate, predict, started_from
+from paint_deposition.fitting.calibration import calibrate, started_from
 from paint_deposition.fitting.collapse_fit import fit_collapse
+from paint_deposition.fitting.study import Study
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.readings.campaign import Campaign, Experiment
@@ -130,7 +131,7 @@ def test_crosswise_passes_determine_the_asymmetry(panel):
 def test_single_pass_is_enough_for_a_fit():
     one = painted_by(TRUTH, passes((1.0,)), column(0.3, 1.7))
     result = calibrate(Campaign((one,)))
-    assert result.agreements[0].residual_sd_um < 0.35
+    assert result.residuals[0].sd_um < 0.35
     assert result.model.planar.K1_cm3_per_s == pytest.approx(1.6, rel=0.03)
 
 
@@ -144,7 +145,7 @@ def test_standoff_other_than_the_model_plane_is_taken_into_account():
 def test_fit_of_ninety_readings_takes_less_than_two_seconds(panel):
     points = column(count=45)
     campaign = Campaign((painted_by(TRUTH, THREE_PASSES, points),))
-    assert campaign.reading_count == 90
+    assert len(campaign.readings) == 90
     took = []
     for _ in range(3):
         start = time.process_time()
@@ -158,11 +159,12 @@ def test_papers_study_fit_at_577_predict_525_and_625(seed):
     """On panels of the virtual paint shop, which shares no code with the model."""
     fitted = calibrate(campaign_of(panel_study(seed, 0.577, parcels=2_000_000)))
     noise = 0.73
-    assert fitted.agreements[0].residual_sd_um < 1.15 * noise
+    assert fitted.residuals[0].sd_um < 1.15 * noise
     for index in (0.525, 0.625):
-        (other,) = predict(fitted.model, campaign_of(panel_study(seed, index, parcels=2_000_000)))
-        assert other.predicted_mean_um == pytest.approx(other.measured_mean_um, rel=0.015)
-        assert other.residual_sd_um < 1.2 * noise
+        other = Study.of(campaign_of(panel_study(seed, index, parcels=2_000_000)))
+        residuals = other.residuals(other.forward.predict_um(fitted.model))
+        assert residuals.predicted_um.mean() == pytest.approx(other.measured_um.mean(), rel=0.015)
+        assert residuals.sd_um < 1.2 * noise
 
 
 def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
@@ -228,7 +230,7 @@ def test_negative_film(panel):
     film = panel.means.mean_um.copy()
     film[7] = -4.5
     text = refused(with_film(panel, film))
-    assert "point 'P7' reads -4.5 um" in text
+    assert "point 'P7' reads -4.5 µm" in text
     assert 'zero the gauge' in text
 
 
@@ -250,4 +252,4 @@ def test_all_in_another_unit(panel, factor, unit):
 def test_thin_edges_of_a_pattern_are_no_other_unit():
     wide = painted_by(TRUTH, passes((1.0,)), column(0.05, 1.95), noise_um=0.05)
     assert wide.means.mean_um.min() < 0.5
-    assert calibrate(Campaign((wide,))).agreements[0].residual_sd_um < 0.2
+    assert calibrate(Campaign((wide,))).residuals[0].sd_um < 0.2

@@ -1,5 +1,7 @@
 """The fit: a known pattern from readings without noise, and uncertainties as wide as they are."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import derivatives, fit_readings
-from paint_deposition.fitting.parameters import PATTERN, Unknowns
+from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 from paint_deposition.fitting.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
@@ -60,7 +62,7 @@ def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
 
 def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
     fit = fit_readings(
-        forward, exact, np.full(len(exact), 0.003), Unknowns.of(DepositionModel()), starts=6
+        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(DepositionModel()), starts=6
     )
     assert fit.converged
     assert fit.chi_square < 1.0
@@ -71,35 +73,35 @@ def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
 def test_a_known_amplitude_comes_back_beside_the_pattern(forward):
     fogged = TRUTH.with_effect(OversprayFog(fog_um=1.7))
     measured = forward.predict_um(fogged)
-    unknowns = Unknowns.of(TRUTH, OversprayFog())
-    fit = fit_readings(forward, measured, np.full(len(measured), 0.01), unknowns, starts=3)
+    parameters = FreeParameters.of(TRUTH, OversprayFog())
+    fit = fit_readings(forward, measured, np.full(len(measured), 0.01), parameters, starts=3)
     assert fit.model.effect('overspray_fog').fog_um == pytest.approx(1.7, rel=0.01)
-    assert unknowns.names[-1] == 'overspray_fog.fog_um'
+    assert parameters.names[-1] == 'overspray_fog.fog_um'
 
 
 def test_derivatives_are_those_of_the_prediction(forward, exact):
-    unknowns = Unknowns.of(TRUTH, OversprayFog(fog_um=0.5))
-    vector = unknowns.encode(unknowns.start)
-    found = derivatives(forward, unknowns, vector, np.full(len(exact), SIGMA_UM))
+    parameters = FreeParameters.of(TRUTH, OversprayFog(fog_um=0.5))
+    vector = parameters.encode(parameters.start)
+    found = derivatives(forward, parameters, vector, np.full(len(exact), SIGMA_UM))
     for k in range(len(vector)):
         ends = []
         for step in (-1e-4, 1e-4):
             moved = vector.copy()
             moved[k] += step
-            ends.append(forward.predict_um(unknowns.decode(moved)))
+            ends.append(forward.predict_um(parameters.decode(moved)))
         slope = (ends[1] - ends[0]) / 2e-4 / SIGMA_UM
         assert found[:, k] == pytest.approx(slope, abs=0.01 * np.abs(slope).max()), k
 
 
 def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
     random = np.random.default_rng(4)
-    unknowns = Unknowns.of(TRUTH)
+    parameters = FreeParameters.of(TRUTH)
     sigma = np.full(len(exact), SIGMA_UM)
     vectors = []
     for _ in range(50):
         measured = exact + SIGMA_UM * random.normal(size=len(exact))
-        vectors.append(fit_readings(forward, measured, sigma, unknowns).vector)
-    reference = fit_readings(forward, exact, sigma, unknowns)
+        vectors.append(fit_readings(forward, measured, sigma, parameters).vector)
+    reference = fit_readings(forward, exact, sigma, parameters)
     # With fixed truth the estimates scatter by C J'J C, a little less than C for the priors.
     covariance = reference.covariance
     information = reference.jacobian.T @ reference.jacobian
@@ -112,32 +114,34 @@ def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
 
 
 def test_readings_that_say_nothing_leave_the_priors(forward, exact):
-    unknowns = Unknowns.of(DepositionModel())
-    fit = fit_readings(forward, exact, np.full(len(exact), 1e9), unknowns)
-    centre, width = unknowns.prior
+    parameters = FreeParameters.of(DepositionModel())
+    fit = fit_readings(forward, exact, np.full(len(exact), 1e9), parameters)
+    centre, width = parameters.prior
     assert fit.vector == pytest.approx(centre, abs=1e-3)
     assert np.sqrt(np.diag(fit.covariance)) == pytest.approx(width, rel=1e-3)
 
 
-def test_further_deviations_are_allowed_for(forward, exact):
+def test_nuisance_directions_are_allowed_for(forward, exact):
     """A common error of all readings, allowed for, moves the fit by no more than it may."""
-    unknowns = Unknowns.of(TRUTH)
+    parameters = FreeParameters.of(TRUTH)
     sigma = np.full(len(exact), SIGMA_UM)
     wrong = exact + 1.5
-    extra = np.full((len(exact), 1), 2.0 / SIGMA_UM)
-    strict = fit_readings(forward, wrong, sigma, unknowns)
-    lenient = fit_readings(forward, wrong, sigma, unknowns, extra=extra)
-    truth = unknowns.encode(TRUTH)
+    nuisance = np.full((len(exact), 1), 2.0 / SIGMA_UM)
+    strict = fit_readings(forward, wrong, sigma, parameters)
+    lenient = fit_readings(forward, wrong, sigma, parameters, nuisance=nuisance)
+    truth = parameters.encode(TRUTH)
     assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
-    assert lenient.chi_square < 0.2 * strict.chi_square
-    assert lenient.extra_log_det == pytest.approx(np.log(1.0 + len(exact) * (2.0 / SIGMA_UM) ** 2))
+    assert lenient.marginal.chi_square < 0.2 * strict.chi_square
+    log_det = np.log(1.0 + len(exact) * (2.0 / SIGMA_UM) ** 2)
+    assert lenient.nuisance_log_det == pytest.approx(log_det)
+    assert strict.nuisance_log_det == 0.0
 
 
 def test_the_same_seed_gives_the_same_fit(forward, exact):
     noisy = exact + SIGMA_UM * np.random.default_rng(2).normal(size=len(exact))
     sigma = np.full(len(exact), SIGMA_UM)
     first, second = (
-        fit_readings(forward, noisy, sigma, Unknowns.of(DepositionModel()), starts=3, seed=5)
+        fit_readings(forward, noisy, sigma, FreeParameters.of(DepositionModel()), starts=3, seed=5)
         for _ in range(2)
     )
     assert np.array_equal(first.vector, second.vector)
@@ -152,24 +156,25 @@ def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     assert study.sigma_um == pytest.approx(
         np.sqrt(gauge**2 / 4 + (TEXTURE_SHARE * study.measured_um) ** 2), rel=0.02
     )
-    assert study.levels is None
+    assert study.nuisance.shape == (len(study), 0)
 
 
 def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
     parts = tuple(
-        painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)) for height in (0.4, 0.6)
+        replace(painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)), name=name)
+        for name, height in (('low', 0.4), ('high', 0.6))
     )
     study = Study.of(Campaign(parts))
     sigma = study.sigma_um[:18]
     level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
     here = np.column_stack([level, -level, zero, -zero]) / 2.0
-    assert study.levels[:18] == pytest.approx(here)
+    assert study.nuisance[:18] == pytest.approx(here)
     film = study.measured_um * study.sigma_um
-    assert (film @ study.levels[:, :2]).sum() == pytest.approx(0.0)
-    patches, bands = study.patches(), study.bands(TRUTH)
-    for blocks in (patches, bands):
+    assert (film @ study.nuisance[:, :2]).sum() == pytest.approx(0.0)
+    patches, by_pass = study.patches(), study.pass_blocks(TRUTH)
+    for blocks in (patches, by_pass):
         assert set(blocks[:18]).isdisjoint(blocks[18:])
-    assert len(np.unique(bands)) == 4
+    assert len(np.unique(by_pass)) == 4
     assert len(np.unique(patches)) >= 6
 
 

@@ -9,7 +9,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.fitting.parameters import PATTERN, Unknowns
+from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 from paint_deposition.model.pattern import PlanarPattern
 
 PATTERNS = st.builds(
@@ -30,8 +30,8 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
         planar=planar,
         effects=(AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)),
     )
-    unknowns = Unknowns.of(model, *model.effects)
-    again = unknowns.decode(unknowns.encode(model))
+    parameters = FreeParameters.of(model, *model.effects)
+    again = parameters.decode(parameters.encode(model))
     for name, value in planar:
         assert getattr(again.planar, name) == pytest.approx(value, abs=1e-12), name
     for before, after in zip(model.effects, again.effects, strict=True):
@@ -41,28 +41,31 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
 
 
 def test_a_vector_survives_the_way_there_and_back():
-    unknowns = Unknowns.of(DepositionModel(), AirDrift())
+    parameters = FreeParameters.of(DepositionModel(), AirDrift())
     vector = np.array([0.7, 0.3, -0.1, 0.2, 0.15, -2.5, -2.0, 0.4, -1.3])
-    assert len(unknowns) == len(vector) == len(unknowns.names)
-    assert unknowns.encode(unknowns.decode(vector)) == pytest.approx(vector)
+    assert len(parameters) == len(vector) == len(parameters.names)
+    assert parameters.encode(parameters.decode(vector)) == pytest.approx(vector)
 
 
 def test_amplitudes_count_in_their_typical_size():
-    unknowns = Unknowns.of(DepositionModel(), AirDrift())
-    vector = unknowns.encode(unknowns.start)
+    parameters = FreeParameters.of(DepositionModel(), AirDrift())
+    vector = parameters.encode(parameters.start)
     assert vector[len(PATTERN) :].tolist() == [0.0, 0.0]
     vector[len(PATTERN)] = 2.0
     typical = AirDrift.parameters()['shift_down_m']['typical']
-    assert unknowns.decode(vector).effect('air_drift').shift_down_m == pytest.approx(2 * typical)
-    assert unknowns.names[len(PATTERN) :] == ('air_drift.shift_down_m', 'air_drift.shift_across_m')
+    assert parameters.decode(vector).effect('air_drift').shift_down_m == pytest.approx(2 * typical)
+    assert parameters.names[len(PATTERN) :] == (
+        'air_drift.shift_down_m',
+        'air_drift.shift_across_m',
+    )
 
 
 def test_shapes_and_effects_that_are_not_varied_stay():
     start = DepositionModel(effects=(AirDrift(shift_down_m=0.03),))
     corner = CornerSlowdown(length_m=0.3)
-    unknowns = Unknowns.of(start, corner)
-    assert unknowns.varied == (('corner_slowdown', 'gain'),)
-    model = unknowns.decode(np.concatenate([unknowns.encode(unknowns.start)[:-1], [1.0]]))
+    parameters = FreeParameters.of(start, corner)
+    assert parameters.varied == (('corner_slowdown', 'gain'),)
+    model = parameters.decode(np.concatenate([parameters.encode(parameters.start)[:-1], [1.0]]))
     assert model.effect('air_drift') == AirDrift(shift_down_m=0.03)
     assert model.effect('corner_slowdown').length_m == 0.3
     assert model.effect('corner_slowdown').gain > 0.0
@@ -70,20 +73,20 @@ def test_shapes_and_effects_that_are_not_varied_stay():
 
 @pytest.mark.parametrize('effect', EFFECTS.values(), ids=EFFECTS.keys())
 def test_bounds_and_prior_suit_every_effect(effect):
-    unknowns = Unknowns.of(DepositionModel(), effect())
-    low, high = unknowns.bounds
-    centre, width = unknowns.prior
+    parameters = FreeParameters.of(DepositionModel(), effect())
+    low, high = parameters.bounds
+    centre, width = parameters.prior
     assert (low <= centre).all()
     assert (centre <= high).all()
     assert (width > 0.0).all()
     for end in (low, high):
-        decoded = unknowns.decode(end)
-        assert unknowns.encode(decoded)[len(PATTERN) :] == pytest.approx(end[len(PATTERN) :])
+        decoded = parameters.decode(end)
+        assert parameters.encode(decoded)[len(PATTERN) :] == pytest.approx(end[len(PATTERN) :])
 
 
 def test_an_asymmetry_beyond_one_is_cut():
-    vector = Unknowns.of(DepositionModel()).encode(DepositionModel())
+    vector = FreeParameters.of(DepositionModel()).encode(DepositionModel())
     vector[2:4] = 0.9
-    model = Unknowns.of(DepositionModel()).decode(vector)
+    model = FreeParameters.of(DepositionModel()).decode(vector)
     assert model.planar.K3 == 1.0
     assert model.planar.phi_rad == pytest.approx(np.pi / 4)

@@ -67,7 +67,7 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
 def test_normal_readings_are_not_dropped(layout, scale):
     random = np.random.default_rng(2)
     dropped = [
-        gross_outliers([readings]).mean()
+        gross_outliers(readings).mean()
         for readings, _ in campaigns(layout, lambda count: scale * random.normal(size=count))
     ]
     assert np.mean(dropped) < 1e-3
@@ -78,7 +78,7 @@ def test_the_noise_of_normal_readings_is_unbiased(layout):
     """1000 campaigns with 20 degrees of freedom or more know a standard deviation to 0.5 %."""
     random = np.random.default_rng(3)
     squares = [
-        np.mean((gauge_noise([readings]).sigma_um / usual_noise_um(film)) ** 2)
+        np.mean((gauge_noise(readings).sigma_um / usual_noise_um(film)) ** 2)
         for readings, film in campaigns(layout, lambda count: random.normal(size=count))
     ]
     assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.02)
@@ -89,7 +89,7 @@ def test_few_readings_with_heavy_tails_are_dropped(layout):
     """Of Student's t with three degrees of freedom 1.1 % lie beyond 5 of its robust sigmas."""
     random = np.random.default_rng(4)
     dropped = [
-        gross_outliers([readings]).mean()
+        gross_outliers(readings).mean()
         for readings, _ in campaigns(layout, lambda count: random.standard_t(3, size=count))
     ]
     assert np.mean(dropped) < 0.011
@@ -98,7 +98,7 @@ def test_few_readings_with_heavy_tails_are_dropped(layout):
 def test_a_display_in_whole_micrometres_makes_no_outliers():
     """Nine pairs in ten without any scatter are no reason to doubt the tenth."""
     labels, _ = honest_pairs()
-    assert not gross_outliers([at_points(labels, [26.0] * 19 + [27.0])]).any()
+    assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
 
 
 # --- slips are found
@@ -107,9 +107,9 @@ def test_a_display_in_whole_micrometres_makes_no_outliers():
 def test_one_slip_does_not_raise_the_noise():
     labels, thickness = honest_pairs()
     readings = at_points(labels + 'xxx', [*thickness, 15.5, 26.6, 26.1])
-    noise = gauge_noise([readings])
+    noise = gauge_noise(readings)
     assert np.flatnonzero(noise.gross).tolist() == [20]
-    honest = gauge_noise([readings.select(~noise.gross)])
+    honest = gauge_noise(readings.select(~noise.gross))
     assert noise.sigma_um[:20] == pytest.approx(honest.sigma_um[:20])
     assert noise.degrees_of_freedom == honest.degrees_of_freedom == 11
 
@@ -128,7 +128,11 @@ def test_one_slip_does_not_raise_the_noise():
 def test_the_minority_at_a_point_is_wrong(thickness, gross):
     labels, others = honest_pairs()
     # The point is on another part, which has a point of the name 'A' as well.
-    found = gross_outliers([at_points(labels, others), at_points('A' * len(gross), thickness)])
+    found = gross_outliers(
+        Readings.joined(
+            {'rest': at_points(labels, others), 'here': at_points('A' * len(gross), thickness)}
+        )
+    )
     assert found[20:].tolist() == gross
     assert not found[:20].any()
 
@@ -137,22 +141,24 @@ def test_several_slips_do_not_hide_each_other():
     labels, thickness = honest_pairs(20)
     for row in (0, 11, 25):
         thickness[row] += 11.0
-    found = np.flatnonzero(gross_outliers([at_points(labels, thickness)]))
+    found = np.flatnonzero(gross_outliers(at_points(labels, thickness)))
     assert found.tolist() == [0, 1, 10, 11, 24, 25]
 
 
 def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
-    assert gross_outliers([at_points('aab', [26.0, 45.0, 20.0])]).tolist() == [True, True, False]
-    assert not gross_outliers([at_points('aab', [26.0, 32.0, 20.0])]).any()
-    assert not gross_outliers([at_points('', [])]).any()
+    assert gross_outliers(at_points('aab', [26.0, 45.0, 20.0])).tolist() == [True, True, False]
+    assert not gross_outliers(at_points('aab', [26.0, 32.0, 20.0])).any()
+    assert not gross_outliers(at_points('', [])).any()
 
 
 def test_a_precise_instrument_beside_the_gauge_has_its_own_scale():
     labels, thickness = honest_pairs(sigma_um=5.0)
     rough, fine = at_points(labels, thickness), at_points(labels, [26.0] * 20, sigma_um=0.05)
-    assert not gross_outliers([rough, fine]).any()
+    assert not gross_outliers(Readings.joined({'rough': rough, 'fine': fine})).any()
     slipped = at_points(labels, [26.0] * 18 + [26.0, 34.0], sigma_um=0.05)
-    assert np.flatnonzero(gross_outliers([rough, slipped])).tolist() == [38, 39]
+    assert np.flatnonzero(
+        gross_outliers(Readings.joined({'rough': rough, 'slipped': slipped}))
+    ).tolist() == [38, 39]
 
 
 # --- and are named
@@ -162,9 +168,9 @@ def test_what_is_left_out_is_named():
     taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
     lines = left_out_lines(taken, np.array([False, True, False, False, True]))
     assert lines == [
-        "point 'a': 15.5, 26.25 um contradict each other; left out of the fit, measure there "
+        "point 'a': 15.5, 26.25 µm contradict each other; left out of the fit, measure there "
         'again',
-        "point 'b': 4 um beside 20, 20.5; left out of the fit, measure it again",
+        "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
     ]
 
 
@@ -181,7 +187,7 @@ def test_a_study_goes_without_slips_and_says_so(sample):
     study, clean = Study.of(Campaign((slipped,))), Study.of(Campaign((door,)))
     beside = ', '.join(f'{value:.4g}' for value in thickness[others])
     assert study.notes == (
-        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} um beside {beside}; "
+        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} µm beside {beside}; "
         'left out of the fit, measure it again',
     )
     assert clean.notes == ()

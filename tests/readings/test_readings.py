@@ -43,7 +43,7 @@ def test_noise_is_pooled_within_points():
     """At zero film the usual gauge's noise is its floor, so pooling is the textbook formula."""
     values = np.array([-1.0, 0.3, 0.7, 1.2, -1.2, 0.5, 0.1, -0.6, 0.0])
     labels = 'aaabbbccc'
-    noise = gauge_noise([at_points(labels, values)])
+    noise = gauge_noise(at_points(labels, values))
     squares = sum(np.var(values[k : k + 3], ddof=1) * 2 for k in (0, 3, 6))
     assert noise.source == 'repeats'
     assert noise.degrees_of_freedom == 6
@@ -58,7 +58,7 @@ def test_noise_keeps_the_shape_of_a_usual_gauge():
     readings = Readings.of(
         np.zeros((800, 3)), film + sigma * random.normal(size=800), point=labels
     )
-    noise = gauge_noise([readings])
+    noise = gauge_noise(readings)
     assert noise.degrees_of_freedom == 400
     # The standard error of a pooled deviation is 1 / sqrt(2 x 400) = 3.5 %.
     assert noise.sigma_um / sigma == pytest.approx(np.ones(800), abs=0.1)
@@ -66,23 +66,24 @@ def test_noise_keeps_the_shape_of_a_usual_gauge():
 
 def test_one_label_on_two_parts_is_two_points_of_one_gauge():
     first, second = at_points('aab', [1.0, 2.0, 9.0]), at_points('aabbbb', [7.0, 8.0, 1, 2, 3, 4])
-    noise = gauge_noise([first, second])  # 1 + 1 + 3 degrees of freedom are too few
+    parts = {'first': first, 'second': second}
+    noise = gauge_noise(Readings.joined(parts))  # 1 + 1 + 3 degrees of freedom are too few
     assert noise.source == 'assumed'
-    third = at_points('aa', [5.0, 6.0])
-    assert gauge_noise([first, second, third]).degrees_of_freedom == ENOUGH_REPEATS
+    parts['third'] = at_points('aa', [5.0, 6.0])
+    assert gauge_noise(Readings.joined(parts)).degrees_of_freedom == ENOUGH_REPEATS
 
 
 @pytest.mark.parametrize('thickness', [[20.0, 30.0], [20.0] * 9])
 def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
     labels = 'ab' if len(thickness) == 2 else 'a' * 9
-    noise = gauge_noise([at_points(labels, thickness)])
+    noise = gauge_noise(at_points(labels, thickness))
     assert noise.source == 'assumed'
     assert noise.degrees_of_freedom == ASSUMED_FREEDOM
     assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
 
 
 def test_stated_noise_wins():
-    noise = gauge_noise([at_points('aaaaaaaa', np.arange(8.0), [0.5] * 8)])
+    noise = gauge_noise(at_points('aaaaaaaa', np.arange(8.0), [0.5] * 8))
     assert (noise.source, noise.degrees_of_freedom) == ('stated', np.inf)
     assert noise.typical_um == 0.5
 
@@ -91,7 +92,7 @@ def test_repeats_of_stated_readings_say_nothing_of_the_others():
     """A precise instrument for some points must not make the gauge look precise."""
     values = [5.0, 5.001, 4.999] * 3 + [0.0, 2.0, -2.0, 1.0, -1.0, 2.0, -2.0]
     stated = [0.001] * 9 + [np.nan] * 7
-    noise = gauge_noise([at_points('aaaaaaaaabbbbbbb', values, stated)])
+    noise = gauge_noise(at_points('aaaaaaaaabbbbbbb', values, stated))
     assert noise.source == 'repeats'
     assert noise.degrees_of_freedom == 6
     assert noise.sigma_um[:9] == pytest.approx(0.001)

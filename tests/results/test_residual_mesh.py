@@ -6,7 +6,7 @@ import trimesh
 from scipy.spatial import cKDTree
 
 from paint_deposition.comparison.comparison import compare
-from paint_deposition.comparison.residual_field import point_residuals_um, radius_of_readings_m
+from paint_deposition.comparison.residual_field import radius_of_readings_m
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.fitting.study import Study
@@ -19,15 +19,15 @@ def test_residuals_surround_their_readings_and_the_rest_is_grey(tmp_path):
     comparison = compare(study, DepositionModel())
     paths = write_residual_meshes(tmp_path, study, comparison)
     assert [path.name for path in paths] == ['residual_panel.ply', 'residual_door.ply']
-    by_point = point_residuals_um(study, comparison)
-    for path, experiment, residual in zip(
-        paths, study.campaign.experiments, by_point, strict=True
+    for number, (path, experiment) in enumerate(
+        zip(paths, study.campaign.experiments, strict=True)
     ):
+        residual = comparison.points.residual_um[study.campaign.experiment_of == number]
         mesh = trimesh.load_mesh(path, process=False)
         assert len(mesh.vertices) == len(experiment.surface.vertices_m)
         raw = mesh.metadata['_ply_raw']['vertex']['data']
         shown = np.asarray(raw['residual_um']).ravel()
-        positions = experiment.points.positions_m[: len(experiment)]
+        positions = experiment.measured_points.positions_m
         distance, nearest = cKDTree(positions).query(mesh.vertices)
         grey = np.all(mesh.visual.vertex_colors[:, :3] == BARE_RGB, axis=1)
         assert np.array_equal(grey, np.isnan(shown))

@@ -45,7 +45,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
     from paint_deposition.comparison.comparison import compare
     from paint_deposition.effects.deposition_model import DepositionModel
     from paint_deposition.files.json_files import json_text, write_json
-    from paint_deposition.fitting.parameters import Unknowns
+    from paint_deposition.fitting.parameters import FreeParameters
     from paint_deposition.fitting.study import Study
     from paint_deposition.report.page.report import write_report
     from paint_deposition.results.inference import comparison_as_dict, write_residuals
@@ -58,7 +58,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
             model = start.model
         else:
             tell('fitting the pattern')
-            model = study.fit(Unknowns.of(DepositionModel()), starts=10).model
+            model = study.fit(FreeParameters.of(DepositionModel()), starts=10).model
         tell('comparing')
         comparison = compare(study, model)
         content = comparison_as_dict(comparison)
@@ -75,17 +75,18 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
 
 def _say_comparison(comparison: Comparison, output: Path) -> None:
     for misfit in comparison.misfits:
-        indent = '' if misfit.kind == 'experiment' else '  '
+        found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         click.echo(
-            f'{indent}{misfit.label}: {misfit.readings} readings, bias {misfit.bias_um:+.2f} um, '
-            f'RMSE {misfit.rmse_um:.2f} um, chi2 per reading {misfit.chi_square_per_reading:.2f}'
+            f'{indent}{misfit.label}: {len(found)} readings, bias {found.bias_um:+.2f} um, '
+            f'RMSE {found.rmse_um:.2f} um, chi2 per reading {found.chi_square_per_reading:.2f}'
         )
-    click.echo(f'gauge noise {comparison.noise_um:.2f} um ({comparison.noise_source})')
+    noise = comparison.study.noise
+    click.echo(f'gauge noise {noise.typical_um:.2f} um ({noise.source})')
     for region in comparison.regions:
         click.echo(f'misfit: {region.experiment}: {region.description}')
     if not comparison.regions:
         click.echo('no region of significant misfit')
-    for note in comparison.notes:
+    for note in comparison.study.notes:
         click.echo(f'note: {note}')
     click.echo(f'report: {output / "report.html"}')
 

@@ -66,7 +66,7 @@ def calibrate(
     """
     from paint_deposition.files.json_files import json_text
     from paint_deposition.files.model_file import read_model_file
-    from paint_deposition.inference import calibration as calibrating
+    from paint_deposition.fitting import calibration as calibrating
     from paint_deposition.report.pictures.calibration import write_calibration_pictures
     from paint_deposition.results.calibration import calibration_as_dict, write_calibration
 
@@ -86,11 +86,11 @@ def calibrate(
         click.echo(
             f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
         )
-    for agreement in result.agreements:
+    for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
         click.echo(
-            f'{agreement.experiment}: {agreement.points} points, mean '
-            f'{agreement.measured_mean_um:.2f} um measured, {agreement.predicted_mean_um:.2f} '
-            f'predicted, residual SD {agreement.residual_sd_um:.2f} um'
+            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} um '
+            f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
+            f'{found.sd_um:.2f} um'
         )
     noise = result.study.noise
     click.echo(

@@ -4,34 +4,27 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2, spearmanr
+from scipy.stats import spearmanr
 
 from paint_deposition.comparison.regions import Region, misfit_regions
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.study import Study
+from paint_deposition.readings.residuals import Residuals
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far the model is off on some of the readings; residual = measured minus predicted.
+    """How far the model is off on some of the readings.
 
     Attributes:
         experiment, kind, label: which readings: kind is 'experiment', 'group' or 'pass'.
-        readings: how many.
-        bias_um, rmse_um, std_um: mean, root mean square and standard deviation of residuals.
-        chi_square_per_reading: about 1 where only the gauge's noise is left.
-        p_value: that noise alone gives this chi-square.
+        residuals: of these readings.
     """
 
     experiment: str
     kind: str
     label: str
-    readings: int
-    bias_um: float
-    rmse_um: float
-    std_um: float
-    chi_square_per_reading: float
-    p_value: float
+    residuals: Residuals
 
 
 @dataclass(frozen=True)
@@ -48,108 +41,56 @@ class Comparison:
     """The model beside the readings.
 
     Attributes:
-        predicted_um, residual_um, sigma_um: (N,) of every reading used, experiments in order.
+        study: the campaign, with the noise of its gauge and notes for the user.
+        readings: residuals of every reading used, experiments in order.
+        points: residuals of the points, averaged over repeats.
         misfits: of each experiment, its groups and its passes.
         dependences: strongest first.
         regions: where the misfit is significant, strongest first.
-        noise_source: where the gauge's noise is known from.
-        noise_um: standard deviation of a reading.
-        notes: remarks for the user.
     """
 
-    predicted_um: np.ndarray
-    residual_um: np.ndarray
-    sigma_um: np.ndarray
+    study: Study
+    readings: Residuals
+    points: Residuals
     misfits: tuple[Misfit, ...]
     dependences: tuple[Dependence, ...]
     regions: tuple[Region, ...]
-    noise_source: str
-    noise_um: float
-    notes: tuple[str, ...]
 
 
 def compare(study: Study, model: DepositionModel) -> Comparison:
-    """Predict every reading and sum up the misfit."""
-    at_points = study.forward.predict_um(model)
-    owner, start = [], 0
-    for experiment in study.campaign.experiments:
-        owner.append(experiment.means.owner + start)
-        start += len(experiment)
-    owner = np.concatenate(owner)
-    measured = np.concatenate([e.readings.thickness_um for e in study.campaign.experiments])
-    predicted = at_points[owner]
-    residual, sigma = measured - predicted, study.noise.sigma_um
-    off = study.measured_um - at_points
+    """Predict every reading and summarise the misfit."""
+    points = study.residuals(study.forward.predict_um(model))
+    campaign = study.campaign
+    readings = Residuals(
+        campaign.readings.thickness_um,
+        points.predicted_um[campaign.means.owner],
+        study.noise.sigma_um,
+    )
     dependences = []
     for covariate in study.covariates(model):
         if covariate.varies:
-            correlation, p_value = spearmanr(covariate.values, off)
+            correlation, p_value = spearmanr(covariate.values, points.residual_um)
             dependences.append(Dependence(covariate.name, float(correlation), float(p_value)))
     return Comparison(
-        predicted,
-        residual,
-        sigma,
-        tuple(_misfits(study, model, owner, residual, sigma)),
+        study,
+        readings,
+        points,
+        tuple(_misfits(study, model, readings)),
         tuple(sorted(dependences, key=lambda d: d.p_value)),
-        tuple(misfit_regions(study, off, study.sigma_um, model)),
-        study.noise.source,
-        study.noise.typical_um,
-        study.notes,
+        tuple(misfit_regions(study, points, model)),
     )
 
 
-def _misfits(
-    study: Study,
-    model: DepositionModel,
-    owner: np.ndarray,
-    residual: np.ndarray,
-    sigma: np.ndarray,
-) -> Iterator[Misfit]:
-    passes = study.bands(model)
-    labels_of_pass = _pass_labels(study, model)
-    start = 0
-    for index, experiment in enumerate(study.campaign.experiments):
-        rows = np.arange(start, start + len(experiment.readings))
-        start += len(experiment.readings)
-        yield _misfit(experiment.name, 'experiment', experiment.name, rows, residual, sigma)
+def _misfits(study: Study, model: DepositionModel, residuals: Residuals) -> Iterator[Misfit]:
+    owner = study.campaign.means.owner
+    experiment_of = study.campaign.experiment_of[owner]
+    groups, passes = study.campaign.readings.group, study.passes(model)[owner]
+    for number, experiment in enumerate(study.campaign.experiments):
+        here, name = experiment_of == number, experiment.name
+        yield Misfit(name, 'experiment', name, residuals.select(here))
         for label in dict.fromkeys(experiment.readings.group):
             if label:
-                inside = rows[experiment.readings.group == label]
-                yield _misfit(experiment.name, 'group', str(label), inside, residual, sigma)
-        here = np.unique(passes[study.experiment_of == index])
-        for band in here if len(here) > 1 else ():
-            inside = rows[passes[owner[rows]] == band]
-            label = f'pass {labels_of_pass[band]}'
-            yield _misfit(experiment.name, 'pass', label, inside, residual, sigma)
-
-
-def _pass_labels(study: Study, model: DepositionModel) -> dict[int, int]:
-    """Number, from 1, of the pass that each band belongs to."""
-    values = next(c for c in study.covariates(model) if c.name == 'spray_pass').values
-    return {
-        band: int(round(float(value))) + 1
-        for band, value in zip(study.bands(model), values, strict=True)
-    }
-
-
-def _misfit(
-    experiment: str,
-    kind: str,
-    label: str,
-    rows: np.ndarray,
-    residual: np.ndarray,
-    sigma: np.ndarray,
-) -> Misfit:
-    here, relative = residual[rows], residual[rows] / sigma[rows]
-    square = float(relative @ relative)
-    return Misfit(
-        experiment,
-        kind,
-        label,
-        len(rows),
-        float(here.mean()),
-        float(np.sqrt(np.mean(here**2))),
-        float(here.std(ddof=1)) if len(rows) > 1 else 0.0,
-        square / len(rows),
-        float(chi2.sf(square, len(rows))),
-    )
+                yield Misfit(name, 'group', str(label), residuals.select(here & (groups == label)))
+        painted_by = np.unique(passes[here])
+        for k in painted_by if len(painted_by) > 1 else ():
+            yield Misfit(name, 'pass', f'pass {k + 1}', residuals.select(here & (passes == k)))

@@ -58,7 +58,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     """
     found = []
     for index, experiment in enumerate(study.campaign.experiments):
-        first = int(np.searchsorted(study.experiment_of, index))
+        rows = np.flatnonzero(study.campaign.experiment_of == index)
         lines = [_Line.of(experiment, label, members) for label, members in _grouped(experiment)]
         grouped = bool(lines)
         if not grouped:
@@ -68,7 +68,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
         for line in lines:
             at, lines_um, passes_um = films.get(line.label, _nothing(len(models)))
             found.append(
-                Profile(experiment.name, line.label, line.axis, first + line.members,
+                Profile(experiment.name, line.label, line.axis, rows[line.members],
                         line.position_m, at, lines_um, passes_um)
             )  # fmt: skip
     return found
@@ -137,28 +137,28 @@ def _strips(experiment: Experiment) -> Iterator[_Line]:
 def _films_along(
     experiment: Experiment, lines: Sequence[_Line], models: Sequence[DepositionModel]
 ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Positions, films of the models and of single passes of each line."""
+    """By label of a line: positions, films of the models, and film of each pass alone."""
     if not lines:
         return {}
-    ways = [_way(experiment, line) for line in lines]
-    cuts = np.cumsum([len(at) for at, _, _ in ways])
+    along_lines = [_along(experiment, line) for line in lines]
+    cuts = np.cumsum([len(at) for at, _, _ in along_lines])
     count = int(cuts[-1])
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(
-        np.concatenate([way for _, way, _ in ways]),
-        np.concatenate([normals for _, _, normals in ways]),
+        np.concatenate([places_m for _, places_m, _ in along_lines]),
+        np.concatenate([normals for _, _, normals in along_lines]),
         stencil_m=STENCIL_M if slopes else None,
     )
     films = np.array([_gauge_um(experiment, points, model)[:count] for model in models])
     passes = np.array(list(_single_passes_um(experiment, points, models[-1])))[:, :count]
     found = {}
-    for line, (at, _, _), stop in zip(lines, ways, cuts, strict=True):
+    for line, (at, _, _), stop in zip(lines, along_lines, cuts, strict=True):
         here = slice(int(stop) - len(at), int(stop))
         found[line.label] = at, films[:, here], passes[:, here]
     return found
 
 
-def _way(experiment: Experiment, line: _Line) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _along(experiment: Experiment, line: _Line) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Positions along the axis, points near the surface and normals, through all readings."""
     members = line.members
     at = line.position_m

@@ -1,4 +1,4 @@
-"""Places where the model misses the readings, in words and numbers."""
+"""Regions of the part where the model misses the readings, in words and numbers."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -7,22 +7,22 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.study import Study
-from paint_deposition.readings.campaign import Experiment
+from paint_deposition.readings.residuals import Residuals
 
 # Regions are discs of these radii about a point [m], or bands of some sixths of the height.
 RADII_M = (0.08, 0.12, 0.18, 0.26, 0.36)
 BANDS = 6
 FEWEST = 2
 MOST_REGIONS = 6
-# Chance that noise alone makes a part's strongest region this strong.
-CHANCE = 0.02
+# Significance level: the probability that noise alone gives a part any region.
+SIGNIFICANCE = 0.02
 DRAWS = 1000
 SEED = 0
 
 
 @dataclass(frozen=True)
 class Region:
-    """Neighbouring points that are off to one side on average.
+    """Neighbouring points whose mean residual is significant.
 
     Attributes:
         description: in words, for a report.
@@ -39,27 +39,25 @@ class Region:
     mean_residual_um: float
 
 
-def misfit_regions(
-    study: Study, residual_um: np.ndarray, sigma_um: np.ndarray, model: DepositionModel
-) -> list[Region]:
+def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> list[Region]:
     """Significant regions, strongest first.
 
     Args:
         study: the readings.
-        residual_um, sigma_um: (P,) measured minus predicted and its standard deviation [um].
-        model: whose incidence is told.
+        points: residuals of the study's P points.
+        model: gives the incidence that the descriptions quote.
     """
-    facts = {c.name: c.values for c in study.covariates(model)}
+    values = {c.name: c.values for c in study.covariates(model)}
     random = np.random.default_rng(SEED)
     found = []
     for index, experiment in enumerate(study.campaign.experiments):
-        rows = np.flatnonzero(study.experiment_of == index)
-        places = _windows(study.positions_m[rows], facts['height_fraction'][rows])
+        rows = np.flatnonzero(study.campaign.experiment_of == index)
+        places = _windows(study.campaign.positions_m[rows], values['height_fraction'][rows])
         if not len(places):
             continue
         noise = np.abs(places @ random.normal(size=(len(rows), DRAWS))).max(axis=0)
-        threshold = float(np.quantile(noise, 1.0 - CHANCE))
-        left = residual_um[rows] / sigma_um[rows]
+        threshold = float(np.quantile(noise, 1.0 - SIGNIFICANCE))
+        left = points.residual_um[rows] / points.sigma_um[rows]
         for _ in range(MOST_REGIONS):
             scores = places @ left
             best = int(np.argmax(np.abs(scores)))
@@ -67,9 +65,12 @@ def misfit_regions(
                 break
             members = places[best] > 0.0
             region = rows[members]
-            told = _told(experiment, rows, region, residual_um, facts)
-            found.append((abs(scores[best]), told))
-            # What is told of is not told again.
+            readings = int(study.campaign.means.repeats[region].sum())
+            mean = float(np.mean(points.residual_um[region]))
+            words = _described(values, region, rows, readings, mean)
+            described = Region(words, experiment.name, region, readings, mean)
+            found.append((abs(scores[best]), described))
+            # The next region is sought among the other points.
             left = np.where(members, 0.0, left)
     return [region for _, region in sorted(found, key=lambda item: -item[0])]
 
@@ -90,27 +91,24 @@ def _windows(positions_m: np.ndarray, height: np.ndarray) -> np.ndarray:
     return (members / np.sqrt(np.maximum(count, 1.0)))[enough]
 
 
-def _told(
-    experiment: Experiment,
-    rows: np.ndarray,
+def _described(
+    values: dict[str, np.ndarray],
     region: np.ndarray,
-    residual_um: np.ndarray,
-    facts: dict[str, np.ndarray],
-) -> Region:
-    readings = int(experiment.means.repeats[region - rows[0]].sum())
-    mean = float(np.mean(residual_um[region]))
-    incidence = facts['incidence_deg'][region]
-    words = (
-        f'{_place(facts, region, rows)}, {readings} readings, model {abs(mean):.1f} um '
-        f'{"low" if mean > 0 else "high"}, incidence {incidence.min():.0f}-'
+    rows: np.ndarray,
+    readings: int,
+    mean_um: float,
+) -> str:
+    incidence = values['incidence_deg'][region]
+    return (
+        f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} µm '
+        f'{"low" if mean_um > 0 else "high"}, incidence {incidence.min():.0f}-'
         f'{incidence.max():.0f} deg'
     )
-    return Region(words, experiment.name, region, readings, mean)
 
 
-def _place(facts: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
-    """Which third of the height, and which half, as the gun sees it, where it is in one only."""
-    height = facts['height_fraction'][region]
+def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
+    """The thirds of the part's height, and the half as seen by the gun if it lies in one only."""
+    height = values['height_fraction'][region]
     low, high = np.quantile(height, [0.1, 0.9])
     thirds = ['lower third', 'middle third', 'upper third']
     first, last = (int(min(2, max(0, 3 * value))) for value in (low, high))
@@ -118,7 +116,7 @@ def _place(facts: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -
         vertical = 'full height'
     else:
         vertical = ' and '.join(thirds[first : last + 1])
-    across = facts['across_m']
+    across = values['across_m']
     ends = across[rows].min(), across[rows].max()
     share = (across[region] - ends[0]) / max(ends[1] - ends[0], 1e-9)
     if share.min() > 0.5:

@@ -1,11 +1,9 @@
-"""Residuals of single readings spread over the surface around them, for pictures."""
+"""Residuals at points interpolated over the surface around them, for pictures."""
 
 import numpy as np
 from scipy.sparse import csr_matrix, diags
 from scipy.spatial import cKDTree
 
-from paint_deposition.comparison.comparison import Comparison
-from paint_deposition.fitting.study import Study
 from paint_deposition.part.surface import Surface
 
 SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 0.025, 0.09
@@ -45,7 +43,7 @@ def spreading(
 
 
 def reached(matrix: csr_matrix) -> np.ndarray:
-    """(V,) whether the surface there takes anything from any point."""
+    """(V,) whether any point is within reach of the vertex."""
     return np.diff(matrix.indptr) > 0
 
 
@@ -64,7 +62,7 @@ def spread_over_surface(
 
 
 def radius_of_readings_m(positions_m: np.ndarray) -> float:
-    """How far a reading speaks for the surface around it [m].
+    """Radius around a reading within which the surface is coloured by it [m].
 
     Somewhat more than the usual distance between neighbouring readings.
     """
@@ -73,15 +71,3 @@ def radius_of_readings_m(positions_m: np.ndarray) -> float:
     nearest = cKDTree(positions_m).query(positions_m, k=2)[0][:, 1]
     usual = RADIUS_OVER_SPACING * float(np.median(nearest))
     return min(max(usual, SMALLEST_RADIUS_M), LARGEST_RADIUS_M)
-
-
-def point_residuals_um(study: Study, comparison: Comparison) -> list[np.ndarray]:
-    """Residuals averaged over repeats: for each experiment (P,) at its points [um]."""
-    parts, start = [], 0
-    for experiment in study.campaign.experiments:
-        stop = start + len(experiment.readings)
-        means = experiment.means
-        residual = comparison.residual_um[start:stop]
-        parts.append(np.bincount(means.owner, residual) / means.repeats)
-        start = stop
-    return parts

@@ -1,4 +1,4 @@
-"""How well a fitted model predicts points that were left out, in blocks."""
+"""Cross-validation: how well a fitted model predicts blocks of points that were left out."""
 
 from dataclasses import dataclass
 
@@ -13,7 +13,7 @@ class HeldOut:
 
     Attributes:
         deviation: (P,) measured minus predicted, over the standard deviation of the reading.
-        log_score: mean log density of the left-out readings under their predictions.
+        log_score: mean log predictive density of the points left out.
     """
 
     deviation: np.ndarray
@@ -21,13 +21,13 @@ class HeldOut:
 
 
 def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
-    """Leave out one block after the other; the fit is moved linearly, priors stay.
+    """Leave out one block after the other and refit in the linear approximation, priors included.
 
     Args:
         fit: around which the model is linear.
         blocks: (P,) block of each point.
     """
-    centre, width = fit.unknowns.prior
+    centre, width = fit.parameters.prior
     jacobian = fit.jacobian
     target = fit.residual + jacobian @ (fit.vector - centre)
     deviation = np.empty_like(target)

@@ -1,4 +1,4 @@
-"""Shapeless hypotheses: a cause that no effect describes, and a pattern that eq. (1) does not.
+"""Shapeless discrepancies: a cause outside the library, and a pattern that deviates from eq. (1).
 
 The first are smooth random fields over the part and over the covariates, as additions to the film
 and as factors on it. The second lets the pattern deviate from its two Gaussians by splines over
@@ -13,7 +13,8 @@ from scipy.sparse import csr_array
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.readings.covariates import Covariate, Rays
 
-# Lengths of the random fields: over the part [m], and over covariates scaled to unit spread.
+# Correlation lengths of the random fields: over the part [m], and over covariates scaled to unit
+# standard deviation.
 PART_LENGTHS_M = (0.12, 0.3)
 COVARIATE_LENGTH = 0.7
 # Sizes of the random fields in standard deviations of the noise.
@@ -22,7 +23,7 @@ SIZES = (1.0, 2.5)
 NEGLIGIBLE = 1e-4
 
 RADIAL_SPLINES = 9
-# Deviations are alike over this many of them: bumps, and changes of the whole profile.
+# Correlation lengths along the radial splines: for bumps, and for changes of the whole profile.
 RADIAL_LENGTHS = (1.5, 4.0)
 HARMONICS = 2
 # How far a pattern may deviate from eq. (1), as a share of its local flux.
@@ -30,15 +31,16 @@ PATTERN_DEVIATIONS = (0.1, 0.3)
 
 
 def random_fields(
-    positions_m: np.ndarray, block: np.ndarray, covariates: list[Covariate]
+    positions_m: np.ndarray, experiment_of: np.ndarray, covariates: list[Covariate]
 ) -> list[np.ndarray]:
     """Square roots (P, n) of unit-variance covariances over the part and over covariates.
 
     Args:
-        positions_m: (P, 3) [m]. block: (P,) experiment of each point: parts share no field.
+        positions_m: (P, 3) [m].
+        experiment_of: (P,) experiment of each point; parts share no field.
         covariates: those of all points.
     """
-    same = block[:, np.newaxis] == block[np.newaxis]
+    same = experiment_of[:, np.newaxis] == experiment_of[np.newaxis]
     distance = np.linalg.norm(positions_m[:, np.newaxis] - positions_m[np.newaxis], axis=2)
     roots = [_root(np.where(same, _bell(distance, length), 0.0)) for length in PART_LENGTHS_M]
     for covariate in covariates:

@@ -1,9 +1,9 @@
-"""Evidence for hypotheses about what is missing, in closed form.
+"""Evidence (marginal likelihood) of hypotheses about what is missing, in closed form.
 
 Around the fitted model the readings are linear in the pattern's parameters and in the amplitudes
-of effects, all with normal priors, so every hypothesis says: the whitened deviations are normal
-with a known covariance. Whitening them once more by the base model's own covariance makes the
-pattern's parameters disappear; each hypothesis is then a low-rank addition to the identity.
+of effects, all with normal priors. Integrated over these, the deviations are normal with a known
+covariance under every hypothesis. Whitening them by the covariance under the null hypothesis
+removes the pattern's parameters; every other hypothesis then adds a low-rank term to the identity.
 """
 
 from dataclasses import dataclass
@@ -12,47 +12,47 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import norm
 
-from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.least_squares import Fit, covariance_factor
 
 
 @dataclass(frozen=True)
-class BaseSpace:
-    """Deviations seen with the base model's own freedom taken out.
+class NullModel:
+    """The null hypothesis that nothing is missing, as the distribution it gives the readings.
 
     Attributes:
-        lower: (P, P) Cholesky factor of the base covariance, noise 1.
-        deviation: (P,) deviations; standard normal if nothing is missing.
+        lower: (P, P) Cholesky factor of the deviations' covariance, in units of the noise.
+        deviation: (P,) whitened deviations; standard normal if nothing is missing.
     """
 
     lower: np.ndarray
     deviation: np.ndarray
 
     @staticmethod
-    def of(fit: Fit, nuisance: np.ndarray | None = None) -> 'BaseSpace':
-        """Around a fit; ``nuisance`` (P, n) are further directions without meaning."""
-        centre, width = fit.unknowns.prior
+    def of(fit: Fit, nuisance: np.ndarray | None = None) -> 'NullModel':
+        """The base model, linear around a fit, with nuisance directions (P, n) over the noise."""
+        centre, width = fit.parameters.prior
         columns = fit.jacobian * width
         deviation = fit.residual + fit.jacobian @ (fit.vector - centre)
         if nuisance is not None and nuisance.size:
             columns = np.hstack([columns, nuisance])
-        lower = cholesky(np.eye(len(deviation)) + columns @ columns.T, lower=True)
-        return BaseSpace(lower, solve_triangular(lower, deviation, lower=True))
+        lower = covariance_factor(columns)
+        return NullModel(lower, solve_triangular(lower, deviation, lower=True))
 
-    def project(self, columns: np.ndarray) -> np.ndarray:
-        """(P, n) directions of the readings, seen in this space."""
+    def whiten(self, columns: np.ndarray) -> np.ndarray:
+        """(P, n) directions of the readings, whitened like the deviations."""
         return solve_triangular(self.lower, columns, lower=True)
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """Something may be missing along these directions.
+    """A statement about what is missing: the readings deviate along some directions.
 
     Attributes:
-        effects: ids of the effects it adds; empty for the base model and for shapeless ones.
-        columns: (P, n) in the base space, for amplitudes with unit variance.
+        effects: ids of the effects it adds; empty for the null hypothesis and for shapeless ones.
+        columns: (P, n) whitened directions, for amplitudes with unit variance.
         sides: (n,) +1 or -1 where physics fixes the sign, else 0.
-        other: 'unknown' or 'footprint' if it also adds what no effect in the library is.
-        prior: probability before the readings.
+        other: 'unknown' or 'footprint' if it also adds something outside the library, else ''.
+        prior: its prior probability.
         shape: values of the shape parameters that the columns stand for.
     """
 
@@ -64,19 +64,19 @@ class Hypothesis:
     shape: tuple[tuple[str, str, float], ...] = ()
 
 
-class Judge:
-    """Evidence of one hypothesis for any number of deviation vectors at once.
+class Evidence:
+    """Evidence of one hypothesis, for any number of deviation vectors at once.
 
     Args:
         hypothesis: what may be missing.
-        freedom: degrees of freedom behind the noise's size; inf where it is known. With few, a
-            misfit may as well be noise that was underestimated, and the evidence allows for it.
+        freedom: degrees of freedom of the noise estimate; inf where the noise is known. The
+            evidence integrates over the noise's unknown scale, so with few degrees of freedom a
+            misfit counts less: the noise may have been underestimated.
     """
 
     def __init__(self, hypothesis: Hypothesis, freedom: float = np.inf) -> None:
-        self.freedom = freedom
-        columns = hypothesis.columns
-        self.columns = columns
+        self.hypothesis, self.freedom = hypothesis, freedom
+        self.columns = columns = hypothesis.columns
         precision = np.eye(columns.shape[1]) + columns.T @ columns
         self._lower = cholesky(precision, lower=True)
         self._log_det = 2.0 * float(np.sum(np.log(np.diag(self._lower))))
@@ -84,17 +84,17 @@ class Judge:
         self._signed = np.flatnonzero(hypothesis.sides)
         self._sides = hypothesis.sides[self._signed]
 
-    def amplitudes(self, deviations: np.ndarray) -> np.ndarray:
-        """(n,) or (n, D) posterior means for (P,) or (P, D) deviations."""
+    def posterior_mean(self, deviations: np.ndarray) -> np.ndarray:
+        """(n,) or (n, D) posterior means of the amplitudes for (P,) or (P, D) deviations."""
         return self.covariance @ (self.columns.T @ deviations)
 
     def explained(self, deviations: np.ndarray) -> np.ndarray:
-        """How much the quadratic form of the deviations falls; scalar or (D,)."""
+        """By how much the chi-square of the deviations falls; scalar or (D,)."""
         scores = solve_triangular(self._lower, self.columns.T @ deviations, lower=True)
         return np.sum(scores**2, axis=0)
 
-    def log_factor(self, deviations: np.ndarray) -> np.ndarray:
-        """Log Bayes factor against the base model; scalar or (D,)."""
+    def log_bayes_factor(self, deviations: np.ndarray) -> np.ndarray:
+        """Log Bayes factor against the null hypothesis; scalar or (D,)."""
         explained = self.explained(deviations)
         if np.isfinite(self.freedom):
             before = self.freedom + np.sum(deviations**2, axis=0)
@@ -103,7 +103,7 @@ class Judge:
         else:
             factor = 0.5 * (explained - self._log_det)
         if len(self._signed):
-            means = self.amplitudes(deviations)[self._signed]
+            means = self.posterior_mean(deviations)[self._signed]
             spread = np.sqrt(np.diag(self.covariance)[self._signed])
             spread = spread[:, np.newaxis] if means.ndim > 1 else spread
             sides = self._sides[:, np.newaxis] if means.ndim > 1 else self._sides
@@ -112,9 +112,9 @@ class Judge:
 
 
 def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
-    """(count, draws) deviations with nothing missing.
+    """(count, draws) whitened deviations under the null hypothesis.
 
-    The noise's size is as uncertain as it was when it was estimated with ``freedom`` degrees of
+    The scale of the noise varies between draws as that of an estimate with ``freedom`` degrees of
     freedom.
     """
     random = np.random.default_rng(seed)
@@ -122,9 +122,3 @@ def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
     if np.isfinite(freedom):
         deviations /= np.sqrt(random.chisquare(freedom, draws) / freedom)
     return deviations
-
-
-def log_sum(log_terms: np.ndarray) -> np.ndarray:
-    """Log of the sum of exponentials along the first axis."""
-    top = log_terms.max(axis=0)
-    return top + np.log(np.sum(np.exp(log_terms - top), axis=0))

@@ -1,8 +1,8 @@
-"""What to measure and what to spray next, to tell rival explanations apart.
+"""What to measure and what to spray next, to discriminate between two explanations.
 
-Two rivals are told apart by what is left of one's mark on the readings after the pattern and the
-other have adapted (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). More readings make
-it longer where the two differ; another spray makes them differ.
+Their separation is what is left of the change that one makes to the readings after the pattern and
+the other have been refitted (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). More
+readings increase it where the two differ; another spray makes them differ.
 """
 
 from collections.abc import Callable, Mapping
@@ -11,7 +11,7 @@ from itertools import product
 
 import numpy as np
 
-from paint_deposition.diagnosis.sensitivities import neutral_shapes, signature
+from paint_deposition.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.forward import Forward
@@ -39,12 +39,12 @@ class Place:
 
 @dataclass(frozen=True)
 class Spray:
-    """An experiment to do: what, which two effects it separates, and how well.
+    """A proposed experiment: what, which two effects it separates, and how well.
 
     Attributes:
         what: in words; names the part where there are several.
         separates: two effect ids.
-        separation: standard deviations between the two after it, for what was found so far.
+        separation: standard deviations between the two effects with it.
         now: the same without it.
     """
 
@@ -56,7 +56,7 @@ class Spray:
 
 @dataclass(frozen=True)
 class Rivals:
-    """Two explanations: the model with each, and the base fit."""
+    """Two explanations of the same readings: the base fit, and the effect of each."""
 
     base: Fit
     first: Effect
@@ -66,10 +66,10 @@ class Rivals:
 def propose_for(
     diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
 ) -> tuple[list[Place], list[Spray]]:
-    """What would settle a diagnosis: its two leading rivals told apart.
+    """Places and sprays that would settle a diagnosis between its two leading explanations.
 
-    The rivals are the two most probable members of the leading class, or the leading effects of
-    the two most probable classes; without two of them there is nothing to propose.
+    These are the two most probable members of the leading class, or the leading effects of
+    the two most probable classes; without two of them nothing is proposed.
     """
     found = diagnosis.classes
     if not found:
@@ -88,64 +88,67 @@ def propose_for(
 def propose(study: Study, rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
     """Places to measure on the parts at hand, and sprays, best first."""
     sigma = study.noise.typical_um
-    here = _marks(study.campaign, rivals, study.sigma_um)
+    here = _derivatives(study.campaign, rivals, study.sigma_um)
     now = _separation([here])
     names = rivals.first.id, rivals.second.id
     sprays = []
     for experiment, (what, change) in product(study.campaign.experiments, MENU.items()):
         other = Campaign((replace(experiment, path=change(experiment.path, experiment)),))
-        marks = _marks(other, rivals, np.full(len(other), sigma))
+        there = _derivatives(other, rivals, np.full(len(other), sigma))
         if len(study.campaign.experiments) > 1:
             what = f'{what}, on {experiment.name}'
-        sprays.append(Spray(what, names, _separation([here, marks]), now))
+        sprays.append(Spray(what, names, _separation([here, there]), now))
     places = _places(study, rivals, here, sigma, seed)
     return places, sorted(sprays, key=lambda spray: -spray.separation)[: len(MENU)]
 
 
 @dataclass(frozen=True)
-class _Marks:
-    """Changes of the readings, over the noise: by the pattern's parameters, by the first effect as
-    it was found, and by the second's amplitudes.
+class _Derivatives:
+    """Derivatives of the readings over the noise.
+
+    By the pattern's parameters, by the first effect as it was found, and by the amplitudes of the
+    second.
     """
 
     jacobian: np.ndarray
     first: np.ndarray
     second: np.ndarray
 
-    def at(self, k: int) -> '_Marks':
+    def at(self, k: int) -> '_Derivatives':
         """Those of one reading."""
-        return _Marks(self.jacobian[[k]], self.first[[k]], self.second[[k]])
+        return _Derivatives(self.jacobian[[k]], self.first[[k]], self.second[[k]])
 
 
-def _marks(campaign: Campaign, rivals: Rivals, sigma_um: np.ndarray) -> _Marks:
+def _derivatives(campaign: Campaign, rivals: Rivals, sigma_um: np.ndarray) -> _Derivatives:
     forward = Forward(campaign)
     base = rivals.base
-    jacobian = derivatives(forward, base.unknowns, base.vector, sigma_um)
+    jacobian = derivatives(forward, base.parameters, base.vector, sigma_um)
     without = forward.predict_um(base.model)
     first = (forward.predict_um(base.model.with_effect(rivals.first)) - without) / sigma_um
-    second = signature(forward, base, rivals.second, sigma_um).columns
-    return _Marks(jacobian, first, second)
+    second = sensitivity(forward, base, rivals.second, sigma_um).columns
+    return _Derivatives(jacobian, first, second)
 
 
-def _separation(parts: list[_Marks]) -> float:
-    """Standard deviations that the second effect cannot imitate of the first's mark."""
-    free = np.vstack([np.hstack([p.jacobian, p.second]) for p in parts])
-    mark = np.concatenate([p.first for p in parts])
-    priors = np.eye(free.shape[1]) * 1e-3
+def _separation(parts: list[_Derivatives]) -> float:
+    """Standard deviations of the first effect's change that the second cannot imitate."""
+    fitted = np.vstack([np.hstack([p.jacobian, p.second]) for p in parts])
+    change = np.concatenate([p.first for p in parts])
+    priors = np.eye(fitted.shape[1]) * 1e-3
     solved, *_ = np.linalg.lstsq(
-        np.vstack([free, priors]), np.concatenate([mark, np.zeros(len(priors))]), rcond=None
+        np.vstack([fitted, priors]), np.concatenate([change, np.zeros(len(priors))]), rcond=None
     )
-    return float(np.linalg.norm(mark - free @ solved))
+    return float(np.linalg.norm(change - fitted @ solved))
 
 
-def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: int) -> list[Place]:
+def _places(
+    study: Study, rivals: Rivals, here: _Derivatives, sigma_um: float, seed: int
+) -> list[Place]:
     """Add one point after the other, on any part, each where it separates most."""
     parts_of = study.campaign.experiments
     count = CANDIDATES // len(parts_of)
     there = Campaign(tuple(_candidates(e, count, seed + k) for k, e in enumerate(parts_of)))
-    part = np.repeat(np.arange(len(parts_of)), [len(e) for e in there.experiments])
-    positions_m = np.concatenate([e.points.positions_m[: len(e)] for e in there.experiments])
-    marks = _marks(there, rivals, np.full(len(part), sigma_um))
+    part, positions_m = there.experiment_of, there.positions_m
+    derivatives_there = _derivatives(there, rivals, np.full(len(part), sigma_um))
     reached = Forward(there).predict_um(rivals.base.model)
     usable = reached > 0.2 * np.mean(study.measured_um)
     places: list[Place] = []
@@ -154,12 +157,12 @@ def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: i
     for _ in range(PROPOSED_POINTS):
         best, gain = -1, before
         for k in np.flatnonzero(usable):
-            value = _separation([*parts, marks.at(k)])
+            value = _separation([*parts, derivatives_there.at(k)])
             if value > gain:
                 best, gain = int(k), value
         if best < 0:
             break
-        parts.append(marks.at(best))
+        parts.append(derivatives_there.at(best))
         where = positions_m[best]
         why = (
             f'separates {rivals.first.id} from {rivals.second.id}: '
@@ -173,7 +176,7 @@ def _places(study: Study, rivals: Rivals, here: _Marks, sigma_um: float, seed: i
 
 
 def _candidates(experiment: Experiment, count: int, seed: int) -> Experiment:
-    """The experiment with no readings yet at some points of its surface, clear of free edges."""
+    """The experiment with readings yet to be taken at random points, clear of free edges."""
     surface = experiment.surface
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]

@@ -3,22 +3,18 @@
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-import numpy as np
 from scipy.special import expit, logsumexp
 
-from paint_deposition.diagnosis.judgement import Judgement, judge
-from paint_deposition.diagnosis.procedure import ALPHA, SURE, intervals, trouble_with
-from paint_deposition.diagnosis.sensitivities import neutral_shapes
+from paint_deposition.diagnosis.classes import ConfoundedClass
+from paint_deposition.diagnosis.linearisation import Linearisation
+from paint_deposition.diagnosis.run import ALPHA, SURE, Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
-from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Step, Verdict
+from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.fitting.parameters import Unknowns
-from paint_deposition.fitting.study import Study
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.readings.campaign import Campaign
-
-STARTS = 10
 
 
 def refit(
@@ -29,7 +25,7 @@ def refit(
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
 ) -> Diagnosis:
-    """Fit the model without and with an effect, and weigh the two.
+    """Fit the model without and with an effect, and compare the evidence of the two.
 
     Args:
         campaign: the readings.
@@ -46,74 +42,42 @@ def refit(
         raise ModelError(
             f'{added.id} is in the model already; to fit it anew, add none, or take it out'
         )
-    neutral = {
-        key: neutral_shapes(effect) for key, effect in library.items() if not start.effect(key)
-    }
-    if added:
-        neutral[added.id] = neutral_shapes(added)
-    study = Study.of(campaign, (*start.effects, *(shapes[0] for shapes in neutral.values())))
-    progress('fitting the model as it is')
-    fit = study.fit(Unknowns.of(start, *start.effects), STARTS, seed, study.levels)
-    history = [Step.of(study, '', study.plain(fit))]
-    trouble = trouble_with(study, history[0].fit)
-    if trouble:
-        return Diagnosis(study, 'fit_broken', trouble, np.nan, (), (), tuple(history))
-    judged = judge(study, fit, neutral, [], seed)
+    known = dict(library) | ({added.id: added} if added else {})
+    run = Run(campaign, start, known, seed, progress)
+    if run.trouble:
+        return run.diagnosis(None, 'fit_broken', run.trouble)
+    linear = run.linearise()
+    missing = linear.space.p_value < ALPHA
     if added is None:
-        return _as_it_is(study, history[0], judged, seed)
+        reason = 'The model was fitted as it is'
+        if not missing:
+            return run.diagnosis(linear, 'none_missing', f'{reason}.')
+        unknown = locate_unexplained(run.study, run.fit, False, seed)
+        reason += '; something is missing, which diagnose can tell.'
+        return run.diagnosis(linear, 'unknown_effect', reason, unknown=unknown)
     progress(f'fitting with {added.id}')
     fits = [
-        study.fit(
-            Unknowns.of(fit.model.with_effect(shape), *start.effects, shape), extra=study.levels
+        run.study.fit(
+            FreeParameters.of(run.fit.model.with_effect(shape), *start.effects, shape),
+            nuisance=run.study.nuisance,
         )
-        for shape in neutral[added.id]
+        for shape in run.candidates[added.id]
     ]
-    best = min(fits, key=lambda f: f.chi_square + f.penalty)
-    history.append(Step.of(study, added.id, study.plain(best)))
-    probability = _probability(judged, added.id)
-    effect = EffectClass(
-        (added.id,),
-        probability,
-        added.id,
-        intervals(best, added.id),
-        {'before': history[0].holdout_rmse_um, 'after': history[1].holdout_rmse_um},
-    )
-    verdict: Verdict = 'none_missing' if judged.weighing.p_value >= ALPHA else 'undecided'
-    return Diagnosis(
-        study,
-        'effect_missing' if probability > SURE else verdict,
+    probability = _probability(linear, added.id)
+    best = min(fits, key=lambda fit: fit.objective)
+    run.add(ConfoundedClass((added.id,), probability, best), linear)
+    reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
-        f'{100 * probability:.0f} % against the model as it was.',
-        judged.weighing.p_value,
-        (added.id,),
-        (effect,),
-        tuple(history),
-        not_testable=judged.not_testable,
-        detectable=judged.detectable,
+        f'{100 * probability:.0f} % against the model as it was.'
     )
+    if probability > SURE:
+        return run.diagnosis(linear, 'effect_missing', reason)
+    return run.diagnosis(linear, 'undecided' if missing else 'none_missing', reason)
 
 
-def _probability(judged: Judgement, effect_id: str) -> float:
-    """That the effect is missing and not nothing, which had the same chance before."""
-    hypotheses = judged.weighing.hypotheses
+def _probability(linear: Linearisation, effect_id: str) -> float:
+    """Posterior probability of the effect against the null hypothesis, with equal priors."""
+    hypotheses = linear.space.hypotheses
     shapes = [k for k, h in enumerate(hypotheses) if h.effects == (effect_id,) and not h.other]
-    factors = judged.weighing.log_factors[shapes]
+    factors = linear.space.log_bayes_factors[shapes]
     return float(expit(logsumexp(factors, b=1.0 / len(shapes))))
-
-
-def _as_it_is(study: Study, step: Step, judged: Judgement, seed: int) -> Diagnosis:
-    """The verdict on a model to which nothing was added."""
-    missing = judged.weighing.p_value < ALPHA
-    reason = 'The model was fitted as it is'
-    return Diagnosis(
-        study,
-        'unknown_effect' if missing else 'none_missing',
-        reason + ('; something is missing, which diagnose can tell.' if missing else '.'),
-        judged.weighing.p_value,
-        (),
-        (),
-        (step,),
-        locate_unexplained(study, step.fit, False, seed) if missing else None,
-        judged.not_testable,
-        judged.detectable,
-    )

@@ -1,4 +1,4 @@
-"""What each effect would do to the readings: derivatives by its amplitudes."""
+"""Sensitivities: derivatives of the predicted readings by the amplitudes of each effect."""
 
 from dataclasses import dataclass
 from itertools import product
@@ -11,20 +11,22 @@ from paint_deposition.fitting.least_squares import Fit
 
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25
+# Values that are tried for each shape parameter.
 SHAPES = 3
-# Weakest signal to noise, at typical amplitude and after the pattern has adapted, that can be
-# told from noise at all.
+# Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
+# effect counts as testable.
 TESTABLE = 2.0
 
 
 @dataclass(frozen=True)
-class Signature:
-    """An effect's mark on the readings, for one choice of its shape parameters.
+class Sensitivity:
+    """Sensitivity of the readings to one effect, for one choice of its shape parameters.
 
     Attributes:
         effect: at the point of linearisation: neutral, or as fitted.
-        names: the amplitudes, one a column.
-        columns: (P, n) change of the readings for a typical amplitude, over the noise.
+        names: of the n amplitudes.
+        columns: (P, n) derivative of the readings by each amplitude in its typical size, over the
+            noise.
         low, high: (n,) bounds of the amplitudes, from neutral, in typical sizes.
     """
 
@@ -67,7 +69,7 @@ def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     ]
 
 
-def signature(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) -> Signature:
+def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) -> Sensitivity:
     """Differentiate the prediction by the effect's amplitudes at the fitted model.
 
     Args:
@@ -97,9 +99,9 @@ def signature(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) 
         columns.append(slope / sigma_um)
         lows.append((low - neutral) / typical)
         highs.append((high - neutral) / typical)
-    return Signature(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))
+    return Sensitivity(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))
 
 
-def visibility(projected: np.ndarray) -> float:
-    """Signal to noise of a typical amplitude along the effect's most visible direction."""
-    return float(np.linalg.norm(projected, 2))
+def signal_to_noise(whitened: np.ndarray) -> float:
+    """Of a typical amplitude, along the combination (P, n) of amplitudes that shows most."""
+    return float(np.linalg.norm(whitened, 2))

@@ -1,22 +1,23 @@
-"""Where the unexplained shows: against which covariate, and on which part of the surface."""
+"""Where the unexplained shows: against which covariate, and in which region of the part."""
 
 import numpy as np
 
 from paint_deposition.comparison.regions import misfit_regions
-from paint_deposition.diagnosis.evidence import BaseSpace, simulated
+from paint_deposition.diagnosis.evidence import NullModel, simulated
 from paint_deposition.diagnosis.verdict import Unknown
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
 
+# Degree of the polynomials in the ranks of a covariate.
 DEGREE = 4
 DRAWS = 1000
 CURVE_POINTS = 15
 
 
 def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Unknown:
-    """Smooth the deviations over each covariate and take the one that explains most.
+    """Regress the deviations on each covariate, smoothly, and take the one that explains most.
 
-    The p-value is that of the largest of all covariates where nothing is missing.
+    The p-value is that of the maximum over all covariates under the null hypothesis.
 
     Args:
         study: the readings.
@@ -24,26 +25,25 @@ def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Un
         footprint: whether the pattern itself is suspected.
         seed: of the simulated deviations.
     """
-    base = BaseSpace.of(fit, study.levels)
+    null = NullModel.of(fit, study.nuisance)
     draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
-    found, null = [], np.zeros(DRAWS)
+    found, by_chance = [], np.zeros(DRAWS)
     for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
         smooth = _smooth(covariate.values) / study.sigma_um[:, np.newaxis]
-        directions, _ = np.linalg.qr(base.project(smooth))
-        found.append((float(np.sum((directions.T @ base.deviation) ** 2)), covariate))
-        null = np.maximum(null, np.sum((directions.T @ draws) ** 2, axis=0))
+        directions, _ = np.linalg.qr(null.whiten(smooth))
+        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), covariate))
+        by_chance = np.maximum(by_chance, np.sum((directions.T @ draws) ** 2, axis=0))
     strength, covariate = max(found, key=lambda item: item[0])
-    residual = fit.residual * study.sigma_um
     smooth = np.column_stack([np.ones(len(study)), _smooth(covariate.values)])
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
     order = np.argsort(covariate.values)
     shown = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
-    regions = misfit_regions(study, residual, study.sigma_um, fit.model)
+    regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
     return Unknown(
         'footprint' if footprint else 'effect',
         covariate.name,
-        float((1 + np.count_nonzero(null >= strength)) / (1 + DRAWS)),
+        float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
         {
             covariate.name: covariate.values[shown].tolist(),
             'residual_um': (smooth[shown] @ coefficients).tolist(),
@@ -53,6 +53,6 @@ def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Un
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
-    """(P, DEGREE) polynomials of the values' ranks, so that outliers carry no weight."""
+    """(P, DEGREE) polynomials of the values' ranks, so that outliers have no leverage."""
     ranks = np.argsort(np.argsort(values)) / max(len(values) - 1, 1)
     return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, DEGREE)[:, 1:]

@@ -7,6 +7,7 @@ from paint_deposition.diagnosis.cross_validation import hold_out
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
+from paint_deposition.readings.residuals import root_mean_square
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -45,7 +46,7 @@ class Unknown:
 
     Attributes:
         kind: 'footprint' if the pattern itself deviates from eq. (1), else 'effect'.
-        covariate: the quantity that it depends on most.
+        covariate: the one that the residual depends on most.
         p_value: of that dependence.
         curve: values of the covariate and mean residual there [um].
         where: in words.
@@ -63,7 +64,7 @@ class Step:
     """One model of the history.
 
     Attributes:
-        added: effect id, '' for the pattern alone.
+        added: effect id, '' for the model that the run started from.
         fit: of the model to the readings.
         rmse_um, holdout_rmse_um: on the fitted points and on points left out [um].
     """
@@ -80,9 +81,10 @@ class Step:
 
     @staticmethod
     def of(study: Study, added: str, fit: Fit) -> 'Step':
-        """Judge a fit by its points and by patches of points left out."""
-        left_out = hold_out(fit, study.patches())
-        return Step(added, fit, study.rmse_um(fit.residual), study.rmse_um(left_out.deviation))
+        """Compute the errors of a fit, those on points left out by patches."""
+        left_out_um = hold_out(fit, study.patches()).deviation * study.sigma_um
+        fitted = study.residuals(fit.predicted_um)
+        return Step(added, fit, fitted.rmse_um, root_mean_square(left_out_um))
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,7 @@ class Diagnosis:
     Attributes:
         study: the readings.
         verdict: the headline.
-        reason: one sentence for a person.
+        reason: one sentence for the user.
         p_value: that as much evidence appears when nothing is missing; nan if not tested.
         accepted: ids of the effects added to the model, in order.
         classes: accepted ones in that order, then others by probability.

@@ -14,9 +14,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
-from paint_deposition.fitting.parameters import Unknowns
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
-from paint_deposition.readings.campaign import Campaign, Experiment
+from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.panel import Panel
 from paint_deposition.readings.plausibility import (
     check_enough,
@@ -24,11 +24,12 @@ from paint_deposition.readings.plausibility import (
     check_readings,
     check_units_beside,
 )
+from paint_deposition.readings.residuals import Residuals
 
 STARTS = 8
-# Residuals beyond this many standard deviations are named; a fit that leaves chi-square per
-# degree of freedom above the limit is not explained by the gauge's noise.
+# Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
+# Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
 MOST_CHI_SQUARE = 2.0
 
 
@@ -41,25 +42,6 @@ class PanelFit:
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """Measured and predicted film of an experiment, over its points.
-
-    Attributes:
-        experiment: its name. points: how many.
-        measured_mean_um, predicted_mean_um: mean films [um].
-        residual_sd_um: standard deviation of measured minus predicted [um].
-        rmse_um: root mean square of the same [um].
-    """
-
-    experiment: str
-    points: int
-    measured_mean_um: float
-    predicted_mean_um: float
-    residual_sd_um: float
-    rmse_um: float
-
-
-@dataclass(frozen=True)
 class Calibration:
     """A model fitted to a campaign, and how well it is known.
 
@@ -67,16 +49,16 @@ class Calibration:
         study: the campaign, ready for inference. fit: the fit of all parameters.
         parameters: of the pattern and of varied effects, with uncertainties.
         correlations: of pairs, strongest first.
-        agreements: of each experiment.
+        residuals: of each experiment's points.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
-        warnings: what the reader must know, in plain words.
+        warnings: what the reader must know, a sentence each.
     """
 
     study: Study
     fit: Fit
     parameters: tuple[Estimate, ...]
     correlations: tuple[Correlation, ...]
-    agreements: tuple[Agreement, ...]
+    residuals: tuple[Residuals, ...]
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
 
@@ -112,31 +94,18 @@ def calibrate(
     model = start or DepositionModel()
     study = Study.of(campaign, model.effects)
     check_enough(len(study))
-    first = 0
-    for experiment in study.campaign.experiments:
-        sigma = study.noise.sigma_um[first : first + len(experiment.readings)]
-        first += len(experiment.readings)
-        check_readings(experiment.readings, sigma)
+    owner = study.campaign.experiment_of[study.campaign.means.owner]
+    for number, experiment in enumerate(study.campaign.experiments):
+        check_readings(experiment.readings, study.noise.sigma_um[owner == number])
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
     fit = _best_fit(study, model, panels, given=start is not None, seed=seed)
     values = estimates(fit)
     pairs = correlations(fit)
-    agreements = tuple(
-        _agreement(study, number, fit.predicted_um) for number in range(len(panels))
-    )
+    residuals = study.residuals_by_experiment(fit.predicted_um)
     return Calibration(
-        study, fit, values, pairs, agreements, panels, tuple(_warnings(study, fit, values, pairs))
-    )
-
-
-def predict(model: DepositionModel, campaign: Campaign) -> tuple[Agreement, ...]:
-    """How a model agrees with readings it was not fitted to, experiment by experiment."""
-    study = Study.of(campaign, model.effects)
-    predicted = study.forward.predict_um(model)
-    return tuple(
-        _agreement(study, number, predicted) for number in range(len(campaign.experiments))
+        study, fit, values, pairs, residuals, panels, tuple(_warnings(study, fit, values, pairs))
     )
 
 
@@ -145,11 +114,11 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
     panel = Panel.of(experiment)
     if panel is None:
         return None
-    rows = study.experiment_of == number
+    rows = study.campaign.experiment_of == number
     measured, sigma = study.measured_um[rows], study.sigma_um[rows]
     check_panel(experiment.readings, panel, measured, sigma)
     collapse = fit_collapse(panel, measured, sigma)
-    check_units_beside(experiment.readings, measured, collapse.predicted_um)
+    check_units_beside(experiment.readings, measured, collapse.residuals.predicted_um)
     return PanelFit(panel, collapse)
 
 
@@ -165,8 +134,10 @@ def _best_fit(
     first = next((panel for panel in panels if panel is not None), None)
     if first is not None:
         starts.insert(0, started_from(model, first))
-    fits = [study.fit(Unknowns.of(one, *one.effects), STARTS, seed) for one in starts or [model]]
-    return min(fits, key=lambda fit: fit.chi_square + fit.penalty)
+    fits = [
+        study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts or [model]
+    ]
+    return min(fits, key=lambda fit: fit.objective)
 
 
 def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
@@ -191,20 +162,6 @@ def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
     return model.model_copy(update={'planar': planar})
 
 
-def _agreement(study: Study, number: int, predicted_um: np.ndarray) -> Agreement:
-    rows = study.experiment_of == number
-    measured, predicted = study.measured_um[rows], predicted_um[rows]
-    residual = measured - predicted
-    return Agreement(
-        study.campaign.experiments[number].name,
-        int(rows.sum()),
-        float(measured.mean()),
-        float(predicted.mean()),
-        float(residual.std()),
-        float(np.sqrt(np.mean(residual**2))),
-    )
-
-
 def _warnings(
     study: Study,
     fit: Fit,
@@ -212,7 +169,7 @@ def _warnings(
     pairs: tuple[Correlation, ...],
 ) -> list[str]:
     warnings = list(study.campaign.notes)
-    warnings += [] if fit.converged else ['the fit did not come to rest: its values are not final']
+    warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
     warnings += [
         f'{value.name} is not determined by these readings: {value.reason}'
         for value in values
@@ -232,21 +189,15 @@ def _warnings(
         )
     far = np.flatnonzero(np.abs(fit.residual) > OUTLIER_SIGMAS)
     if len(far):
-        worst = far[np.argmax(np.abs(fit.residual[far]))]
+        campaign, worst = study.campaign, np.argmax(np.abs(fit.residual))
+        label = campaign.readings.point[campaign.means.first[worst]]
         warnings.append(
             f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
-            f"deviations, most of all point '{_label(study, int(worst))}': measure there again"
+            f"deviations, most of all point '{label}': measure there again"
         )
     if study.noise.source == 'assumed':
         warnings.append(
-            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} um): repeat some '
+            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} µm): repeat some '
             'readings to know it'
         )
     return warnings
-
-
-def _label(study: Study, point: int) -> str:
-    number = int(study.experiment_of[point])
-    experiment: Experiment = study.campaign.experiments[number]
-    first = int(np.flatnonzero(study.experiment_of == number)[0])
-    return str(experiment.readings.point[experiment.means.first[point - first]])

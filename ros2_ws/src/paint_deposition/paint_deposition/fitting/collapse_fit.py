@@ -7,11 +7,12 @@ from scipy.optimize import least_squares
 
 from paint_deposition.model.collapse import ThreeGaussianCollapse
 from paint_deposition.readings.panel import Panel
+from paint_deposition.readings.residuals import Residuals
 
-# Starts: offset radii and standard deviations in the panel's scale.
+# Starts of the search: offset radii and standard deviations in units of the panel's scale.
 RADII = (0.2, 0.35, 0.5)
 SIGMAS = (0.12, 0.22)
-# Standard deviations beyond which a reading counts less.
+# Residuals beyond this many standard deviations get a smaller weight.
 ROBUST_AT = 2.0
 NARROWEST, WIDEST = 0.02, 1.0
 
@@ -22,22 +23,15 @@ class CollapseFit:
 
     Attributes:
         collapse: eq. (3) for the first pass's speed.
-        predicted_um: (P,) film of all passes at the points.
-        residual_um: (P,) measured minus predicted.
+        residuals: of the P points, with the film of all passes as the prediction.
     """
 
     collapse: ThreeGaussianCollapse
-    predicted_um: np.ndarray
-    residual_um: np.ndarray
-
-    @property
-    def rmse_um(self) -> float:
-        """Root mean square of the residuals [um]."""
-        return float(np.sqrt(np.mean(self.residual_um**2)))
+    residuals: Residuals
 
 
 def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> CollapseFit:
-    """Fit eq. (3), summed over the passes, with a loss that forgives gross errors.
+    """Fit eq. (3), summed over the passes, with a loss that is robust against gross errors.
 
     Args:
         panel: where points and passes lie.
@@ -77,5 +71,4 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
         r1_m=best[3] * scale, r2_m=best[4] * scale,
         sigma1_m=sigma[0], sigma2_m=sigma[1], sigma3_m=sigma[2],
     )  # fmt: skip
-    predicted = film(best)
-    return CollapseFit(collapse, predicted, measured_um - predicted)
+    return CollapseFit(collapse, Residuals(measured_um, film(best), sigma_um))

@@ -65,7 +65,7 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """
     covariance = scaled_covariance(fit)
     sigma = np.sqrt(np.diag(_spread(fit)))
-    _, prior = fit.unknowns.prior
+    _, prior = fit.parameters.prior
     learned = np.sqrt(np.diag(covariance)) <= LEARNED * prior
     values = _parameters(fit, fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
@@ -108,19 +108,19 @@ def scaled_covariance(fit: Fit) -> np.ndarray:
     """(k, k) covariance of the fit's vector, widened where residuals exceed the noise."""
     freedom = max(len(fit.residual) - len(fit.vector), 1)
     widening = max(fit.chi_square / freedom, 1.0)
-    _, prior = fit.unknowns.prior
+    _, prior = fit.parameters.prior
     data = fit.jacobian.T @ fit.jacobian / widening
     return np.linalg.inv(data + np.diag(prior**-2.0))
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
-    return (*PATTERN_NAMES, *(f'{effect}.{name}' for effect, name in fit.unknowns.varied))
+    return (*PATTERN_NAMES, *(f'{effect}.{name}' for effect, name in fit.parameters.varied))
 
 
 def _parameters(fit: Fit, vectors: np.ndarray) -> np.ndarray:
     """(n, k) parameters in the model's units for vectors (n, k) of the fit."""
     log_k1, k2, k3_cos, k3_sin, r, log_sigma1, log_sigma2 = vectors[:, :7].T
-    amplitudes = fit.unknowns.neutral + fit.unknowns.typical * vectors[:, 7:]
+    amplitudes = fit.parameters.neutral + fit.parameters.typical * vectors[:, 7:]
     pattern = [
         np.exp(log_k1),
         k2,
@@ -142,7 +142,7 @@ def _around_phase(values: np.ndarray, centre: np.ndarray) -> np.ndarray:
 
 def _spread(fit: Fit) -> np.ndarray:
     """(k, k) covariance of the parameters, linearised."""
-    low, high = fit.unknowns.bounds
+    low, high = fit.parameters.bounds
     steps = STEP * np.eye(len(fit.vector))
     up, down = np.minimum(fit.vector + steps, high), np.maximum(fit.vector - steps, low)
     change = _around_phase(_parameters(fit, up), _parameters(fit, down))
@@ -156,7 +156,7 @@ def _intervals(
     """(k,) ends of the 95 % intervals."""
     random = np.random.default_rng(0)
     vectors = random.multivariate_normal(fit.vector, covariance, DRAWS, method='cholesky')
-    inside = np.clip(vectors, *fit.unknowns.bounds)
+    inside = np.clip(vectors, *fit.parameters.bounds)
     away = _around_phase(_parameters(fit, inside), values)
     low, high = np.quantile(away, TAILS, axis=0)
     return values + low, values + high

@@ -1,4 +1,4 @@
-"""What the model predicts at a campaign's points, fast enough to fit with."""
+"""The forward model: predictions at a campaign's points, fast enough to fit with."""
 
 import numba
 import numpy as np
@@ -19,7 +19,7 @@ class Forward:
 
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
         self.campaign = campaign
-        # Laws in the kernel come in one fixed order, at neutral values when not in the model.
+        # The compiled kernel has these laws in a fixed order; those a model lacks are neutral.
         self._in_kernel = tuple(e for e in effects if type(e).flux_factor or type(e).pattern_scale)
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
 
@@ -40,10 +40,9 @@ class Forward:
 
 
 class _Part:
-    """One experiment with its integrators, with and without the stencils for slopes."""
+    """One experiment with its integrators, for models that need the film's slope and others."""
 
     def __init__(self, experiment: Experiment) -> None:
-        self.count = len(experiment)
         self.experiment = experiment
         self._integrators: dict[bool, FilmIntegrator] = {}
 
@@ -51,23 +50,17 @@ class _Part:
         with_stencils = any(effect.needs_slope for effect in model.effects)
         integrator = self._integrators.get(with_stencils)
         if integrator is None:
-            points = self.experiment.points
-            if not with_stencils:
-                points = points.select(slice(0, self.count))
-            integrator = FilmIntegrator(
-                points,
-                model,
-                'double',
-                self.experiment.surface.occluder,
-                keep_absent_laws=True,
+            one = self.experiment
+            points = one.points if with_stencils else one.measured_points
+            integrator = self._integrators[with_stencils] = FilmIntegrator(
+                points, model, 'double', one.surface.occluder, keep_absent_laws=True
             )
-            self._integrators[with_stencils] = integrator
         integrator.reset()
         integrator.use(model)
         threads = numba.get_num_threads()
-        numba.set_num_threads(1)  # a hundred points are painted before other threads wake
+        numba.set_num_threads(1)  # a hundred points are done before other threads have started
         try:
             integrator.add(self.experiment.path)
         finally:
             numba.set_num_threads(threads)
-        return integrator.gauge_um[: self.count]
+        return integrator.gauge_um[: len(self.experiment)]

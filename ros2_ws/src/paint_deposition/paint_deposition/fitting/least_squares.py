@@ -1,6 +1,7 @@
 """Weighted least squares on the readings, through the forward simulation."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
@@ -9,7 +10,7 @@ from scipy.stats import norm, qmc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward
-from paint_deposition.fitting.parameters import PATTERN, Unknowns
+from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 
 # Steps of the finite differences, in the vector's units.
 STEP = 1e-3
@@ -31,41 +32,65 @@ class Fit:
     """A model fitted to readings.
 
     Attributes:
-        unknowns: what was varied.
+        parameters: what was varied.
         vector: (k,) best values.
         model: the model they stand for.
         predicted_um: (P,) [um].
         residual: (P,) measured minus predicted, over the standard deviation.
         jacobian: (P, k) derivative of predictions over the standard deviation.
         converged: whether the last search ended by itself.
-        extra_log_det: log determinant of the covariance of further deviations, if the fit
-            allowed for them; residual and jacobian are then whitened by it as well.
+        nuisance: (P, n) nuisance directions that the fit allowed for, over the standard
+            deviation; their amplitudes are independent and standard normal.
     """
 
-    unknowns: Unknowns
+    parameters: FreeParameters
     vector: np.ndarray
     model: DepositionModel
     predicted_um: np.ndarray
     residual: np.ndarray
     jacobian: np.ndarray
     converged: bool
-    extra_log_det: float = 0.0
+    nuisance: np.ndarray
+
+    @cached_property
+    def marginal(self) -> 'Fit':
+        """The same fit with residual and Jacobian whitened by the nuisance directions, too."""
+        return replace(
+            self,
+            residual=solve_triangular(self._factor, self.residual, lower=True),
+            jacobian=solve_triangular(self._factor, self.jacobian, lower=True),
+            nuisance=self.nuisance[:, :0],
+        )
+
+    @property
+    def nuisance_log_det(self) -> float:
+        """Log determinant of the covariance of noise and nuisance directions; 0 without any."""
+        return 2.0 * float(np.sum(np.log(np.diag(self._factor))))
+
+    @cached_property
+    def _factor(self) -> np.ndarray:
+        return covariance_factor(self.nuisance)
 
     @property
     def chi_square(self) -> float:
-        """Sum of squared whitened residuals."""
+        """Sum of squared residuals over the standard deviation."""
         return float(self.residual @ self.residual)
 
     @property
     def penalty(self) -> float:
         """Sum of squared deviations from the priors, in their widths."""
-        centre, width = self.unknowns.prior
+        centre, width = self.parameters.prior
         return float(np.sum(((self.vector - centre) / width) ** 2))
+
+    @property
+    def objective(self) -> float:
+        """What the fit minimises: chi-square, nuisance integrated out, plus the penalty."""
+        return self.marginal.chi_square + self.penalty
 
     @property
     def precision(self) -> np.ndarray:
         """(k, k) inverse covariance of the vector, priors included."""
-        _, width = self.unknowns.prior
+        _, width = self.parameters.prior
         return self.jacobian.T @ self.jacobian + np.diag(width**-2.0)
 
     @property
@@ -78,27 +103,26 @@ def fit_readings(
     forward: Forward,
     measured_um: np.ndarray,
     sigma_um: np.ndarray,
-    unknowns: Unknowns,
+    parameters: FreeParameters,
     starts: int = 1,
     seed: int = 0,
-    extra: np.ndarray | None = None,
+    nuisance: np.ndarray | None = None,
 ) -> Fit:
-    """Find the most probable values.
+    """Find the most probable values (maximum a posteriori).
 
     Args:
         forward: predicts the points.
         measured_um, sigma_um: (P,) point means and their standard deviations [um].
-        unknowns: what is varied; its start model is the first start.
+        parameters: what is varied; its start model is the first start.
         starts: how many starts; others are the best of many shapes of the pattern around the
             first, drawn with the given seed.
-        extra: (P, n) directions, over the standard deviation, along which the readings may
-            deviate further with unit variance.
+        nuisance: (P, n) nuisance directions, over the standard deviation, along which the
+            readings may deviate further with unit variance; default: none.
     """
-    lower = None
-    if extra is not None:
-        lower = cholesky(np.eye(len(measured_um)) + extra @ extra.T, lower=True)
-    problem = _Problem(forward, measured_um, sigma_um, unknowns, lower)
-    first = problem.scaled_to_mean(unknowns.encode(unknowns.start))
+    if nuisance is None:
+        nuisance = np.empty((len(measured_um), 0))
+    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance)
+    first = problem.scaled_to_mean(parameters.encode(parameters.start))
     if starts > 1:
         candidates = [first, *_promising(problem, first, starts - 1, seed)]
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
@@ -108,18 +132,23 @@ def fit_readings(
         candidates = [first]
     found = [problem.search(start, MOST_STEPS) for start in candidates]
     best = min(found, key=lambda result: result.cost)
-    model = unknowns.decode(best.x)
+    model = parameters.decode(best.x)
     predicted = forward.predict_um(model)
     return Fit(
-        unknowns,
+        parameters,
         best.x,
         model,
         predicted,
-        problem.whitened((measured_um - predicted) / sigma_um),
-        problem.whitened(derivatives(forward, unknowns, best.x, sigma_um, predicted)),
+        (measured_um - predicted) / sigma_um,
+        derivatives(forward, parameters, best.x, sigma_um, predicted),
         bool(best.status > 0),
-        0.0 if lower is None else 2.0 * float(np.sum(np.log(np.diag(lower)))),
+        nuisance,
     )
+
+
+def covariance_factor(directions: np.ndarray) -> np.ndarray:
+    """(P, P) lower Cholesky factor of unit noise with deviations along directions (P, n)."""
+    return cholesky(np.eye(len(directions)) + directions @ directions.T, lower=True)
 
 
 def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
@@ -129,7 +158,7 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
     so that only these three need be searched (variable projection, Golub and Pereyra 1973).
     """
     shape = [k for k, c in enumerate(PATTERN) if c.name in ('r_m', 'log_sigma1', 'log_sigma2')]
-    _, width = problem.unknowns.prior
+    _, width = problem.parameters.prior
     spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
     tried = []
     for away in spread:
@@ -141,21 +170,21 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
 
 def derivatives(
     forward: Forward,
-    unknowns: Unknowns,
+    parameters: FreeParameters,
     vector: np.ndarray,
     sigma_um: np.ndarray,
     predicted_um: np.ndarray | None = None,
 ) -> np.ndarray:
     """(P, k) derivative of the predictions by the vector, over the standard deviation."""
     if predicted_um is None:
-        predicted_um = forward.predict_um(unknowns.decode(vector))
-    _, high = unknowns.bounds
+        predicted_um = forward.predict_um(parameters.decode(vector))
+    _, high = parameters.bounds
     columns = []
     for k in range(len(vector)):
         step = STEP if vector[k] + STEP <= high[k] else -STEP
         moved = vector.copy()
         moved[k] += step
-        change = forward.predict_um(unknowns.decode(moved)) - predicted_um
+        change = forward.predict_um(parameters.decode(moved)) - predicted_um
         columns.append(change / step / sigma_um)
     return np.column_stack(columns)
 
@@ -168,19 +197,21 @@ class _Problem:
         forward: Forward,
         measured_um: np.ndarray,
         sigma_um: np.ndarray,
-        unknowns: Unknowns,
-        lower: np.ndarray | None,
+        parameters: FreeParameters,
+        nuisance: np.ndarray,
     ) -> None:
         self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
-        self.unknowns, self.lower = unknowns, lower
-        self.centre, self.width = unknowns.prior
-        self.low, self.high = unknowns.bounds
+        self.parameters = parameters
+        # None spares a solve in every step where there are no nuisance directions.
+        self.lower = covariance_factor(nuisance) if nuisance.size else None
+        self.centre, self.width = parameters.prior
+        self.low, self.high = parameters.bounds
         self._last: tuple[bytes, np.ndarray] | None = None
 
     def predict(self, vector: np.ndarray) -> np.ndarray:
         key = vector.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = (key, self.forward.predict_um(self.unknowns.decode(vector)))
+            self._last = (key, self.forward.predict_um(self.parameters.decode(vector)))
         return self._last[1]
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
@@ -193,7 +224,7 @@ class _Problem:
         return np.concatenate([misfit, (vector - self.centre) / self.width])
 
     def jacobian(self, vector: np.ndarray) -> np.ndarray:
-        data = derivatives(self.forward, self.unknowns, vector, self.sigma, self.predict(vector))
+        data = derivatives(self.forward, self.parameters, vector, self.sigma, self.predict(vector))
         return np.vstack([self.whitened(data), np.diag(1.0 / self.width)])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:

@@ -1,8 +1,8 @@
-"""The numbers that a fit varies, as one vector, and the model they stand for.
+"""The free parameters of a fit as one vector, and the model that a vector stands for.
 
-The pattern's parameters are taken where they are smooth: logarithms of what is positive, and the
-asymmetry as K3 cos(phi) and K3 sin(phi), so that phi is harmless when K3 vanishes. Amplitudes of
-effects count in units of their typical size.
+The vector holds smooth coordinates of the pattern: logarithms of what is positive, and the
+asymmetry as K3 cos(phi) and K3 sin(phi), so that phi is well-behaved when K3 vanishes. Amplitudes
+of effects are in units of their typical size.
 """
 
 from dataclasses import dataclass
@@ -26,8 +26,8 @@ class Coordinate:
     high: float
 
 
-# Weak priors: any bell's pattern lies well within two widths. They only keep what the readings
-# do not determine from running away.
+# Weak priors: any bell's pattern lies well within two widths. They only keep finite what the
+# readings do not determine.
 PATTERN = (
     Coordinate('log_K1', np.log(2.0), 2.0, np.log(1e-3), np.log(99.0)),
     Coordinate('K2', 0.3, 0.4, 0.0, 1.0),
@@ -41,8 +41,8 @@ PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigm
 
 
 @dataclass(frozen=True)
-class Unknowns:
-    """Which parameters of a model are varied.
+class FreeParameters:
+    """The parameters of a model that are varied.
 
     Attributes:
         start: the model that fixes everything else, effects included.
@@ -53,13 +53,13 @@ class Unknowns:
     varied: tuple[tuple[str, str], ...] = ()
 
     @staticmethod
-    def of(start: DepositionModel, *effects: Effect) -> 'Unknowns':
-        """The pattern and all amplitudes of these effects; the model gets those it lacks."""
+    def of(start: DepositionModel, *effects: Effect) -> 'FreeParameters':
+        """The pattern and all amplitudes of these effects; those the model lacks are added."""
         for effect in effects:
             if start.effect(effect.id) is None:
                 start = start.with_effect(effect)
         varied = [(e.id, name) for e in effects for name in type(e).amplitudes()]
-        return Unknowns(start, tuple(varied))
+        return FreeParameters(start, tuple(varied))
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -1,1 +1,1 @@
-"""Gauge readings: noise, outliers, covariates, and the campaign that they belong to."""
+"""Gauge readings: noise, outliers, residuals, covariates, and the campaign that they belong to."""

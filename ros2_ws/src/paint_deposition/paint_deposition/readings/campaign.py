@@ -1,6 +1,7 @@
 """A campaign: painted parts with their gauge readings, ready to be compared with the model."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from paint_deposition.readings.readings import PointMeans, Readings
 # Readings further from the surface, or facing more away from it, do not belong to the part.
 MAX_DISTANCE_M = 0.02
 MAX_ANGLE_RAD = np.radians(60.0)
-# Distance to the neighbours from which the film's slope at a reading is taken [m].
+# Half the width of the stencil from which the film's slope at a reading is taken [m].
 STENCIL_M = 0.006
 
 
@@ -25,11 +26,12 @@ class Experiment:
     Attributes:
         name: for reports.
         surface: the refined part.
-        path: sub-steps with what lies ahead known.
+        path: sub-steps of the recorded motion.
         readings: those that are used.
         means: the readings averaged over repeats; its P points are what is fitted.
+        points: the P measured points on the surface, followed by the stencils around them from
+            which the film's slope is taken.
         taken: all readings; used: (N,) which of them are used.
-        points: the P places on the surface, with covariates and slope stencils behind them.
         files: where mesh, trajectory and readings came from, for reports.
     """
 
@@ -92,6 +94,11 @@ class Experiment:
     def __len__(self) -> int:
         return len(self.means.mean_um)
 
+    @cached_property
+    def measured_points(self) -> SurfacePoints:
+        """The P measured points without the stencils."""
+        return self.points.select(slice(0, len(self)))
+
     @property
     def groups(self) -> np.ndarray:
         """(P,) group label of each point."""
@@ -102,37 +109,64 @@ class Experiment:
 class Campaign:
     """Experiments under one process setting.
 
+    Arrays over the N readings or the P points of a campaign hold those of the first experiment
+    first, then those of the second, and so on.
+
     Attributes:
         experiments: at least one.
         model_file: the start model's file, or None.
         name: that of its file, '' for none; errors compare within one campaign only.
+
+    Raises:
+        ReadingsError: two experiments have one name.
     """
 
     experiments: tuple[Experiment, ...]
     model_file: str | None = None
     name: str = ''
 
-    def __len__(self) -> int:
-        return sum(len(experiment) for experiment in self.experiments)
+    def __post_init__(self) -> None:
+        names = [experiment.name for experiment in self.experiments]
+        for name in names:
+            if names.count(name) > 1:
+                raise ReadingsError(f"two experiments are called '{name}'; rename one")
 
-    @property
-    def reading_count(self) -> int:
-        """Readings that are used, repeats counted singly."""
-        return sum(len(experiment.readings) for experiment in self.experiments)
+    def __len__(self) -> int:
+        return len(self.means.mean_um)
+
+    @cached_property
+    def readings(self) -> Readings:
+        """The N readings that are used; the label of a point names its experiment."""
+        return Readings.joined({e.name: e.readings for e in self.experiments})
+
+    @cached_property
+    def means(self) -> PointMeans:
+        """The readings averaged over repeats, P points."""
+        return PointMeans.of(self.readings)
+
+    @cached_property
+    def experiment_of(self) -> np.ndarray:
+        """(P,) number of the experiment of each point."""
+        return np.repeat(np.arange(len(self.experiments)), [len(e) for e in self.experiments])
+
+    @cached_property
+    def positions_m(self) -> np.ndarray:
+        """(P, 3) measured points on the surfaces [m]."""
+        return np.concatenate([e.measured_points.positions_m for e in self.experiments])
 
     def without(self, left_out: np.ndarray) -> 'Campaign':
-        """The same without some of the readings, (N,) in the order of the experiments.
+        """The same campaign without some of its readings (N,).
 
         Raises:
             ReadingsError: an experiment has no reading left.
         """
-        ends = np.cumsum([len(experiment.readings) for experiment in self.experiments])
-        parts = zip(self.experiments, np.split(left_out, ends[:-1]), strict=True)
-        return replace(self, experiments=tuple(e.without(rows) for e, rows in parts))
+        owner = self.experiment_of[self.means.owner]
+        kept = (e.without(left_out[owner == k]) for k, e in enumerate(self.experiments))
+        return replace(self, experiments=tuple(kept))
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Readings that were left out, a line for each point."""
+        """A line for each point at which readings were left out."""
         return tuple(
             f'{experiment.name}: {line}'
             for experiment in self.experiments

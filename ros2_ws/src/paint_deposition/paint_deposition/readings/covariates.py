@@ -1,4 +1,4 @@
-"""What differs from point to point: the axes along which a missing effect can show."""
+"""Covariates: quantities that differ from point to point, against which a residual can show."""
 
 from dataclasses import dataclass
 
@@ -8,10 +8,11 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.axes import across_axis
 from paint_deposition.readings.campaign import Experiment
 
-# Edge effects reach a few centimetres; the covariate flattens out beyond this length [m].
+# Edge effects reach a few centimetres: the covariate decays over this length [m].
 EDGE_LENGTH_M = 0.03
+# Most sub-steps from which rays are traced; a longer path is thinned.
 SUB_STEPS_USED = 4000
-# A quantity that varies by less than this share of itself is constant but for rounding.
+# A quantity whose standard deviation is a smaller share of its largest value is constant.
 ROUNDING = 1e-4
 
 
@@ -35,7 +36,7 @@ class Covariate:
 
 @dataclass(frozen=True)
 class Rays:
-    """Rays from the sub-steps that spray (M) to the points (P), for the base model.
+    """Straight rays from the M sub-steps that spray to the P points, for eqs. (1) and (2) alone.
 
     Attributes:
         share: (M, P) film that each sub-step leaves at each point [um].
@@ -54,18 +55,17 @@ class Rays:
     @staticmethod
     def of(experiment: Experiment, model: DepositionModel) -> 'Rays':
         """Trace them in plain NumPy; sub-steps are thinned to SUB_STEPS_USED."""
-        path, points = experiment.path, experiment.points
-        count = len(experiment)
+        path, points = experiment.path, experiment.measured_points
         rows = np.flatnonzero(path.flow * path.dwell_s > 0.0)
         stride = 1 + len(rows) // SUB_STEPS_USED
         rows = rows[::stride]
         axes = path.rotation[rows]
         offset, omega = model.projection.emission_offset_m, model.projection.model_plane_m
         origin = path.position_m[rows] - offset * axes[:, :, 2]
-        to_point = points.positions_m[np.newaxis, :count] - origin[:, np.newaxis]
+        to_point = points.positions_m[np.newaxis] - origin[:, np.newaxis]
         local = np.einsum('mpi,mij->mpj', to_point, axes)
         distance = np.linalg.norm(to_point, axis=2)
-        facing = -np.einsum('mpi,pi->mp', to_point, points.normals[:count])
+        facing = -np.einsum('mpi,pi->mp', to_point, points.normals)
         along = local[:, :, 2]
         lit = (along > max(offset, 1e-3)) & (facing > 0.0)
         depth = np.where(lit, along, 1.0)
@@ -82,9 +82,8 @@ class Rays:
 
 
 def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> list[Covariate]:
-    """All covariates of an experiment's points."""
-    count = len(experiment)
-    points = experiment.points.select(slice(0, count))
+    """All covariates of an experiment's P points."""
+    points = experiment.measured_points
     path = experiment.path.select(rays.rows)
     start_ns = path.stamp_ns[0] if len(path) else 0
     seconds = (path.stamp_ns - start_ns) * 1e-9

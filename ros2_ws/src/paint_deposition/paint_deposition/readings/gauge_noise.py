@@ -11,6 +11,7 @@ from paint_deposition.readings.outliers import (
     usual_noise_um,
 )
 from paint_deposition.readings.readings import PointMeans, Readings
+from paint_deposition.readings.residuals import root_mean_square
 
 
 @dataclass(frozen=True)
@@ -32,37 +33,31 @@ class GaugeNoise:
     @property
     def typical_um(self) -> float:
         """Root mean square over the readings [um]."""
-        return float(np.sqrt(np.mean(self.sigma_um**2)))
+        return root_mean_square(self.sigma_um)
 
     def without_gross(self) -> 'GaugeNoise':
-        """Of the other readings."""
+        """The noise of the readings that are no gross outliers."""
         kept = ~self.gross
         return replace(self, sigma_um=self.sigma_um[kept], gross=self.gross[kept])
 
 
-def gauge_noise(readings: list[Readings]) -> GaugeNoise:
-    """Noise of all readings of a campaign, in their order, taken with one gauge.
+def gauge_noise(readings: Readings) -> GaugeNoise:
+    """Noise of all readings that were taken with one gauge.
 
     Stated values win. For the others the shape of a usual gauge, sqrt(0.7^2 + (0.01 T)^2) um, is
     scaled to the pooled scatter of their repeats, gross outliers left out; without enough of
     those it is assumed as it is.
     """
-    stated = np.concatenate([r.sigma_um for r in readings])
-    thickness = np.concatenate([r.thickness_um for r in readings])
+    stated = readings.sigma_um
     gross = gross_outliers(readings)
     if np.isfinite(stated).all():
         return GaugeNoise(stated, 'stated', np.inf, gross)
-    usual = usual_noise_um(thickness)
-    squares, freedom, start = 0.0, 0, 0
-    for part in readings:
-        counted = np.isnan(part.sigma_um) & ~gross[start : start + len(part)]
-        start += len(part)
-        part = part.select(counted)
-        means = PointMeans.of(part)
-        shape = usual_noise_um(means.mean_um[means.owner])
-        deviations = (part.thickness_um - means.mean_um[means.owner]) / shape
-        squares += float(np.sum(deviations**2))
-        freedom += len(part) - len(means.first)
+    usual = usual_noise_um(readings.thickness_um)
+    counted = readings.select(np.isnan(stated) & ~gross)
+    means = PointMeans.of(counted)
+    film = means.mean_um[means.owner]
+    squares = float(np.sum(((counted.thickness_um - film) / usual_noise_um(film)) ** 2))
+    freedom = len(counted) - len(means.first)
     if freedom < ENOUGH_REPEATS or squares == 0.0:
         sigma = np.where(np.isfinite(stated), stated, usual)
         return GaugeNoise(sigma, 'assumed', ASSUMED_FREEDOM, gross)

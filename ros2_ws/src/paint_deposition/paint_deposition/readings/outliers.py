@@ -1,7 +1,7 @@
 """Gross outliers among repeats: slips of the gauge, which no noise explains.
 
-One of them in twenty repeats can triple a mean square, and noise that is taken for so large hides
-every effect.
+One of them in twenty repeats can triple the mean square, and a noise that is overestimated by so
+much hides every effect.
 """
 
 import numpy as np
@@ -15,14 +15,15 @@ ASSUMED_FLOOR_UM = 0.7
 ASSUMED_SHARE = 0.01
 # Fewer degrees of freedom from repeats than this are not trusted alone.
 ENOUGH_REPEATS = 6
-# An assumed noise is trusted like one from this many repeats: it may be off by a third.
+# An assumed noise counts like an estimate with these degrees of freedom: it may be off by a third.
 ASSUMED_FREEDOM = 5.0
-# Repeats that are off by more standard deviations are gross. Where few repeats say what the
-# standard deviation is, the limit is what honest ones exceed with this chance (Student's t).
+# Repeats that are off by more standard deviations are gross outliers. Where the standard deviation
+# is estimated from few repeats, the limit is the quantile of Student's t that sound readings
+# exceed with this probability.
 GROSS_SIGMAS = 5.0
 GROSS_CHANCE = 1e-4
-# No gauge is taken to be better than this share of the usual one: a display in whole um shows
-# many repeats without any scatter.
+# The scale is at least this share of the usual noise: a display in whole um shows many repeats
+# without any scatter.
 LEAST_SCALE = 0.5
 MOST_ROUNDS = 20
 
@@ -32,21 +33,16 @@ def usual_noise_um(thickness_um: np.ndarray) -> np.ndarray:
     return np.hypot(ASSUMED_FLOOR_UM, ASSUMED_SHARE * thickness_um)
 
 
-def gross_outliers(readings: list[Readings]) -> np.ndarray:
-    """(N,) whether a reading contradicts the others at its point, for all parts in order.
+def gross_outliers(readings: Readings) -> np.ndarray:
+    """(N,) whether a reading contradicts the others at its point.
 
-    Of three or more at a point those are that lie far from their median. Where no majority is
-    left, as with two that disagree, nothing says which is wrong, and all of them are. The scale
-    is pooled over all points; readings with a stated noise have a scale of their own.
+    Of three or more readings at a point, those far from their median are outliers. Where no
+    majority is left, as with two that disagree, nothing says which one is wrong, and all of them
+    are outliers. The scale is pooled over all points; readings with a stated noise have a scale
+    of their own.
     """
-    owners, points = [], 0
-    for part in readings:
-        means = PointMeans.of(part)
-        owners.append(means.owner + points)
-        points += len(means.first)
-    thickness = np.concatenate([part.thickness_um for part in readings])
-    stated = np.concatenate([part.sigma_um for part in readings])
-    owner, gross = np.concatenate(owners), np.zeros(len(thickness), dtype=bool)
+    thickness, stated = readings.thickness_um, readings.sigma_um
+    owner, gross = PointMeans.of(readings).owner, np.zeros(len(thickness), dtype=bool)
     for pool in (np.isnan(stated), np.isfinite(stated)):
         if pool.any():
             _, compact = np.unique(owner[pool], return_inverse=True)
@@ -67,7 +63,7 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
         out, kept = taken.thickness_um[here & ~used], taken.thickness_um[here & used]
         beside = f' beside {_listed(kept)}' if len(kept) else ' contradict each other'
         lines.append(
-            f"point '{label}': {_listed(out)} um{beside}; left out of the fit, measure "
+            f"point '{label}': {_listed(out)} µm{beside}; left out of the fit, measure "
             f'{"it" if len(kept) else "there"} again'
         )
     return lines
@@ -97,7 +93,7 @@ class _Repeats:
         self.distance = reference * np.abs(self.scaled) / error
 
     def gross(self) -> np.ndarray:
-        """(N,) outliers: from a robust scale on, readings are taken back until all agree."""
+        """(N,) outliers, from a robust scale and iterated until the set no longer changes."""
         if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
             return self._beyond(1.0, ASSUMED_FREEDOM)
         gross = self._beyond(self._robust_scale(), np.inf)
@@ -110,12 +106,12 @@ class _Repeats:
     def _robust_scale(self) -> float:
         """Median of the distances, consistent for normal noise."""
         order = np.lexsort((self.distance, self.owner))
-        # Half of a pair, and the median itself of three, say nothing that the others do not.
+        # At each point one distance is redundant: half of a pair, or the median of three itself.
         own = np.diff(self.owner[order], prepend=-1) == 0
         return float(np.median(self.distance[order][own]) / norm.ppf(0.75))
 
     def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
-        """Root mean square of the kept within points, and its degrees of freedom."""
+        """Pooled scale of the kept readings within points, and its degrees of freedom."""
         count = np.bincount(self.owner, kept)
         mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
         freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)

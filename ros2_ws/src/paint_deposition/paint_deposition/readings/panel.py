@@ -1,4 +1,4 @@
-"""A flat panel painted by straight parallel passes, seen along its passes."""
+"""A flat panel painted by straight parallel passes: coordinates across the passes."""
 
 from dataclasses import dataclass
 
@@ -8,7 +8,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.readings.campaign import Experiment
 
-# A surface whose normals stay this close together is flat, and passes this parallel are parallel.
+# Cosines of the largest angles: between normals of a flat panel, between parallel passes, and
+# between the gun's axis and the panel's normal.
 FLAT_COSINE = np.cos(np.radians(3.0))
 PARALLEL_COSINE = np.cos(np.radians(2.0))
 SQUARE_COSINE = np.cos(np.radians(5.0))
@@ -40,8 +41,8 @@ class Panel:
     @staticmethod
     def of(experiment: Experiment) -> 'Panel | None':
         """The panel of an experiment, or None if part or motion are of another kind."""
-        normals = experiment.points.normals[: len(experiment)]
-        positions = experiment.points.positions_m[: len(experiment)]
+        normals = experiment.measured_points.normals
+        positions = experiment.measured_points.positions_m
         outward = normals.mean(axis=0)
         outward /= np.linalg.norm(outward)
         if (normals @ outward).min() < FLAT_COSINE:
@@ -51,16 +52,16 @@ class Panel:
         passes = [p for p in passes if p.dwell_s @ p.speed_m_per_s > SHORTEST_PASS_M]
         if not passes:
             return None
-        ways = np.array([p.dwell_s @ p.velocity_m_per_s for p in passes])
-        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
-        travel = ways[0]
+        travels = np.array([p.dwell_s @ p.velocity_m_per_s for p in passes])
+        travels /= np.linalg.norm(travels, axis=1, keepdims=True)
+        travel = travels[0]
         axes = np.array([np.median(p.rotation, axis=0) for p in passes])
-        if np.abs(ways @ travel).min() < PARALLEL_COSINE:
+        if np.abs(travels @ travel).min() < PARALLEL_COSINE:
             return None
         if (-axes[:, :, 2] @ outward).min() < SQUARE_COSINE:
             return None
         across = np.cross(-outward, travel)
-        # The first steps of a pass may still be counted with the one before.
+        # The first sub-steps of a pass may still be counted with the pass before.
         spread = [np.ptp(np.quantile(p.position_m @ across, INNER)) for p in passes]
         if max(spread) > STRAIGHT_M:
             return None
@@ -79,7 +80,7 @@ class Panel:
 
     @property
     def scale_m(self) -> float:
-        """A length like a pass's width: the index, or the spread of the readings [m]."""
+        """Order of a pass's width: the index, or a share of the readings' extent [m]."""
         if len(self.passes_m) > 1:
             return float(np.median(np.diff(np.sort(self.passes_m))))
         return 0.6 * float(np.ptp(self.across_m))

@@ -1,4 +1,4 @@
-"""Whether readings can be what they are said to be, before anything is fitted to them."""
+"""Plausibility of readings: units, signs and coverage, checked before anything is fitted."""
 
 import numpy as np
 from scipy.stats import chi2
@@ -7,19 +7,19 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.readings.panel import Panel
 from paint_deposition.readings.readings import Readings
 
-# The pattern has seven parameters; a few points more tell a fit from a coincidence.
+# The pattern has seven parameters, and a fit needs a few points more.
 FEWEST_POINTS = 10
 UM_PER_MIL, UM_PER_MM = 25.4, 1000.0
-# No paint film is thinner than this all over; such numbers are mils or millimetres.
+# No paint film is thinner than this everywhere; such numbers are mils or millimetres.
 THINNEST_FILM_UM = 3.0
 THINNEST_MILS = 0.15
-# Two units in one column stand apart by a gap that no film has between neighbours in size.
+# Two units in one column leave a gap: sorted by size, neighbours differ by more than this factor.
 LEAST_GAP = 6.0
 UNIT_SLACK = 1.8
 NEGATIVE_SIGMAS = 4.0
-# Structure is a scatter of the points that their noise has by chance less often than this.
+# The film has structure if noise alone scatters as much with a smaller probability.
 NO_STRUCTURE_P = 1e-3
-# Points count as beside a pass from this share of the panel's scale on.
+# A point lies beside a pass from this share of the panel's scale on.
 BESIDE = 0.05
 
 
@@ -66,7 +66,7 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     if below.any():
         worst = int(np.argmin(film))
         raise ReadingsError(
-            f"{readings.source}: point '{readings.point[worst]}' reads {film[worst]:g} um; film "
+            f"{readings.source}: point '{readings.point[worst]}' reads {film[worst]:g} µm; film "
             'is not negative, zero the gauge on bare metal'
         )
     _refuse_mixed_units(readings)
@@ -75,7 +75,7 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
 def check_panel(
     readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
 ) -> None:
-    """Refuse a panel from which no pass can be told.
+    """Refuse a panel whose readings cannot determine a pass.
 
     Args:
         readings: as taken. panel: where points and passes lie.
@@ -99,7 +99,7 @@ def check_panel(
     if chi2.sf(scatter, len(measured_um) - 1) > NO_STRUCTURE_P:
         raise ReadingsError(
             f'{readings.source}: the film varies by no more than the noise of the gauge '
-            f'({float(measured_um.std()):.2f} um between points); there is no pattern in it, '
+            f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
             'measure beyond the passes or paint at a wider index'
         )
 
@@ -107,7 +107,7 @@ def check_panel(
 def check_units_beside(
     readings: Readings, measured_um: np.ndarray, expected_um: np.ndarray
 ) -> None:
-    """Refuse points that are what a robust fit expects in another unit.
+    """Refuse points that agree with a robust fit if they are taken for another unit.
 
     Args:
         readings: as taken.
@@ -134,7 +134,7 @@ def _refuse_mixed_units(readings: Readings) -> None:
         return
     low, high = film[: cut + 1], film[cut + 1 :]
     factor = float(np.median(high) / np.median(low))
-    # Readings beside the pattern are small too, but they are not all alike.
+    # Readings beside the pattern are small, too, but they differ among themselves.
     if np.median(high) < THINNEST_FILM_UM or low.max() > LEAST_GAP * low.min():
         return
     for unit, exact in (('mils', UM_PER_MIL), ('mm', UM_PER_MM)):
@@ -147,6 +147,6 @@ def _other_unit(
 ) -> ReadingsError:
     return ReadingsError(
         f'{readings.source}: {len(strange)} of the readings are about {np.median(strange):.3g} '
-        f'where {np.median(others_um):.3g} um is to be expected; they look like {unit}, multiply '
+        f'where {np.median(others_um):.3g} µm is expected; they look like {unit}, multiply '
         f'them by {factor:g}'
     )

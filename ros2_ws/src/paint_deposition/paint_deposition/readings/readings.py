@@ -1,6 +1,6 @@
 """Gauge readings of a painted part."""
 
-from collections.abc import Sized
+from collections.abc import Mapping, Sized
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,6 +48,22 @@ class Readings:
             np.asarray(positions_m, dtype=float),
             np.asarray(thickness_um, dtype=float),
             **(defaults | columns),
+        )
+
+    @staticmethod
+    def joined(parts: Mapping[str, 'Readings']) -> 'Readings':
+        """Readings of named parts, one part after the other; labels of points name the part.
+
+        The normals are left out.
+        """
+        columns = ('positions_m', 'thickness_um', 'group', 'sigma_um')
+        return Readings(
+            point=np.array([f'{name}: {p}' for name, part in parts.items() for p in part.point]),
+            source=', '.join(part.source for part in parts.values()),
+            **{
+                column: np.concatenate([getattr(part, column) for part in parts.values()])
+                for column in columns
+            },
         )
 
     def select(self, rows: np.ndarray | slice) -> 'Readings':

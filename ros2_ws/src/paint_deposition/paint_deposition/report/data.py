@@ -9,7 +9,6 @@ import numpy as np
 
 from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.comparison.profiles import Profile, profiles_of
-from paint_deposition.comparison.residual_field import point_residuals_um
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
@@ -112,22 +111,12 @@ class ReportData:
     @cached_property
     def residuals_um(self) -> list[np.ndarray]:
         """For each model (P,) at the points, averaged over repeats [um]."""
-        return [np.concatenate(point_residuals_um(self.study, c)) for c in self.comparisons]
-
-    @cached_property
-    def rmse_um(self) -> list[float]:
-        """For each model, over the points [um]."""
-        return [float(np.sqrt(np.mean(r**2))) for r in self.residuals_um]
+        return [c.points.residual_um for c in self.comparisons]
 
     def errors_in_words(self, rows: np.ndarray) -> str:
         """RMSE of each model at these points of the study."""
-        errors = [f'{np.sqrt(np.mean(r[rows] ** 2)):.2f}' for r in self.residuals_um]
+        errors = [f'{c.points.select(rows).rmse_um:.2f}' for c in self.comparisons]
         return f'RMSE {" → ".join(errors)} µm'
-
-    @cached_property
-    def chi_square_per_point(self) -> list[float]:
-        """For each model; about 1 where only the gauge's noise is left."""
-        return [float(np.mean((r / self.study.sigma_um) ** 2)) for r in self.residuals_um]
 
     @cached_property
     def profiles(self) -> list[Profile]:
@@ -175,7 +164,7 @@ class ReportData:
 
     def rows_of(self, index: int) -> slice:
         """Points of the study that belong to an experiment."""
-        first, stop = np.searchsorted(self.study.experiment_of, [index, index + 1])
+        first, stop = np.searchsorted(self.study.campaign.experiment_of, [index, index + 1])
         return slice(int(first), int(stop))
 
 

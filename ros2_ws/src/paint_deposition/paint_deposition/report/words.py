@@ -146,7 +146,7 @@ def count_words(study: Study) -> str:
     names = ' and '.join(e.name for e in experiments) if len(experiments) < 4 else (
         f'{len(experiments)} experiments'
     )  # fmt: skip
-    readings, points = study.campaign.reading_count, len(study)
+    readings, points = len(study.campaign.readings), len(study)
     text = f'{readings} readings'
     if points != readings:
         text += f' at {points} points'

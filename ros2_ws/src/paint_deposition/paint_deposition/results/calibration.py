@@ -1,6 +1,5 @@
 """A calibration on disk: the model with its uncertainty, and figures."""
 
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -32,12 +31,24 @@ def calibration_as_dict(calibration: Calibration) -> dict[str, Any]:
             {'parameters': [pair.first, pair.second], 'value': pair.value}
             for pair in calibration.correlations[:SHOWN_CORRELATIONS]
         ],
-        'experiments': [asdict(agreement) for agreement in calibration.agreements],
+        'experiments': [
+            {
+                'experiment': experiment.name,
+                'points': len(residuals),
+                'measured_mean_um': float(residuals.measured_um.mean()),
+                'predicted_mean_um': float(residuals.predicted_um.mean()),
+                'residual_sd_um': residuals.sd_um,
+                'rmse_um': residuals.rmse_um,
+            }
+            for experiment, residuals in zip(
+                study.campaign.experiments, calibration.residuals, strict=True
+            )
+        ],
         'collapse': [
             None if panel is None else _collapse_as_dict(panel) for panel in calibration.panels
         ],
         'points': len(study),
-        'readings': study.campaign.reading_count,
+        'readings': len(study.campaign.readings),
         'chi_square_per_degree_of_freedom': calibration.chi_square_per_freedom,
         'converged': calibration.fit.converged,
         'noise': {'sigma_um': study.noise.typical_um, 'source': study.noise.source},
@@ -70,7 +81,7 @@ def write_calibration(
 
 
 def _headline(calibration: Calibration) -> list[str]:
-    names = ', '.join(agreement.experiment for agreement in calibration.agreements)
+    names = ', '.join(experiment.name for experiment in calibration.study.campaign.experiments)
     return [
         f'Calibrated on {len(calibration.study)} points ({names}).',
         *(f'Mind: {warning}.' for warning in calibration.warnings),
@@ -86,6 +97,6 @@ def _collapse_as_dict(panel: PanelFit) -> dict[str, Any]:
         **collapse.model_dump(),
         'index_m': index,
         'sigma_n': None if index is None else sigma_n_closed_form(collapse, index),
-        'rmse_um': panel.collapse.rmse_um,
+        'rmse_um': panel.collapse.residuals.rmse_um,
         'speed_m_per_s': float(panel.panel.speed_m_per_s[0]),
     }

@@ -91,7 +91,7 @@ def _rounded(fit: Fit) -> DepositionModel:
         values = {
             name: _few_digits(getattr(effect, name), info['low'], info['high'])
             for name, info in effect.parameters().items()
-            if (effect.id, name) in fit.unknowns.varied
+            if (effect.id, name) in fit.parameters.varied
         }
         effects.append(effect.model_copy(update=values))
     planar = fit.model.planar.model_copy(update=pattern)

@@ -15,13 +15,17 @@ from paint_deposition.fitting.study import Study
 
 def comparison_as_dict(comparison: Comparison) -> dict[str, Any]:
     """The figures of a comparison."""
+    study = comparison.study
     return {
-        'readings': len(comparison.residual_um),
-        'noise': {'sigma_um': comparison.noise_um, 'source': comparison.noise_source},
-        'misfits': [asdict(misfit) for misfit in comparison.misfits],
+        'readings': len(comparison.readings),
+        'noise': {'sigma_um': study.noise.typical_um, 'source': study.noise.source},
+        'misfits': [
+            {'experiment': m.experiment, 'kind': m.kind, 'label': m.label, **m.residuals.figures()}
+            for m in comparison.misfits
+        ],
         'regions': regions_as_list(comparison.regions),
         'dependences': [asdict(dependence) for dependence in comparison.dependences],
-        'notes': list(comparison.notes),
+        'notes': list(study.notes),
     }
 
 
@@ -101,7 +105,8 @@ def write_residuals(path: str | Path, study: Study, comparison: Comparison) -> N
         ['experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
          'residual_um', 'sigma_um', 'used']
     ]  # fmt: skip
-    fitted = zip(comparison.predicted_um, comparison.residual_um, comparison.sigma_um, strict=True)
+    found = comparison.readings
+    fitted = zip(found.predicted_um, found.residual_um, found.sigma_um, strict=True)
     for experiment in study.campaign.experiments:
         readings = experiment.taken
         for k, used in enumerate(experiment.used):

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.comparison.comparison import Comparison
-from paint_deposition.comparison.residual_field import point_residuals_um, spread_over_surface
+from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.film.colour_scales import residual_scale
 from paint_deposition.fitting.study import Study
@@ -19,14 +19,12 @@ def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparis
     reading is near. All experiments share one scale of colours.
     """
     fields = []
-    for experiment, residual in zip(
-        study.campaign.experiments, point_residuals_um(study, comparison), strict=True
-    ):
-        count = len(experiment)
-        points = experiment.points
+    for number, experiment in enumerate(study.campaign.experiments):
+        points = experiment.measured_points
+        residual_um = comparison.points.residual_um[study.campaign.experiment_of == number]
         fields.append(
             spread_over_surface(
-                experiment.surface, points.positions_m[:count], points.normals[:count], residual
+                experiment.surface, points.positions_m, points.normals, residual_um
             )
         )
     everything = np.concatenate(fields)

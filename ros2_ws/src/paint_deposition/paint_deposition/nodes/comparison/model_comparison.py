@@ -13,7 +13,6 @@ from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.comparison.residual_field import reached, spreading
-from paint_deposition.comparison.residuals import Residuals
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
@@ -31,6 +30,7 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.readings.gauge_noise import gauge_noise
+from paint_deposition.readings.residuals import Residuals
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25
@@ -90,7 +90,7 @@ class ModelComparison(PaintingNode):
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
         self._readings = read_readings(self.values['measurements_file'])
-        self._noise = gauge_noise([self._readings])
+        self._noise = gauge_noise(self._readings)
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return self._experiment.points
@@ -117,12 +117,7 @@ class ModelComparison(PaintingNode):
         """Every reading against the film of all poses received."""
         predicted = self.film.up_to_date().gauge_um[: len(self._experiment)]
         at_readings = predicted[self._experiment.means.owner]
-        return Residuals(
-            self._readings.positions_m,
-            at_readings,
-            self._readings.thickness_um - at_readings,
-            self._noise.sigma_um,
-        )
+        return Residuals(self._readings.thickness_um, at_readings, self._noise.sigma_um)
 
     # --- parameters
 
@@ -169,10 +164,10 @@ class ModelComparison(PaintingNode):
         )
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
-        x, y, z = residuals.positions_m[residuals.worst].tolist()
+        x, y, z = self._readings.positions_m[residuals.worst].tolist()
         message = ComparisonStats(
             model=self._model_name,
-            readings=len(residuals.residual_um),
+            readings=len(residuals),
             readings_painted=int(residuals.painted.sum()),
             bias_um=residuals.bias_um,
             rmse_um=residuals.rmse_um,
@@ -189,9 +184,9 @@ class ModelComparison(PaintingNode):
     def summary(self) -> str:
         """The comparison in one line."""
         found = self.residuals()
-        x, y, z = found.positions_m[found.worst]
+        x, y, z = self._readings.positions_m[found.worst]
         return (
-            f'{self._model_name}: {len(found.residual_um)} readings, {found.painted.sum()} where '
+            f'{self._model_name}: {len(found)} readings, {found.painted.sum()} where '
             f'paint is predicted; residual {found.bias_um:+.2f} µm on average, rms '
             f'{found.rmse_um:.2f} µm (gauge {self._noise.typical_um:.2f} µm, '
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
@@ -202,7 +197,7 @@ class ModelComparison(PaintingNode):
         found = self.residuals()
         return Status(
             OK,
-            f'rms {found.rmse_um:.2f} µm at {len(found.residual_um)} readings',
+            f'rms {found.rmse_um:.2f} µm at {len(found)} readings',
             {
                 'readings': self.values['measurements_file'],
                 'bias [µm]': f'{found.bias_um:.3f}',

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from paint_deposition.diagnosis.procedure import ALPHA, SURE
+from paint_deposition.diagnosis.run import ALPHA, SURE
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows, effect_rows
@@ -162,9 +162,9 @@ def _broken(data: ReportData, diagnosis: Diagnosis) -> Headline:
 
 
 def _compared(data: ReportData) -> Headline:
-    regions = data.comparisons[-1].regions
+    regions, points = data.comparisons[-1].regions, data.comparisons[-1].points
     freedom = min(data.study.noise.degrees_of_freedom, 1e6)
-    chance = float(fisher.sf(data.chi_square_per_point[-1], len(data.study), freedom))
+    chance = float(fisher.sf(points.chi_square_per_reading, len(points), freedom))
     off = bool(regions) or chance < CHANCE
     if regions:
         title = 'The model misses the readings in places'
@@ -172,12 +172,12 @@ def _compared(data: ReportData) -> Headline:
         title = 'The model is further off than the gauge explains'
     else:
         title = 'The model agrees with the readings'
-    worst = float(np.max(np.abs(data.residuals_um[-1])))
+    worst = float(np.abs(points.residual_um[points.worst]))
     where = ' '.join(f'{capital(in_print(region.description))}.' for region in regions[:3])
     facts = (
         (
             'How far off',
-            f'RMSE {micrometres(data.rmse_um[-1])}, at worst {micrometres(worst)}; '
+            f'RMSE {micrometres(points.rmse_um)}, at worst {micrometres(worst)}; '
             f'the gauge alone gives {micrometres(data.study.noise_floor_um)}.',
         ),
         ('Where', where or 'No region stands out.'),
@@ -191,7 +191,9 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     found = []
     diagnosis = data.diagnosis
     if diagnosis is None:
-        found.append(('RMSE', '', f'{data.rmse_um[-1]:.2f}', 'µm on all points'))
+        found.append(
+            ('RMSE', '', f'{data.comparisons[-1].points.rmse_um:.2f}', 'µm on all points')
+        )
     else:
         first, last = diagnosis.history[0], diagnosis.history[-1]
         for label, before, after in (

@@ -69,7 +69,7 @@ def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
 def draw_panel(axes: Axes, calibration: Calibration, number: int, one: PanelFit) -> None:
     """Draw the film across a panel, an experiment of this number, as measured and as predicted."""
     study, panel = calibration.study, one.panel
-    rows = study.experiment_of == number
+    rows = study.campaign.experiment_of == number
     measured, predicted = study.measured_um[rows], calibration.fit.predicted_um[rows]
     quiet(
         axes, 'across the passes [mm]; dotted: tool path', 'film [µm]',

@@ -3,17 +3,12 @@
 import numpy as np
 import pytest
 
-from paint_deposition.comparison.residuals import Residuals
+from paint_deposition.readings.residuals import Residuals
 
 
 def _residuals(predicted, measured, sigma=1.0):
     predicted, measured = np.array(predicted, float), np.array(measured, float)
-    return Residuals(
-        np.zeros((len(predicted), 3)),
-        predicted,
-        measured - predicted,
-        np.full(len(predicted), sigma),
-    )
+    return Residuals(measured, predicted, np.full(len(predicted), sigma))
 
 
 def test_figures_by_hand():
