@@ -39,7 +39,7 @@ lock: build  ## pin the newest versions that every supported Python can have
 	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
 
 clean:  ## remove what was built, keep the environment
-	rm -rf ros2_ws/{build,install,log} .setup .{pytest,mypy,ruff}_cache .hypothesis
+	rm -rf ros2_ws/{build,install,log} $(PACKAGE)/{build,*.egg-info} .setup .{pytest,mypy,ruff}_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 
 distclean: clean  ## remove the environment too

@@ -27,6 +27,16 @@ logged() {
     fi
 }
 
+# through_shell SCRIPT...: has Python scripts started by the shell. The kernel takes the first line of
+# a script apart at spaces, so that it cannot name an interpreter whose path has some. To Python the
+# lines for the shell are a text.
+through_shell() {
+    sed -i "1c\\
+#!/bin/sh\\
+'''exec' \"$venv/bin/python\" \"\$0\" \"\$@\"\\
+' '''" "$@"
+}
+
 # Where ROS 2 comes from: the distribution that is sourced, else the one this environment was made
 # with, else 'wheels'.
 ros_source() {
@@ -57,7 +67,7 @@ toolchain_fingerprint() {
 sources_fingerprint() {
     local package=$workspace/src/paint_deposition
     {
-        find "$workspace/src/paint_msgs" "$package"/{setup.py,setup.cfg,package.xml,resource} \
+        find "$workspace/src/paint_msgs" "$package"/{setup.py,setup.cfg,pyproject.toml,package.xml,resource} \
             -type f -print0 | sort -z | xargs -0 sha256sum
         find "$package" \( -path '*/launch/*' -o -path '*/config/*' -o -path '*/samples/*' \) \
             -type f -not -path '*/__pycache__/*' | sort

@@ -26,6 +26,13 @@ logged 'Building messages, nodes and command line' \
     --merge-install --symlink-install --event-handlers console_direct+ \
     --cmake-args -DCMAKE_BUILD_TYPE=Release -DBUILD_TESTING=OFF
 
+if [[ $venv == *[[:space:]]* ]]; then
+    through_shell "$install"/lib/paint_deposition/*
+    # colcon's own scripts call their interpreter without quotes.
+    sed -i 's/(\$_colcon_python_executable /("$_colcon_python_executable" /' \
+        "$install"/local_setup.{sh,bash}
+fi
+
 sources=$linked
 [[ $(install_kind) == linked ]] || sources=$copied
 printf '%s\n' "$toolchain" "$sources" >"$install/.fingerprint"

@@ -8,12 +8,19 @@ import importlib.util
 import os
 import py_compile
 import re
+import shutil
 import subprocess
+import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+import paint_deposition
+from paint_deposition.nodes import executables
 
 PACKAGE = 'paint_deposition'
 NODES = ('bag_player', 'deposition_simulator', 'index_planner', 'model_comparison', 'run_recorder')
@@ -35,7 +42,8 @@ def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
 
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    module = importlib.import_module(console_scripts()[node].module)
+    _, module_name = getattr(executables, node).args
+    module = importlib.import_module(f'{PACKAGE}.nodes.{module_name}.{node}')
     (table,) = (
         thing.PARAMETERS
         for thing in vars(module).values()
@@ -58,8 +66,9 @@ def test_manifest_and_setup_agree():
     assert xml.findtext('name') == installed['Name'].replace('-', '_')
     assert xml.findtext('version') == installed['Version']
     assert xml.findtext('license') == installed['License']
-    assert xml.findtext('maintainer') == installed['Maintainer']
-    assert xml.find('maintainer').get('email') == installed['Maintainer-email']
+    maintainer = xml.find('maintainer')
+    assert installed['Maintainer-email'] == f'{maintainer.text} <{maintainer.get("email")}>'
+    assert installed['Version'] == paint_deposition.__version__
 
 
 @pytest.mark.parametrize('package', ['paint_msgs', PACKAGE])
@@ -186,6 +195,95 @@ def test_parameter_file_tells_of_every_parameter(node):
     section = text.split(f'/**/{node}:')[1].split('/**/')[0]
     for name in table_of(node):
         assert re.search(rf'^ +(# )?{name}: .*#', section, re.M), f'{node}: {name} is not there'
+
+
+def test_every_dependency_is_declared_and_pinned(repository):
+    """Each with the oldest release that will do; the pins satisfy them all."""
+    pins = dict(
+        line.split(' ')[0].split('==')
+        for line in (repository / 'requirements/core.txt').read_text().splitlines()
+        if '==' in line and not line.startswith('#')
+    )
+    chosen = {
+        canonicalize_name(line.split()[0])
+        for line in (repository / 'requirements/core.in').read_text().splitlines()
+        if line and not line.startswith('#')
+    }
+    required = [
+        Requirement(text) for text in importlib.metadata.requires(PACKAGE) if 'extra' not in text
+    ]
+    assert {canonicalize_name(requirement.name) for requirement in required} == chosen
+    for requirement in required:
+        assert requirement.specifier
+        assert requirement.specifier.contains(pins[canonicalize_name(requirement.name)]), (
+            requirement
+        )
+
+
+@pytest.fixture(scope='module')
+def clean_environment(repository, tmp_path_factory):
+    """A new environment with nothing but the wheel and what it asks for; no ROS."""
+    folder = tmp_path_factory.mktemp('wheel')
+    source = shutil.copytree(
+        SOURCES / PACKAGE, folder / 'source', ignore=shutil.ignore_patterns('__pycache__', 'build')
+    )
+    uv = repository / '.venv/bin/uv'
+    for command in (
+        [uv, 'build', '--wheel', '--out-dir', folder, source],
+        [uv, 'venv', '--python', sys._base_executable, folder / 'venv'],
+        [uv, 'pip', 'install', '--python', folder / 'venv/bin/python',
+         '--constraint', repository / 'requirements/core.txt', f'{PACKAGE} @ {{wheel}}'],
+    ):  # fmt: skip
+        wheel = next(folder.glob('*.whl'), None)
+        command = [str(part).replace('{wheel}', f'file://{wheel}') for part in command]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+    shutil.rmtree(source)
+    # The environment lies in a repository of another project, as environments do.
+    subprocess.run(['git', 'init', '--quiet', folder], check=True)
+    who = ['-c', 'user.name=Somebody', '-c', 'user.email=somebody@example.org']
+    message = ['commit', '--quiet', '--allow-empty', '--message', 'Begin']
+    subprocess.run(['git', '-C', folder, *who, *message], check=True)
+    bare = {name: os.environ[name] for name in ('HOME', 'NUMBA_CACHE_DIR') if name in os.environ}
+
+    def run(name: str, *arguments: object) -> subprocess.CompletedProcess:
+        command = [folder / 'venv/bin' / name, *map(str, arguments)]
+        return subprocess.run(command, cwd=folder, env=bare, capture_output=True, text=True)
+
+    return run
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_wheel_brings_command_and_library_without_ros(clean_environment, tmp_path):
+    run = clean_environment
+    assert run('paint', '--version').stdout == f'paint {paint_deposition.__version__}\n'
+    done = run(
+        'python', '-c',
+        'import importlib.util, paint_deposition as pd\n'
+        'assert importlib.util.find_spec("rclpy") is None\n'
+        'print(pd.sample_folder(), pd.read_mesh(pd.sample_folder() / "panel.stl"))',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    samples, surface = done.stdout.split(' ', 1)
+    assert samples.endswith('share/paint_deposition/samples')
+    assert surface.startswith('Surface(')
+    done = run(
+        'paint', 'simulate', '--mesh', f'{samples}/panel.stl', '--trajectory',
+        f'{samples}/panel_577', '--max-edge-length-m', 0.05, '-o', tmp_path,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert {'film.csv', 'film.ply', 'film.png', 'stats.json'} <= set(os.listdir(tmp_path))
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+@pytest.mark.parametrize('node', NODES)
+def test_a_node_without_ros_says_in_a_line_what_it_needs(clean_environment, node):
+    done = clean_environment(node)
+    assert (done.returncode, done.stdout) == (2, '')
+    assert done.stderr.startswith(f'{node}: needs rclpy; source a ROS 2 installation')
+    assert done.stderr.count('\n') == 1
 
 
 def test_paint_runs_from_anywhere(repository, tmp_path):

@@ -65,3 +65,21 @@ def test_paint_is_a_command_once_the_environment_is_sourced(repository):
     )
     folder = repository / 'ros2_ws' / 'install' / 'lib' / 'paint_deposition'
     assert done.stdout.split() == [str(folder / 'paint'), str(folder / 'bag_player')]
+
+
+def test_commands_start_in_a_folder_with_spaces(repository, tmp_path):
+    """What colcon writes names its interpreter in the first line, which spaces break."""
+    root = tmp_path / 'paint cell 1'
+    python = root / '.venv/bin/python'
+    python.parent.mkdir(parents=True)
+    python.symlink_to(sys.executable)
+    shutil.copytree(repository / 'setup', root / 'setup')
+    command = root / 'command'
+    command.write_text(f'#!{python}\nimport sys\nprint(sys.argv[1:])\n')
+    command.chmod(0o755)
+    with pytest.raises(OSError, match='No such file'):
+        subprocess.run([command])
+    script = 'source "$1/setup/project.sh"; through_shell "$1/command"'
+    subprocess.run(['bash', '-c', script, '-', root], check=True)
+    done = subprocess.run([command, 'a b', '$c'], capture_output=True, text=True)
+    assert done.stdout == "['a b', '$c']\n", done.stderr

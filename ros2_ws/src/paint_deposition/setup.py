@@ -1,18 +1,11 @@
-"""Package `paint_deposition` for ament: modules, executables and shared files."""
+"""What ament needs beside pyproject.toml: the files shared with other packages and with users."""
 
 from collections import defaultdict
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import setup
 
 PACKAGE = 'paint_deposition'
-NODES = {
-    'deposition_simulator': 'painting',
-    'index_planner': 'planning',
-    'bag_player': 'replay',
-    'run_recorder': 'recording',
-    'model_comparison': 'comparison',
-}
 SHARED_FOLDERS = ('launch', 'config', 'samples')
 
 
@@ -27,26 +20,15 @@ def shared_files():
 
 
 setup(
-    name=PACKAGE,
-    version='0.1.0',
-    packages=find_packages(include=[PACKAGE, f'{PACKAGE}.*']),
-    package_data={PACKAGE: ['**/*.html', '**/*.css', '**/*.js', '**/*.j2', '**/*.yaml']},
+    # Not in pyproject.toml: releases of setuptools disagree on the form of the licence there, and
+    # colcon cannot read `requires-python`.
+    license='Apache-2.0',
+    python_requires='>=3.10',
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{PACKAGE}']),
-        (f'share/{PACKAGE}', ['package.xml']),
+        # colcon builds in a folder of links to setup.py, setup.cfg, the modules and the files
+        # named here: without pyproject.toml the package would have no name there.
+        (f'share/{PACKAGE}', ['package.xml', 'pyproject.toml']),
         *shared_files(),
     ],
-    install_requires=['setuptools'],
-    extras_require={'test': ['pytest']},
-    zip_safe=False,
-    maintainer='Paint Deposition developers',
-    maintainer_email='paint-deposition@example.org',
-    description='Film thickness of rotary bell spray painting: simulation, calibration, diagnosis',
-    license='Apache-2.0',
-    entry_points={
-        'console_scripts': [
-            f'paint = {PACKAGE}.cli.main:main',
-            *(f'{node} = {PACKAGE}.nodes.{room}.{node}:main' for node, room in NODES.items()),
-        ],
-    },
 )

@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import hashlib
 import subprocess
-from importlib import metadata
 from pathlib import Path
 
+from paint_deposition import __version__
 from paint_deposition.errors import PaintError
-
-PACKAGE = 'paint_deposition'
 
 
 def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
     """Texts by name: versions, the mesh's digest, the model in full. Empty paths are left out."""
-    notes = {'package_version': package_version(), 'git_version': git_version()}
+    notes = {'package_version': __version__, 'git_version': git_version()}
     if mesh_file:
         digest = hashlib.sha256(_content(mesh_file, 'mesh_file')).hexdigest()
         notes |= {'mesh_file': mesh_file, 'mesh_sha256': digest}
@@ -24,18 +22,12 @@ def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
     return {key: value for key, value in notes.items() if value}
 
 
-def package_version() -> str:
-    """Installed version of this package, '' when it runs from its sources alone."""
-    try:
-        return metadata.version(PACKAGE)
-    except metadata.PackageNotFoundError:
-        return ''
-
-
 def git_version() -> str:
     """`git describe` of the sources, '' where they are installed away from their repository."""
     command = ['git', 'describe', '--always', '--dirty', '--tags']
     folder = Path(__file__).resolve().parent
+    if 'site-packages' in folder.parts:  # what repository there is, it is another project's
+        return ''
     try:
         done = subprocess.run(
             command, cwd=folder, capture_output=True, text=True, timeout=10, check=False

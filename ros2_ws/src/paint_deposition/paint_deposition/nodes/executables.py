@@ -1,0 +1,27 @@
+"""The executables of the nodes: they say in one line what is missing where there is no ROS 2."""
+
+import importlib
+import sys
+from functools import partial
+from importlib.util import find_spec
+
+REMEDIES = {
+    'rclpy': 'source a ROS 2 installation, or use the one that `make build` installs',
+    'paint_msgs': 'build the workspace with `make build` or colcon and source it',
+}
+
+
+def _run(name: str, module: str) -> int:
+    """Load a node's module and run it; returns the process's exit code."""
+    for needed, remedy in REMEDIES.items():
+        if find_spec(needed) is None:
+            sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
+            return 2
+    return importlib.import_module(f'paint_deposition.nodes.{module}.{name}').main()
+
+
+bag_player = partial(_run, 'bag_player', 'replay')
+deposition_simulator = partial(_run, 'deposition_simulator', 'painting')
+index_planner = partial(_run, 'index_planner', 'planning')
+model_comparison = partial(_run, 'model_comparison', 'comparison')
+run_recorder = partial(_run, 'run_recorder', 'recording')
