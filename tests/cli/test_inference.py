@@ -9,6 +9,7 @@ import yaml
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
+from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.files.model_file import read_model_file
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
@@ -49,7 +50,8 @@ def test_diagnose_names_the_hidden_effect(diagnosed):
     done, folder = diagnosed
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f'effect missing: The readings show {HIDDEN}.')
-    assert f'added {HIDDEN}: ' in done.stdout
+    assert f'added {HIDDEN}: > 99 %\n' in done.stdout
+    assert '100 %' not in done.stdout
     assert str(folder / 'report.html') in done.stdout
     content = json.loads((folder / 'diagnosis.json').read_text())
     assert content['verdict'] == 'effect_missing'
@@ -68,8 +70,8 @@ def test_diagnose_writes_all_that_it_says(diagnosed):
     _, folder = diagnosed
     names = {path.name for path in folder.iterdir()}
     assert names == {
-        'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv', 'report.html',
-        'comparison.png', 'residual_panel.ply', 'residual_door.ply',
+        MARKER, 'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv',
+        'report.html', 'comparison.png', 'residual_panel.ply', 'residual_door.ply',
     }  # fmt: skip
     rows = table(folder / 'residuals.csv')
     readings = table(SAMPLES / 'measured_door/panel.csv') + table(
@@ -111,7 +113,7 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     assert door['rmse_um'] ** 2 == pytest.approx(squares)
     kinds = [misfit['kind'] for misfit in content['misfits']]
     assert {'group', 'pass'} <= set(kinds)
-    assert f'door: 72 readings, bias +{door["bias_um"]:.2f} um' in done.stdout
+    assert f'door: 72 readings, bias +{door["bias_um"]:.2f} µm' in done.stdout
     assert 'misfit: door: ' in done.stdout
     p_values = [dependence['p_value'] for dependence in content['dependences']]
     assert p_values == sorted(p_values)

@@ -9,6 +9,7 @@ from PIL import Image
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
+from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.rapid.program import read_program
@@ -48,7 +49,7 @@ def test_recommendation_is_printed_and_written(model_file, tmp_path):
     assert done.returncode == 0, done.stderr
     expected = recommend(MODEL, Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
     written = json.loads((tmp_path / 'recommendation.json').read_text())
-    assert written == json.loads(json.dumps(expected.as_dict()))
+    assert written == json.loads(json.dumps(expected.to_dict()))
     assert expected.sentence in done.stdout
     assert 'keeps its orientation' in done.stdout
     assert is_picture(tmp_path / 'uniformity.png')
@@ -74,6 +75,7 @@ def test_recommendation_lands_here_without_a_folder(tmp_path):
     done = paint('recommend', '--speed', 0.3, '--gun-turns', cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert sorted(path.name for path in tmp_path.iterdir()) == [
+        MARKER,
         'recommendation.json',
         'uniformity.png',
     ]
@@ -179,8 +181,8 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     assert content['sigma_n'] < content['plane']['sigma_n_on_part']
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert names == {
-        'film.csv', 'film.ply', 'film.png', 'passes.csv', 'passes.mod', 'plan.json', 'stats.json',
-        'trajectory',
+        MARKER, 'film.csv', 'film.ply', 'film.png', 'passes.csv', 'passes.mod', 'plan.json',
+        'stats.json', 'trajectory',
     }  # fmt: skip
     assert read_program(tmp_path / 'plan' / 'passes.mod').moves
     assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000

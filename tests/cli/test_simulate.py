@@ -10,6 +10,7 @@ import trimesh
 from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import assert_refused, paint
 from files.recorded import Messages, pose_entries, write_bag
+from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
@@ -23,7 +24,7 @@ from scenes import straight_pass
 DOOR, DOOR_BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
 TRIGGER = ('--state-topic', '/atomizer/state')
 COARSE = ('--max-edge-length-m', 0.05)
-FILES = ['film.csv', 'film.ply', 'film.png', 'stats.json']
+FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
 
 
 @pytest.fixture(scope='module')

@@ -34,8 +34,8 @@ def test_refining_the_mesh_changes_nothing():
     fine = film_statistics(
         np.repeat(film, 4), np.repeat(area, 4) / 4, 10.0, target_um=15.0, target_tolerance_um=2.0
     )
-    for name, value in coarse.as_dict().items():
-        assert fine.as_dict()[name] == pytest.approx(value, rel=1e-12), name
+    for name, value in coarse.to_dict().items():
+        assert fine.to_dict()[name] == pytest.approx(value, rel=1e-12), name
 
 
 def test_bare_metal_and_dust_count_for_coverage_and_volume_only():
@@ -57,5 +57,5 @@ def test_without_target_or_paint_figures_say_so():
     stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
     assert math.isnan(stats.within_target)
     assert math.isnan(stats.capture_fraction)
-    assert stats.as_dict()['capture_fraction'] is None
+    assert stats.to_dict()['capture_fraction'] is None
     assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)

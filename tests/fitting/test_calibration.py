@@ -26,7 +26,7 @@ from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.panel import Panel
-from paint_deposition.results.calibration import calibration_as_dict, write_calibration
+from paint_deposition.results.calibration import write_calibration
 from virtual_paint_shop.shop import panel_study
 
 TRUTH = DepositionModel(
@@ -173,7 +173,7 @@ def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
     assert written.model == calibrated.model
     assert written.uncertainty['planar'].keys() == {v.name for v in calibrated.parameters}
     content = json.loads(files[1].read_text())
-    assert content.keys() == calibration_as_dict(calibrated).keys()
+    assert content.keys() == calibrated.to_dict().keys()
     assert content['parameters']['phi_rad']['determined'] is False
     (step,) = written.history
     assert step['added'] == 'pattern'

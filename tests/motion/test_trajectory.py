@@ -28,7 +28,7 @@ def test_shapes_must_match():
 def test_counts_by_name_with_their_sum():
     counts = PoseCounts(received=9, repeated_stamps=1, backward_stamps=2, not_finite=3)
     counts.not_unit_quaternions = 1
-    named = counts.as_dict()
+    named = counts.to_dict()
     assert named['rejected'] == counts.rejected == 7
     assert named['received'] == 9
     assert named['restarts'] == 0

@@ -218,7 +218,7 @@ def test_impossible_requests_say_why(what, words):
 
 
 def test_json_has_the_agreed_fields():
-    content = json.loads(json.dumps(asked(LOPSIDED, tolerance=0.1, width_m=1.2).as_dict()))
+    content = json.loads(json.dumps(asked(LOPSIDED, tolerance=0.1, width_m=1.2).to_dict()))
     agreed = {
         'index_m', 'sigma_n', 'index_range_m', 'tolerance', 'windows_m', 'minima', 'mean_um',
         'speed_m_per_s', 'passes', 'cycle_time_s', 'travel', 'curve',

@@ -8,6 +8,7 @@ import sys
 
 import click
 
+from paint_deposition import __version__
 from paint_deposition.errors import PaintError, did_you_mean
 
 # Threads that share matrices as small as ours mostly wait for each other, on a busy machine ten
@@ -19,9 +20,13 @@ PACKAGE = 'paint_deposition.cli'
 # their command is used, so that help comes at once.
 COMMANDS = {
     'simulate': ('simulate', 'simulate_command', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('planning', 'calibrate', "Fit the bell's pattern to gauge readings."),
-    'recommend': ('planning', 'recommend', 'Recommend the index between passes.'),
-    'plan': ('planning', 'plan', 'Lay passes over a part; write bag, CSV and RAPID module.'),
+    'calibrate': ('planning', 'calibrate_command', "Fit the bell's pattern to gauge readings."),
+    'recommend': ('planning', 'recommend_command', 'Recommend the index between passes.'),
+    'plan': (
+        'planning',
+        'plan_command',
+        'Lay passes over a part; write bag, CSV and RAPID module.',
+    ),
     'compare': ('inference', 'compare_command', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'diagnose_command', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'refit_command', 'Add an effect of your choice and fit anew.'),
@@ -58,10 +63,9 @@ class Commands(click.Group):
 
 def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from paint_deposition.files.provenance import git_version, package_version
+        from paint_deposition.files.provenance import git_version
 
-        known = [version for version in (package_version(), git_version()) if version]
-        click.echo(f'paint {" ".join(known) or "of unknown version"}')
+        click.echo(f'paint {__version__} {git_version()}'.rstrip())
         context.exit()
 
 

@@ -1,16 +1,18 @@
-"""What several commands take and show alike: numbers, options, when a bar appears."""
+"""What several commands take and say alike: numbers, options, inputs and results."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
-# A bar shows itself only for work that takes longer, and never when piped.
-SHOW_PROGRESS_AFTER_S = 2.0
+if TYPE_CHECKING:
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.model_file import ModelFile
+    from paint_deposition.readings.campaign import Campaign
 
 
 class Finite:
@@ -45,9 +47,19 @@ def model_option(text: str) -> Callable:
     return click.option('--model', 'model_file', type=FILE, help=text)
 
 
-def output_option(text: str, **more: Any) -> Callable:
+def output_option(what: str, **more: Any) -> Callable:
     """The folder for a command's results."""
+    text = (
+        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
+        'into it are removed; other files in it are kept, unless a result has their name. Nothing '
+        'is changed before all results are complete.'
+    )
     return click.option('-o', '--output', type=FOLDER, help=text, **more)
+
+
+def seed_option(of: str) -> Callable:
+    """The seed of what a command draws at random."""
+    return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
 
 
 def direction_option(name: str, text: str) -> Callable:
@@ -90,3 +102,44 @@ def max_pose_gap_option() -> Callable:
         '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
         help='A longer time between poses is a gap: gun off.',
     )  # fmt: skip
+
+
+def read_noted(path: Path, tell: Callable[[str], None]) -> Campaign:
+    """Read a campaign; `tell` gets each line of progress, stderr each note on an experiment."""
+    from paint_deposition.files.campaign_file import read_campaign
+
+    def show(line: str) -> None:
+        if line.startswith('reading '):
+            tell(line)
+        else:
+            click.echo(f'note: {line}', err=True)
+
+    return read_campaign(path, show)
+
+
+def read_start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:
+    """The model named with --model, else the campaign's, if it names one."""
+    from paint_deposition.files.model_file import read_model_file
+
+    chosen = model_file or campaign.model_file
+    return read_model_file(chosen) if chosen else None
+
+
+def read_given_model(model_file: Path | None) -> DepositionModel:
+    """The model named with --model, else that of a 50 mm bell."""
+    from paint_deposition.effects.deposition_model import DepositionModel
+    from paint_deposition.files.model_file import read_model
+
+    return read_model(model_file) if model_file else DepositionModel()
+
+
+def say_all(label: str, lines: Iterable[str], err: bool = False) -> None:
+    """Print each line behind its label: notes, warnings."""
+    for line in lines:
+        click.echo(f'{label}: {line}', err=err)
+
+
+def say_files(files: Iterable[Path], output: Path) -> None:
+    """Print the files of a folder of results by their final names."""
+    for file in files:
+        click.echo(f'  {output / file.name}')

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
 from pathlib import Path
+from typing import Any
 
 import click
-from tqdm import tqdm
 
-from paint_deposition.cli.campaigns import Steps, read_noted
 from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
@@ -17,18 +15,25 @@ from paint_deposition.cli.options import (
     NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
-    SHOW_PROGRESS_AFTER_S,
     direction_option,
     max_edge_length_option,
     mesh_scale_option,
     model_option,
     output_option,
+    read_given_model,
+    read_noted,
+    read_start,
+    say_all,
+    say_files,
+    seed_option,
 )
+from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import results_in
 
 MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
 SPEED = click.option('--speed', 'speed_m_per_s', type=NUMBER, help='Speed of the passes [m/s].')
 TARGET = click.option(
-    '--target-um', type=NUMBER, help='Mean film; the speed is chosen for it [um].'
+    '--target-um', type=NUMBER, help='Mean film build; the speed is chosen for it [µm].'
 )
 INDEX_MIN = click.option('--index-min', 'index_min_m', type=NUMBER, help='Least index [m].')
 INDEX_MAX = click.option('--index-max', 'index_max_m', type=NUMBER, help='Greatest index [m].')
@@ -51,35 +56,30 @@ TRAVEL = click.option(
 @click.command('calibrate')
 @CAMPAIGN
 @model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
-@output_option(
-    'Folder for model.yaml, calibration.json and pictures; older ones are replaced.', required=True
-)
-@click.option('--seed', default=0, show_default=True, help='Of the starts of the fit.')
+@output_option('model.yaml, calibration.json and pictures', required=True)
+@seed_option('the starts of the fit')
 @JSON
-def calibrate(
+def calibrate_command(
     campaign: Path, model_file: Path | None, output: Path, seed: int, as_json: bool
 ) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 
-    Any number of panels and parts; a flat panel painted by a few passes is best. Effects of the
-    model to start from are fitted along, its projection is kept.
+    Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
+    effects of the model to start from are fitted as well; its projection is kept.
     """
+    from paint_deposition.api.inference import calibrate
+    from paint_deposition.api.writing import write
     from paint_deposition.files.json_files import json_text
-    from paint_deposition.files.model_file import read_model_file
-    from paint_deposition.fitting import calibration as calibrating
-    from paint_deposition.report.pictures.calibration import write_calibration_pictures
-    from paint_deposition.results.calibration import calibration_as_dict, write_calibration
 
-    with Steps('calibrate') as tell:
+    with Progress('calibrate') as tell:
         data = read_noted(campaign, tell)
-        chosen = model_file or data.model_file
-        start = read_model_file(chosen) if chosen else None
-        result = calibrating.calibrate(data, start.model if start else None, seed, tell)
+        start = read_start(data, model_file)
+        result = calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
-        files = write_calibration(output, result, start)
-        files += write_calibration_pictures(output, result)
+        with results_in(output) as folder:
+            files = write(result, folder, start=start)
     if as_json:
-        click.echo(json_text(calibration_as_dict(result)))
+        click.echo(json_text(result.to_dict()))
         return
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
@@ -88,17 +88,17 @@ def calibrate(
         )
     for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
         click.echo(
-            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} um '
+            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '
             f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
-            f'{found.sd_um:.2f} um'
+            f'{found.sd_um:.2f} µm'
         )
     noise = result.study.noise
     click.echo(
         f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
-        f'{noise.typical_um:.2f} um ({noise.source})'
+        f'{noise.typical_um:.2f} µm ({noise.source})'
     )
-    _tell_warnings(result.warnings)
-    _tell_files(files)
+    say_all('warning', result.warnings, err=True)
+    say_files(files, output)
 
 
 @click.command('recommend')
@@ -119,31 +119,31 @@ def calibrate(
 )  # fmt: skip
 @STANDOFF
 @TRAVEL
-@output_option('Folder for recommendation.json and uniformity.png; default: here.', default='.')
+@output_option(
+    'recommendation.json and uniformity.png; default: the working directory', default='.'
+)
 @JSON
-def recommend(
+def recommend_command(
     model_file: Path | None,
     output: Path,
     as_json: bool,
     gun_turns: bool,
     travel_deg: float,
-    **wanted: float | bool | None,
+    **wanted: Any,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    from paint_deposition.files.json_files import json_text, write_json
-    from paint_deposition.planning import recommendation
-    from paint_deposition.planning.index_request import Request
-    from paint_deposition.report.pictures.uniformity import write_uniformity
+    from paint_deposition.api.planning import recommend
+    from paint_deposition.api.writing import write
+    from paint_deposition.files.json_files import json_text
 
-    answer = recommendation.recommend(
-        _model(model_file),
-        Request(gun_turns=gun_turns, travel_rad=math.radians(travel_deg), **wanted),
-    )
-    files = [output / 'recommendation.json', output / 'uniformity.png']
-    write_json(files[0], answer.as_dict())
-    write_uniformity(files[1], answer)
+    answer = recommend(
+        read_given_model(model_file), gun_turns=gun_turns, travel_rad=math.radians(travel_deg),
+        **wanted,
+    )  # fmt: skip
+    with results_in(output) as folder:
+        files = write(answer, folder)
     if as_json:
-        click.echo(json_text(answer.as_dict()))
+        click.echo(json_text(answer.to_dict()))
         return
     click.echo(answer.sentence)
     for minimum in answer.minima:
@@ -157,9 +157,8 @@ def recommend(
             f'{answer.standoff_drift_m[0] * 1e3:+.0f} and '
             f'{answer.standoff_drift_m[1] * 1e3:+.0f} mm'
         )
-    for note in answer.notes:
-        click.echo(f'note: {note}')
-    _tell_files(files)
+    say_all('note', answer.notes)
+    say_files(files, output)
 
 
 @click.command('plan')
@@ -191,12 +190,9 @@ def recommend(
 @mesh_scale_option()
 @max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
-@output_option(
-    'Folder for the bag, passes.csv, passes.mod, plan.json and the film; older ones are replaced.',
-    required=True,
-)
+@output_option('the bag, passes.csv, passes.mod, plan.json and the film', required=True)
 @JSON
-def plan(
+def plan_command(
     mesh: Path,
     model_file: Path | None,
     output: Path,
@@ -206,42 +202,33 @@ def plan(
     max_edge_length_m: float,
     frame_id: str,
     as_json: bool,
-    **wanted: float | bool | str | tuple | None,
+    **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     import numpy as np
 
+    from paint_deposition.api.planning import plan
+    from paint_deposition.api.writing import write
     from paint_deposition.files.meshes import read_mesh
-    from paint_deposition.motion.path_builder import spray_path
-    from paint_deposition.planning import plan as planning
-    from paint_deposition.report.pictures.film import write_door_picture
-    from paint_deposition.results.plan import write_plan
 
-    model = _model(model_file)
-    request = planning.PlanRequest(travel_rad=math.radians(travel_deg), **wanted)
-    gravity = None if down is None else np.array(down)
-    surface = read_mesh(mesh, mesh_scale, max_edge_length_m, gravity)
-    with tqdm(
-        total=1.0, desc='plan', disable=None, delay=SHOW_PROGRESS_AFTER_S,
-        bar_format='{desc}: {percentage:3.0f}%|{bar}| [{elapsed}]', leave=False,
-    ) as bar:  # fmt: skip
-        result = planning.plan(surface, model, request, frame_id, _shown_on(bar))
-    details = {
-        'mesh': str(mesh),
-        'model': str(model_file) if model_file else 'default',
-        'frame_id': frame_id,
-        'down': surface.down,
-        'notes': list(surface.notes),
-    }
-    files = write_plan(output, result, surface, details)
-    files.append(
-        write_door_picture(
-            output / 'film.png', surface, result.film_um, spray_path(result.trajectory)[0],
-            result.statistics, 'Planned passes and their film', result.sentence,
-        )
-    )  # fmt: skip
-    for note in surface.notes:
-        click.echo(f'note: {note}', err=True)
+    model = read_given_model(model_file)
+    with Progress('plan') as tell:
+        tell('reading the mesh')
+        gravity = None if down is None else np.array(down)
+        surface = read_mesh(mesh, mesh_scale, max_edge_length_m, gravity)
+        result = plan(
+            surface, model, frame_id=frame_id, progress=tell, travel_rad=math.radians(travel_deg),
+            **wanted,
+        )  # fmt: skip
+        made_from = {
+            'mesh': str(mesh),
+            'model': str(model_file) if model_file else 'default',
+            'frame_id': frame_id,
+        }
+        tell('writing')
+        with results_in(output) as folder:
+            files = write(result, folder, made_from=made_from)
+    say_all('note', surface.notes, err=True)
     if as_json:
         click.echo((output / 'plan.json').read_text(), nl=False)
         return
@@ -252,35 +239,8 @@ def plan(
         f'{100 * result.plane_on_part.sigma_n:.1f} %'
     )
     click.echo(
-        f'film {result.statistics.min_um:.1f} to {result.statistics.max_um:.1f} um, coverage '
+        f'film {result.statistics.min_um:.1f} to {result.statistics.max_um:.1f} µm, coverage '
         f'{100 * result.statistics.coverage:.0f} %, '
         f'capture fraction {100 * result.statistics.capture_fraction:.0f} %'
     )
-    _tell_files(files)
-
-
-def _model(model_file: Path | None):
-    from paint_deposition.effects.deposition_model import DepositionModel
-    from paint_deposition.files.model_file import read_model
-
-    return read_model(model_file) if model_file else DepositionModel()
-
-
-def _shown_on(bar: tqdm) -> Callable[[str, float], None]:
-    """Progress of one step after the other on one bar."""
-
-    def show(what: str, share: float) -> None:
-        bar.set_description(what, refresh=False)
-        bar.update(share - bar.n)
-
-    return show
-
-
-def _tell_warnings(warnings: Iterable[str]) -> None:
-    for warning in warnings:
-        click.echo(f'warning: {warning}', err=True)
-
-
-def _tell_files(files: Iterable[Path]) -> None:
-    for file in files:
-        click.echo(f'  {file}')
+    say_files(files, output)

@@ -11,9 +11,9 @@ from paint_deposition.cli.options import (
     FILE,
     GUN_SIGNAL,
     JSON,
-    SHOW_PROGRESS_AFTER_S,
     max_pose_gap_option,
 )
+from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_files import refuse_gun_signal
 from paint_deposition.files.rapid.motion import is_rapid, program_as_dict, program_as_text
@@ -42,7 +42,7 @@ def inspect_command(
     refuse_gun_signal(recording, gun_signal)
     summary = summarise(recording, max_pose_gap_s)
     if as_json:
-        click.echo(json_text(summary.as_dict()))
+        click.echo(json_text(summary.to_dict()))
     else:
         click.echo(_table(summary))
 

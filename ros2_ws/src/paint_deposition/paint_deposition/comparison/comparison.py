@@ -1,7 +1,8 @@
 """The model beside the readings: where and how much it is off."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import spearmanr
@@ -47,6 +48,7 @@ class Comparison:
         misfits: of each experiment, its groups and its passes.
         dependences: strongest first.
         regions: where the misfit is significant, strongest first.
+        model: what was compared with the readings.
     """
 
     study: Study
@@ -55,6 +57,30 @@ class Comparison:
     misfits: tuple[Misfit, ...]
     dependences: tuple[Dependence, ...]
     regions: tuple[Region, ...]
+    model: DepositionModel
+
+    def __repr__(self) -> str:
+        return (
+            f'Comparison({len(self.readings)} readings, RMSE {self.readings.rmse_um:.2f} µm, '
+            f'gauge noise {self.study.noise.typical_um:.2f} µm, '
+            f'{len(self.regions)} regions of misfit)'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``comparison.json``."""
+        noise = self.study.noise
+        return {
+            'readings': len(self.readings),
+            'noise': {'sigma_um': noise.typical_um, 'source': noise.source},
+            'misfits': [
+                {'experiment': m.experiment, 'kind': m.kind, 'label': m.label}
+                | m.residuals.figures()
+                for m in self.misfits
+            ],
+            'regions': [region.to_dict() for region in self.regions],
+            'dependences': [asdict(dependence) for dependence in self.dependences],
+            'notes': list(self.study.notes),
+        }
 
 
 def compare(study: Study, model: DepositionModel) -> Comparison:
@@ -78,6 +104,7 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
         tuple(_misfits(study, model, readings)),
         tuple(sorted(dependences, key=lambda d: d.p_value)),
         tuple(misfit_regions(study, points, model)),
+        model,
     )
 
 

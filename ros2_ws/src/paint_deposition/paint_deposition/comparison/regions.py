@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
@@ -37,6 +38,11 @@ class Region:
     rows: np.ndarray
     readings: int
     mean_residual_um: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``regions`` in the files of results."""
+        names = ('description', 'experiment', 'readings', 'mean_residual_um')
+        return {name: getattr(self, name) for name in names}
 
 
 def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> list[Region]:

@@ -8,6 +8,7 @@ readings increase it where the two differ; another spray makes them differ.
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -36,6 +37,11 @@ class Place:
     experiment: str
     why: str
 
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``next.measure`` in ``diagnosis.json``."""
+        position = dict(zip(('x_m', 'y_m', 'z_m'), self.position_m.tolist(), strict=True))
+        return {'experiment': self.experiment, **position, 'why': self.why}
+
 
 @dataclass(frozen=True)
 class Spray:
@@ -52,6 +58,15 @@ class Spray:
     separates: tuple[str, str]
     separation: float
     now: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``next.spray`` in ``diagnosis.json``."""
+        return {
+            'what': self.what,
+            'separates': list(self.separates),
+            'separation_sigma': self.separation,
+            'separation_now_sigma': self.now,
+        }
 
 
 @dataclass(frozen=True)

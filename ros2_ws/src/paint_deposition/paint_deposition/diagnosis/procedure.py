@@ -17,7 +17,7 @@ from paint_deposition.diagnosis.cross_validation import hold_out
 from paint_deposition.diagnosis.linearisation import Linearisation
 from paint_deposition.diagnosis.run import ALPHA, SURE, Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
-from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Step
+from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Step, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.readings.campaign import Campaign
@@ -106,7 +106,7 @@ def _conclude(
         )
         return run.diagnosis(first, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
-        f'{c.best} ({100 * c.probability:.0f} %)' for c in others[:NAMED]
+        f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
     )
     return run.diagnosis(first, 'undecided', reason, others)
 

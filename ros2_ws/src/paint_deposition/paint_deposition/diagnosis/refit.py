@@ -9,7 +9,7 @@ from paint_deposition.diagnosis.classes import ConfoundedClass
 from paint_deposition.diagnosis.linearisation import Linearisation
 from paint_deposition.diagnosis.run import ALPHA, SURE, Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
-from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
@@ -68,7 +68,7 @@ def refit(
     run.add(ConfoundedClass((added.id,), probability, best), linear)
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
-        f'{100 * probability:.0f} % against the model as it was.'
+        f'{percent(probability)} against the model as it was.'
     )
     if probability > SURE:
         return run.diagnosis(linear, 'effect_missing', reason)

@@ -1,15 +1,31 @@
 """What a diagnosis says."""
 
-from dataclasses import dataclass, field
-from typing import Literal
+from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+from paint_deposition.comparison.comparison import Comparison, compare
 from paint_deposition.diagnosis.cross_validation import hold_out
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.residuals import root_mean_square
 
+if TYPE_CHECKING:
+    from paint_deposition.diagnosis.next_experiment import Place, Spray
+
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
+
+
+def percent(probability: float) -> str:
+    """A probability in print, never as 0 % or 100 %: no diagnosis is certain."""
+    if probability > 0.99:
+        return '> 99 %'
+    return '< 1 %' if probability < 0.01 else f'{100 * probability:.0f} %'
 
 
 @dataclass(frozen=True)
@@ -80,7 +96,7 @@ class Step:
         return self.fit.model
 
     @staticmethod
-    def of(study: Study, added: str, fit: Fit) -> 'Step':
+    def of(study: Study, added: str, fit: Fit) -> Step:
         """Compute the errors of a fit, those on points left out by patches."""
         left_out_um = hold_out(fit, study.patches()).deviation * study.sigma_um
         fitted = study.residuals(fit.predicted_um)
@@ -102,6 +118,7 @@ class Diagnosis:
         unknown: where the unexplained shows, or None.
         not_testable: ids that these readings cannot see at typical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
+        library: the effects that further experiments may be proposed for, by id.
     """
 
     study: Study
@@ -114,6 +131,12 @@ class Diagnosis:
     unknown: Unknown | None = None
     not_testable: tuple[str, ...] = ()
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
+    library: Mapping[str, type[Effect]] = field(default_factory=dict)
+
+    def __repr__(self) -> str:
+        before, after = self.history[0].rmse_um, self.history[-1].rmse_um
+        found = f' {", ".join(self.accepted)}' if self.accepted else ''
+        return f'Diagnosis({self.verdict}{found}, RMSE {before:.2f} -> {after:.2f} µm)'
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -129,3 +152,44 @@ class Diagnosis:
     def model(self) -> DepositionModel:
         """The model with what was accepted."""
         return self.history[-1].model
+
+    @cached_property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """Each model of the history beside the readings."""
+        return tuple(compare(self.study, step.model) for step in self.history)
+
+    @cached_property
+    def proposals(self) -> tuple[list[Place], list[Spray]]:
+        """Places to measure and sprays that would settle the diagnosis, best first."""
+        from paint_deposition.diagnosis.next_experiment import propose_for
+
+        return propose_for(self, self.library)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``diagnosis.json``."""
+        before, after = self.history[0], self.history[-1]
+        places, sprays = self.proposals
+        return {
+            'verdict': self.verdict,
+            'reason': self.reason,
+            'p_value': self.p_value,
+            'accepted': list(self.accepted),
+            'classes': [asdict(found) for found in self.classes],
+            'rmse_um': {
+                'before': before.rmse_um,
+                'after': after.rmse_um,
+                'holdout_before': before.holdout_rmse_um,
+                'holdout_after': after.holdout_rmse_um,
+                'noise_floor': self.noise_floor_um,
+            },
+            'unknown': None if self.unknown is None else asdict(self.unknown),
+            'not_testable': list(self.not_testable),
+            'detectable': self.detectable,
+            'regions': [region.to_dict() for region in self.comparisons[0].regions],
+            'next': {
+                'measure': [place.to_dict() for place in places],
+                'spray': [spray.to_dict() for spray in sprays],
+            },
+            'noise': {'sigma_um': self.study.noise.typical_um, 'source': self.study.noise.source},
+            'notes': list(self.notes),
+        }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 from paint_deposition.errors import RecordingError
@@ -11,8 +12,8 @@ from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.motion.trajectory import Trajectory
 
 
-def read_motion(
-    path: Path,
+def read_recording(
+    path: str | Path,
     pose_topic: str | None = None,
     state_topic: str | None = None,
     gun_signal: str | None = None,
@@ -26,12 +27,15 @@ def read_motion(
         RecordingError: what `read_trajectory` and `read_program` refuse, or an option that the
             other kind of file has.
     """
+    path = Path(path)
     if is_rapid(path):
         if pose_topic or state_topic:
             raise RecordingError(f'{path} is a RAPID module without topics; give --gun-signal')
-        return program_trajectory(read_program(path, gun_signal=gun_signal))
-    refuse_gun_signal(path, gun_signal)
-    return read_trajectory(path, pose_topic, state_topic)
+        recorded = program_trajectory(read_program(path, gun_signal=gun_signal))
+    else:
+        refuse_gun_signal(path, gun_signal)
+        recorded = read_trajectory(path, pose_topic, state_topic)
+    return replace(recorded, source=str(path))
 
 
 def refuse_gun_signal(path: Path, gun_signal: str | None) -> None:

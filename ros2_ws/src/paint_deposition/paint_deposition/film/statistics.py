@@ -44,7 +44,7 @@ class FilmStatistics:
     target_um: float
     target_tolerance_um: float
 
-    def as_dict(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, float | None]:
         """All figures by name; None stands for NaN, which JSON does not know."""
         return {k: None if math.isnan(v) else float(v) for k, v in asdict(self).items()}
 

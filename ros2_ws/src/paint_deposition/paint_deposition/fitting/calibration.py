@@ -7,6 +7,7 @@ as every film, so that door and panel alike can be in a campaign.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from paint_deposition.fitting.estimates import Correlation, Estimate, correlatio
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
+from paint_deposition.model.uniformity import sigma_n_closed_form
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.panel import Panel
 from paint_deposition.readings.plausibility import (
@@ -31,6 +33,7 @@ STARTS = 8
 OUTLIER_SIGMAS = 4.0
 # Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
 MOST_CHI_SQUARE = 2.0
+SHOWN_CORRELATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -39,6 +42,18 @@ class PanelFit:
 
     panel: Panel
     collapse: CollapseFit
+
+    def to_dict(self) -> dict[str, Any]:
+        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
+        collapse = self.collapse.collapse
+        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
+        return {
+            **collapse.model_dump(),
+            'index_m': index,
+            'sigma_n': None if index is None else sigma_n_closed_form(collapse, index),
+            'rmse_um': self.collapse.residuals.rmse_um,
+            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
+        }
 
 
 @dataclass(frozen=True)
@@ -61,6 +76,47 @@ class Calibration:
     residuals: tuple[Residuals, ...]
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
+
+    def __repr__(self) -> str:
+        known = sum(value.determined for value in self.parameters)
+        return (
+            f'Calibration({len(self.study)} points, {known} of {len(self.parameters)} parameters '
+            f'determined, chi2 per degree of freedom {self.chi_square_per_freedom:.2f})'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``calibration.json``."""
+        study, names = self.study, ('value', 'sigma', 'low', 'high', 'determined')
+        return {
+            'parameters': {
+                value.name: {name: getattr(value, name) for name in names}
+                for value in self.parameters
+            },
+            'correlations': [
+                {'parameters': [pair.first, pair.second], 'value': pair.value}
+                for pair in self.correlations[:SHOWN_CORRELATIONS]
+            ],
+            'experiments': [
+                {
+                    'experiment': experiment.name,
+                    'points': len(residuals),
+                    'measured_mean_um': float(residuals.measured_um.mean()),
+                    'predicted_mean_um': float(residuals.predicted_um.mean()),
+                    'residual_sd_um': residuals.sd_um,
+                    'rmse_um': residuals.rmse_um,
+                }
+                for experiment, residuals in zip(
+                    study.campaign.experiments, self.residuals, strict=True
+                )
+            ],
+            'collapse': [None if panel is None else panel.to_dict() for panel in self.panels],
+            'points': len(study),
+            'readings': len(study.campaign.readings),
+            'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
+            'converged': self.fit.converged,
+            'noise': {'sigma_um': study.noise.typical_um, 'source': study.noise.source},
+            'warnings': list(self.warnings),
+        }
 
     @property
     def model(self) -> DepositionModel:

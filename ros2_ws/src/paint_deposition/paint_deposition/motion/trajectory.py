@@ -31,7 +31,7 @@ class PoseCounts:
             + self.not_unit_quaternions
         )
 
-    def as_dict(self) -> dict[str, int]:
+    def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""
         counts = {item.name: int(getattr(self, item.name)) for item in fields(self)}
         return counts | {'rejected': self.rejected}
@@ -54,6 +54,7 @@ class Trajectory:
         trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
             Before the first of them the gun is off.
         notes: remarks on the recording for the user, a line each.
+        source: the file it came from, for messages.
 
     Raises:
         RecordingError: the arrays do not have these shapes.
@@ -66,6 +67,10 @@ class Trajectory:
     trigger_stamps_ns: np.ndarray = field(default_factory=_no_stamps)
     trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
     notes: tuple[str, ...] = ()
+    source: str = 'trajectory'
+
+    def __repr__(self) -> str:
+        return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'
 
     def __post_init__(self) -> None:
         count = len(self.stamps_ns)

@@ -47,6 +47,9 @@ class Surface:
     gun_side: np.ndarray | None = None
     in_hem: np.ndarray | None = None
 
+    def __repr__(self) -> str:
+        return f'Surface({len(self.vertices_m)} vertices, {self.area_m2:.2f} m²)'
+
     def __getstate__(self) -> dict[str, Any]:
         """What is kept of rays and searches stays behind: it can be made again."""
         return {item.name: getattr(self, item.name) for item in fields(self)}

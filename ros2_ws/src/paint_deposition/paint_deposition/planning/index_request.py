@@ -58,6 +58,11 @@ class Request:
                 raise PlanError(f'{name} is {value:g}; give metres, {low:g} to {high:g}')
         if not math.isfinite(self.travel_rad):
             raise PlanError(f'travel_rad is {self.travel_rad}; give an angle')
+        if self.tolerance is not None and self.tolerance >= 1.0:
+            raise PlanError(
+                f'tolerance is {self.tolerance:g}, which is {100 * self.tolerance:g} % of the '
+                'mean film; give a share below 1, 0.05 for 5 %'
+            )
         if self.speed_m_per_s is None and self.target_um is None:
             raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
         if self.speed_m_per_s is not None and self.speed_m_per_s > FASTEST_M_PER_S:

@@ -93,7 +93,7 @@ class Plan:
     """Passes on a part with the film that the model predicts.
 
     Attributes:
-        request: what was asked for. style: how passes are run.
+        surface: the part. request: what was asked for. style: how passes are run.
         placing: number, index and place of the passes, with sigma_n of the search.
         passes: in running order. trajectory: their timed poses and trigger.
         film_um: (V,) film on the refined part. painted: (V,) bool, the side that is painted.
@@ -105,6 +105,7 @@ class Plan:
         cycle_time_s: from the first pose to the last.
     """
 
+    surface: Surface
     request: PlanRequest
     style: PassStyle
     placing: Placing
@@ -132,7 +133,10 @@ class Plan:
             f'{self.cycle_time_s:.1f} s'
         )
 
-    def as_dict(self) -> dict[str, Any]:
+    def __repr__(self) -> str:
+        return f'Plan({self.sentence})'
+
+    def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
         return {
             'direction': self.request.direction,
@@ -149,7 +153,7 @@ class Plan:
             'cycle_time_s': self.cycle_time_s,
             'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
             'sigma_n': self.sigma_n,
-            'film': self.statistics.as_dict(),
+            'film': self.statistics.to_dict(),
             'plane': {
                 'index_m': self.plane.index_m,
                 'passes': self.plane_on_part.passes,
@@ -215,8 +219,8 @@ def plan(
         target_tolerance_um=0.1 * (request.target_um or 0.0),
     )
     return Plan(
-        request, style, placing, passes, trajectory, film, surface_map.painted, statistics,
-        sigma_n, plane, on_part,
+        surface, request, style, placing, passes, trajectory, film, surface_map.painted,
+        statistics, sigma_n, plane, on_part,
     )  # fmt: skip
 
 

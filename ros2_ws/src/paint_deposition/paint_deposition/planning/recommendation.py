@@ -98,7 +98,10 @@ class Recommendation:
             text += f', {self.passes} passes in {self.cycle_time_s:.1f} s'
         return text
 
-    def as_dict(self) -> dict[str, Any]:
+    def __repr__(self) -> str:
+        return f'Recommendation({self.sentence})'
+
+    def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
         return {
             'index_m': self.index_m,

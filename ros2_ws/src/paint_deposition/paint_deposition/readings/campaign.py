@@ -125,6 +125,10 @@ class Campaign:
     model_file: str | None = None
     name: str = ''
 
+    def __repr__(self) -> str:
+        names = ', '.join(experiment.name for experiment in self.experiments)
+        return f'Campaign({len(self.readings)} readings on {names})'
+
     def __post_init__(self) -> None:
         names = [experiment.name for experiment in self.experiments]
         for name in names:

@@ -32,6 +32,9 @@ class Readings:
     normals: np.ndarray | None = None
     source: str = 'readings'
 
+    def __repr__(self) -> str:
+        return f'Readings({len(self)} from {self.source}, mean {self.thickness_um.mean():.1f} µm)'
+
     def __len__(self) -> int:
         return len(self.thickness_um)
 

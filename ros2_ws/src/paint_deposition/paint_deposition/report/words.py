@@ -4,6 +4,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.study import Study
 from paint_deposition.results.fitted_model import PATTERN, REFIT
@@ -126,13 +127,6 @@ def p_words(p_value: float) -> str:
 def in_print(text: str) -> str:
     """Plain text with its units as they are printed."""
     return re.sub(r'(\d)-(\d)', r'\1–\2', text.replace(' um', ' µm'))
-
-
-def percent(probability: float) -> str:
-    """Never 100 %: no diagnosis is certain."""
-    if probability > 0.99:
-        return '> 99 %'
-    return '< 1 %' if probability < 0.01 else f'{100 * probability:.0f} %'
 
 
 def percent_words(probability: float) -> str:

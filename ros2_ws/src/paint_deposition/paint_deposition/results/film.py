@@ -54,7 +54,7 @@ def write_film(
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
         write_film_csv(paths[1], surface.vertices_m, film_um)
-        write_json(paths[2], {**statistics.as_dict(), **(details or {})})
+        write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     except OSError as error:
         raise PaintError(
             f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'

@@ -52,7 +52,7 @@ def write_plan(
             write_passes_csv(folder / 'passes.csv', plan),
             _write_module(folder / 'passes.mod', plan),
         ]
-        write_json(folder / 'plan.json', {**plan.as_dict(), **(details or {})})
+        write_json(folder / 'plan.json', {**plan.to_dict(), **(details or {})})
     except OSError as error:
         raise PaintError(
             f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'

@@ -41,7 +41,7 @@ class BagSummary:
     pose_streams: list[PoseStream]
     triggers: list[str]
 
-    def as_dict(self) -> dict:
+    def to_dict(self) -> dict:
         return {
             'path': self.path,
             'topics': [topic._asdict() for topic in self.topics],

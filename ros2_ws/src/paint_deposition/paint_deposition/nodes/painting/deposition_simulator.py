@@ -228,7 +228,7 @@ class DepositionSimulator(PaintingNode):
             'down': surface.down,
             'model_file': values['model_file'],
             'effects': [effect.id for effect in self.film.model.effects],
-            'poses': self.film.counts.as_dict(),
+            'poses': self.film.counts.to_dict(),
             'poses_in_other_frames': dict(self.input.refused_frames),
         }
         folder = Path(values['output_directory'])

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.stats import f as fisher
 
 from paint_deposition.diagnosis.run import ALPHA, SURE
-from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows, effect_rows
 from paint_deposition.report.words import (
@@ -17,7 +17,6 @@ from paint_deposition.report.words import (
     joined,
     micrometres,
     p_words,
-    percent,
 )
 
 # Chance of deviations this large from the gauge alone, below which the model is called off.

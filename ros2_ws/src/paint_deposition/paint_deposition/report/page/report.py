@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition import __version__
 from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
@@ -15,7 +16,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.provenance import git_version, package_version
+from paint_deposition.files.provenance import git_version
 from paint_deposition.fitting.study import Study
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
@@ -128,11 +129,10 @@ def _most_telling(data: ReportData) -> int:
 
 
 def _provenance() -> list[tuple[str, str]]:
-    version = package_version() or 'from sources'
     git = git_version()
     return [
         ('Made', datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z')),
-        ('paint_deposition', f'{version} ({git})' if git else version),
+        ('paint_deposition', f'{__version__} ({git})' if git else __version__),
     ]
 
 

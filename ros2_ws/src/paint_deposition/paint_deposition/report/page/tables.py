@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.diagnosis.verdict import Interval
+from paint_deposition.diagnosis.verdict import Interval, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.parameters import PATTERN_NAMES
@@ -17,7 +17,6 @@ from paint_deposition.report.words import (
     in_unit,
     number,
     parameter_words,
-    percent,
     percent_words,
     step_words,
 )

@@ -1,0 +1,121 @@
+"""What readings say of a model: calibrate it, compare it, find what it lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import replace
+
+from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.comparison import compare as compared
+from paint_deposition.diagnosis.procedure import diagnose as diagnosed
+from paint_deposition.diagnosis.refit import refit as refitted
+from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS, effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.model_file import read_model
+from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.fitting.calibration import calibrate as calibrated
+from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.study import Study
+from paint_deposition.readings.campaign import Campaign
+
+Progress = Callable[[str], None]
+# Starts of the fit that stands in for a model where none is given.
+STARTS = 10
+
+
+def _silent(line: str) -> None:
+    """Progress that nobody follows."""
+
+
+def calibrate(
+    campaign: Campaign,
+    model: DepositionModel | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress = _silent,
+) -> Calibration:
+    """Fit the pattern, and the amplitudes of the model's effects, to all readings.
+
+    Args:
+        campaign: painted parts with readings.
+        model: to start from; default: the campaign's, else a 50 mm bell.
+        seed: of the starts of the fit.
+        progress: called with a line for each step.
+
+    Raises:
+        ReadingsError: the readings cannot be what they are said to be, or determine nothing.
+    """
+    return calibrated(campaign, model or _model_of(campaign), seed, progress)
+
+
+def compare(
+    campaign: Campaign, model: DepositionModel | None = None, *, progress: Progress = _silent
+) -> Comparison:
+    """Set a model beside the readings and say where it is off.
+
+    Args:
+        campaign: painted parts with readings.
+        model: taken as it is; default: the campaign's, else one fitted to the campaign.
+        progress: called with a line for each step.
+    """
+    model = model or _model_of(campaign)
+    study = Study.of(campaign, model.effects if model else ())
+    if model is None:
+        progress('fitting the pattern')
+        model = study.fit(FreeParameters.of(DepositionModel()), STARTS).model
+    progress('comparing')
+    return compared(study, model)
+
+
+def diagnose(
+    campaign: Campaign,
+    model: DepositionModel | None = None,
+    *,
+    own_effects: Iterable[type[Effect]] = (),
+    seed: int = 0,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """Find which physical effect a model lacks, if any, and add it.
+
+    Args:
+        campaign: painted parts with readings.
+        model: to start from; default: the campaign's, else a 50 mm bell.
+        own_effects: to consider beside the catalogue's.
+        seed: of the starts of the fits and of the simulated deviations.
+        progress: called with a line for each step.
+    """
+    library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
+    start = model or _model_of(campaign) or DepositionModel()
+    return replace(diagnosed(campaign, start, library, seed, progress), library=library)
+
+
+def refit(
+    campaign: Campaign,
+    added: str | type[Effect] | None,
+    model: DepositionModel | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress = _silent,
+) -> Diagnosis:
+    """Add an effect to a model, fit both to the readings and weigh them.
+
+    Args:
+        campaign: painted parts with readings.
+        added: an effect or its id; None fits the model as it is.
+        model: to start from; default: the campaign's, else a 50 mm bell.
+        seed: of the starts of the fits and of the simulated deviations.
+        progress: called with a line for each step.
+
+    Raises:
+        ModelError: the effect is not known, or the model has it already.
+    """
+    if isinstance(added, str):
+        added = effect_class(added)
+    start = model or _model_of(campaign) or DepositionModel()
+    return refitted(campaign, start, added, EFFECTS, seed, progress)
+
+
+def _model_of(campaign: Campaign) -> DepositionModel | None:
+    return read_model(campaign.model_file) if campaign.model_file else None

@@ -1,0 +1,75 @@
+"""Pictures of results on axes of the caller's."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+from matplotlib.axes import Axes
+
+from paint_deposition.api.simulation import Film
+from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.report.pictures.calibration import draw_agreement
+from paint_deposition.report.pictures.film import draw_film
+from paint_deposition.report.pictures.uniformity import draw_curve
+
+
+def plot(result: Any, ax: Axes | None = None) -> Axes:
+    """Draw a result: a film or a plan on its part, an index curve, or measured over predicted.
+
+    Args:
+        result: what a verb of this package returned.
+        ax: where to draw; default: matplotlib's present axes.
+
+    Returns:
+        The axes, for titles and more.
+    """
+    if ax is None:
+        from matplotlib import pyplot
+
+        ax = pyplot.gca()
+    _draw(result, ax)
+    return ax
+
+
+@singledispatch
+def _draw(result: Any, ax: Axes) -> None:
+    raise TypeError(f'{type(result).__name__} is not a result that can be drawn')
+
+
+@_draw.register
+def _(result: Film, ax: Axes) -> None:
+    draw_film(ax, result.surface, result.film_um, result.path, result.statistics.painted_above_um)
+
+
+@_draw.register
+def _(result: Plan, ax: Axes) -> None:
+    path, _ = spray_path(result.trajectory)
+    draw_film(ax, result.surface, result.film_um, path, result.statistics.painted_above_um)
+
+
+@_draw.register
+def _(result: Recommendation, ax: Axes) -> None:
+    draw_curve(ax, result)
+
+
+@_draw.register
+def _(result: Comparison, ax: Axes) -> None:
+    readings = result.readings
+    draw_agreement(ax, readings.measured_um, readings.predicted_um, readings.sigma_um)
+
+
+@_draw.register
+def _(result: Diagnosis, ax: Axes) -> None:
+    _draw(result.comparisons[-1], ax)
+
+
+@_draw.register
+def _(result: Calibration, ax: Axes) -> None:
+    study = result.study
+    draw_agreement(ax, study.measured_um, result.fit.predicted_um, study.sigma_um)

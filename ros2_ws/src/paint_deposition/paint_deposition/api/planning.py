@@ -1,0 +1,52 @@
+"""Where passes should lie: the index on a plane, and passes on a part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.plan import Plan, PlanRequest
+from paint_deposition.planning.plan import plan as planned
+from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.planning.recommendation import recommend as recommended
+
+
+def recommend(model: DepositionModel | None = None, **wanted: Any) -> Recommendation:
+    """Recommend the index between parallel passes on a plane.
+
+    Args:
+        model: what the gun sprays; default: a 50 mm bell.
+        wanted: the fields of ``planning.index_request.Request``; ``speed_m_per_s`` or
+            ``target_um`` at least.
+
+    Raises:
+        PlanError: the request has no answer; says why and what comes closest.
+    """
+    return recommended(model or DepositionModel(), Request(**wanted))
+
+
+def plan(
+    surface: Surface,
+    model: DepositionModel | None = None,
+    *,
+    frame_id: str = 'part',
+    progress: Callable[[str, float], None] = lambda what, share: None,
+    **wanted: Any,
+) -> Plan:
+    """Lay passes over a part and compute the film to expect.
+
+    Args:
+        surface: the part.
+        model: what the gun sprays; default: a 50 mm bell.
+        frame_id: of the planned poses.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+        wanted: the fields of ``planning.plan.PlanRequest``; ``speed_m_per_s`` or ``target_um`` at
+            least.
+
+    Raises:
+        PlanError: the request has no answer; says why and what comes closest.
+    """
+    return planned(surface, model or DepositionModel(), PlanRequest(**wanted), frame_id, progress)

@@ -1,0 +1,159 @@
+"""The film that a recorded motion leaves on a part."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import RecordingError
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.fitting.forward import Forward
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.part.facing import facing, toward_the_gun
+from paint_deposition.part.surface import Surface
+from paint_deposition.readings.campaign import Campaign, Experiment
+from paint_deposition.readings.readings import Readings
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True)
+class Film:
+    """The film on a part, with all that it was computed from.
+
+    Attributes:
+        surface: the part, its outward side turned to the gun.
+        trajectory: the motion as recorded; path: the same cut into sub-steps; counts: its poses.
+        model: the deposition model.
+        film_um: (V,) film at the vertices of the surface [um].
+        statistics: of the film, weighted by area.
+        readings: places where the gauge should be predicted, or None.
+        predicted_um: (N,) what the gauge should show at each of them [um], or None.
+    """
+
+    surface: Surface
+    trajectory: Trajectory
+    path: SprayPath
+    counts: PoseCounts
+    model: DepositionModel
+    film_um: np.ndarray
+    statistics: FilmStatistics
+    readings: Readings | None = None
+    predicted_um: np.ndarray | None = None
+
+    def __repr__(self) -> str:
+        s = self.statistics
+        return (
+            f'Film({s.mean_um:.1f} ± {s.std_dev_um:.1f} µm at {len(self.film_um)} vertices, '
+            f'{100 * s.coverage:.0f} % of {s.area_m2:.2f} m² painted)'
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the mesh and the recording for the user."""
+        return (*self.surface.notes, *self.trajectory.notes)
+
+    @property
+    def warning(self) -> str:
+        """Why the part stays bare, or nothing."""
+        if self.statistics.coverage > 0.0:
+            return ''
+        spraying = self.path.select(self.path.flow > 0.0)
+        if not len(spraying):
+            return 'the part stays bare: the gun never sprays; check --state-topic'
+        seen = facing(self.surface, spraying.position_m, spraying.rotation[:, :, 2])
+        if seen.front:
+            return f'the part stays bare: the gun sprays {self.path.spraying_time_s:.3g} s only'
+        distance = np.linalg.norm(spraying.position_m - self.surface.centre_m, axis=1).min()
+        return (
+            f'the part stays bare: the gun never looks at it and stays {distance:.3g} m or more '
+            'from its centre; check that mesh and poses are in one frame, and --mesh-scale'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the film and of how it was painted, as in ``stats.json``."""
+        return self.statistics.to_dict() | {
+            'frame_id': self.trajectory.frame_id,
+            'down': self.surface.down.tolist(),
+            'effects': [effect.id for effect in self.model.effects],
+            'spraying_time_s': self.path.spraying_time_s,
+            'poses': self.counts.to_dict(),
+            'notes': list(self.notes),
+        }
+
+
+def simulate(
+    surface: Surface,
+    trajectory: Trajectory,
+    model: DepositionModel | None = None,
+    *,
+    readings: Readings | None = None,
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+    target_um: float = 0.0,
+    tolerance_um: float = 0.0,
+    progress: Progress = lambda what, share: None,
+) -> Film:
+    """Compute the film on a part from a recorded motion.
+
+    Args:
+        surface: the part; it is turned round, with a note, if the gun looks at its back.
+        trajectory: poses and trigger in the frame of the mesh.
+        model: what the gun sprays; default: a 50 mm bell.
+        readings: places at which the gauge is to be predicted too, effects on it included.
+        max_pose_gap_s: a longer time between two poses counts as gun off [s].
+        target_um, tolerance_um: the film wanted and what it may differ, for the figures [um].
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+
+    Raises:
+        RecordingError: the poses make no motion.
+        ReadingsError: readings that are not on the part.
+    """
+    model = model or DepositionModel()
+    path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
+    _require_motion(trajectory.source, path, counts, max_pose_gap_s)
+    surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
+    painted = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    painted.add(path, lambda done: progress('painting', done / len(path)))
+    film_um = painted.film_um
+    statistics = film_statistics(
+        film_um, surface.vertex_areas_m2, painted.emitted_cm3,
+        target_um=target_um, target_tolerance_um=tolerance_um,
+    )  # fmt: skip
+    film = Film(surface, trajectory, path, counts, model, film_um, statistics)
+    if readings is None:
+        return film
+    progress('predicting the readings', 0.0)
+    return replace(film, readings=readings, predicted_um=_predicted_um(film, readings))
+
+
+def _require_motion(
+    source: str, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
+) -> None:
+    if len(path):
+        return
+    reasons = {
+        'not finite': counts.not_finite,
+        'without a unit quaternion': counts.not_unit_quaternions,
+        'with a repeated stamp': counts.repeated_stamps,
+        'with a backward stamp': counts.backward_stamps,
+        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
+    }
+    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
+    raise RecordingError(
+        f'{source}: no two of its {counts.received} poses make a motion'
+        f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
+    )
+
+
+def _predicted_um(film: Film, readings: Readings) -> np.ndarray:
+    """(N,) what the gauge should show at each reading [um], in double precision."""
+    each = replace(readings, point=np.arange(len(readings)).astype(str))
+    experiment = Experiment.of('part', film.surface, film.path, each)
+    return Forward(Campaign((experiment,))).predict_um(film.model)

@@ -1,0 +1,55 @@
+"""The public names: what a script or a notebook needs."""
+
+from paint_deposition.api.inference import calibrate, compare, diagnose, refit
+from paint_deposition.api.pictures import plot
+from paint_deposition.api.planning import plan, recommend
+from paint_deposition.api.samples import sample_folder
+from paint_deposition.api.simulation import Film, simulate
+from paint_deposition.api.writing import write
+from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.readings.campaign import Campaign
+from paint_deposition.readings.readings import Readings
+
+__all__ = [
+    'Calibration',
+    'Campaign',
+    'Comparison',
+    'DepositionModel',
+    'Diagnosis',
+    'Film',
+    'PaintError',
+    'Plan',
+    'Readings',
+    'Recommendation',
+    'Surface',
+    'Trajectory',
+    'calibrate',
+    'compare',
+    'diagnose',
+    'plan',
+    'plot',
+    'read_campaign',
+    'read_mesh',
+    'read_model',
+    'read_readings',
+    'read_recording',
+    'recommend',
+    'refit',
+    'sample_folder',
+    'simulate',
+    'write',
+    'write_model',
+]

@@ -1,0 +1,124 @@
+"""The public interface: names that load when used, results that show and tell themselves."""
+
+import json
+import runpy
+import subprocess
+import sys
+
+import matplotlib
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import paint_deposition as pd
+from booth import SAMPLES
+from paint_deposition.files.json_files import json_text
+
+matplotlib.use('Agg')
+
+
+@pytest.fixture(scope='module')
+def panel():
+    return pd.read_mesh(SAMPLES / 'panel.stl', max_edge_length_m=0.05)
+
+
+@pytest.fixture(scope='module')
+def film(panel):
+    recording = pd.read_recording(SAMPLES / 'panel_577', state_topic='/atomizer/state')
+    readings = pd.read_readings(SAMPLES / 'panel_study/panel_577.csv')
+    return pd.simulate(panel, recording, readings=readings)
+
+
+@pytest.fixture(scope='module')
+def campaign():
+    return pd.read_campaign(SAMPLES / 'measured_door/unseen.yaml')
+
+
+@pytest.fixture(scope='module')
+def comparison(campaign):
+    return pd.compare(campaign, pd.DepositionModel())
+
+
+@pytest.fixture(scope='module')
+def recommendation():
+    return pd.recommend(speed_m_per_s=0.3, tolerance=0.1)
+
+
+def test_every_name_is_there():
+    assert set(dir(pd)) == {'__version__', *pd.public.__all__}
+    for name in dir(pd):
+        assert getattr(pd, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'simulat'"):
+        _ = pd.simulat
+
+
+def test_the_import_loads_nothing_else():
+    program = (
+        'import sys, paint_deposition as pd\n'
+        'slow = {"numpy", "numba", "scipy", "matplotlib", "pydantic", "rclpy"}\n'
+        'print(sorted(slow & set(sys.modules)), pd.__version__)\n'
+    )
+    done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True)
+    assert done.stdout == f'[] {pd.__version__}\n', done.stderr
+
+
+def test_samples_are_found():
+    assert pd.sample_folder().samefile(SAMPLES)
+
+
+def test_a_film_has_arrays_and_figures(film, panel):
+    assert film.film_um.shape == (len(panel.vertices_m),)
+    assert film.predicted_um.shape == (len(film.readings),)
+    assert film.statistics.mean_um == pytest.approx(
+        np.average(film.film_um, weights=panel.vertex_areas_m2), rel=0.2
+    )
+
+
+def test_a_model_by_itself_is_fitted_where_none_is_named(campaign):
+    assert pd.compare(campaign).model != pd.DepositionModel()
+
+
+@pytest.mark.parametrize('name', ['film', 'comparison', 'recommendation'])
+def test_results_show_and_tell_themselves(name, request, tmp_path):
+    result = request.getfixturevalue(name)
+    assert repr(result).startswith(f'{type(result).__name__}(')
+    assert len(repr(result)) < 200
+    assert '\n' not in repr(result)
+    figures = json.loads(json_text(result.to_dict()))
+    assert figures
+    axes = Figure().subplots()
+    assert pd.plot(result, ax=axes) is axes
+    assert axes.has_data()
+    files = pd.write(result, tmp_path)
+    assert all(file.stat().st_size for file in files)
+    written = next(file for file in files if file.suffix == '.json')
+    assert json.loads(written.read_text()) == figures
+
+
+def test_inputs_show_themselves_shortly(film, campaign):
+    for thing in (film.surface, film.trajectory, film.readings, campaign):
+        assert repr(thing).startswith(f'{type(thing).__name__}(')
+        assert len(repr(thing)) < 200
+
+
+def test_what_is_no_result_is_refused(tmp_path):
+    with pytest.raises(TypeError, match='str is not a result'):
+        pd.plot('film', ax=Figure().subplots())
+    with pytest.raises(TypeError, match='str is not a result'):
+        pd.write('film', tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch):
+    """docs/python_example.py, whose cells docs/python.md shows."""
+    monkeypatch.chdir(tmp_path)
+    example = repository / 'docs' / 'python_example.py'
+    names = runpy.run_path(str(example))
+    assert isinstance(names['film'], pd.Film)
+    assert names['diagnosis'].accepted == ('incidence_attraction',)
+    assert (tmp_path / 'results/diagnosis/report.html').is_file()
+    page = (repository / 'docs' / 'python.md').read_text()
+    for cell in example.read_text().split('# %%')[1:]:
+        code = cell.split('\n', 1)[1].strip()
+        assert code in page, f'docs/python.md does not show:\n{code}'
