@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, installed_paint, paint
 from paint_deposition.files.model_file import read_model_file
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
@@ -18,7 +18,7 @@ HIDDEN = 'incidence_attraction'
 @pytest.fixture(scope='module')
 def diagnosed(tmp_path_factory):
     folder = tmp_path_factory.mktemp('diagnosed')
-    return paint('diagnose', CAMPAIGN, '-o', folder), folder
+    return installed_paint('diagnose', CAMPAIGN, '-o', folder), folder
 
 
 @pytest.fixture(scope='module')
@@ -98,7 +98,7 @@ def test_a_diagnosed_model_predicts_readings_never_seen(diagnosed, tmp_path):
 
 
 def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
-    done = paint('compare', door_alone, '-o', tmp_path)
+    done = installed_paint('compare', door_alone, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / 'comparison.json').read_text())
     assert set(content) == {'readings', 'noise', 'misfits', 'regions', 'dependences', 'notes'}
@@ -157,7 +157,7 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
 
 
 def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, tmp_path):
-    done = paint('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
+    done = installed_paint('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
     assert done.returncode == 0, done.stderr
     content = json.loads(done.stdout)
     assert content['accepted'] == [HIDDEN]

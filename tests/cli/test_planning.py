@@ -8,7 +8,7 @@ import trimesh
 from PIL import Image
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, installed_paint, paint
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.rapid.program import read_program
@@ -31,7 +31,7 @@ def model_file(tmp_path_factory):
 @pytest.fixture(scope='module')
 def calibrated(tmp_path_factory):
     folder = tmp_path_factory.mktemp('calibrated')
-    return paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
+    return installed_paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
 
 
 def is_picture(path) -> bool:
@@ -44,7 +44,7 @@ def is_picture(path) -> bool:
 
 def test_recommendation_is_printed_and_written(model_file, tmp_path):
     arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
-    done = paint('recommend', *arguments, '-o', tmp_path)
+    done = installed_paint('recommend', *arguments, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
     expected = recommend(MODEL, Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
     written = json.loads((tmp_path / 'recommendation.json').read_text())
@@ -199,7 +199,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
 
 def test_plan_tells_in_words_and_replaces_an_older_one(tmp_path):
     arguments = ('plan', '--mesh', SAMPLES / 'panel.stl', '--speed', 0.3, '-o', tmp_path)
-    done = paint(*arguments, '--direction', 'vertical', '--index', 0.3)
+    done = installed_paint(*arguments, '--direction', 'vertical', '--index', 0.3)
     assert done.returncode == 0, done.stderr
     assert 'vertical passes at 300 mm' in done.stdout
     assert 'on a plane: sigma_n' in done.stdout

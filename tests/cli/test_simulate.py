@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, installed_paint, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
@@ -52,7 +52,7 @@ def one_pass(tmp_path_factory):
 def painted_door(tmp_path_factory):
     """The sample door, painted along the sample recording, and what the command printed."""
     folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
-    done = paint(
+    done = installed_paint(
         'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
         '--target-um', 18, '--tolerance-um', 4,
     )  # fmt: skip
