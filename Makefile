@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test bench bench-diagnosis lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis lint format lock clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -20,6 +20,9 @@ demo: build  ## paint a door through the nodes, recommend an index, explain a me
 
 test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
 	@$(IN_ENVIRONMENT) pytest $(ARGS)
+
+test-fast: build  ## run the tests of less than a second each, none of them with a node: a minute
+	@$(IN_ENVIRONMENT) pytest -m 'not slow' $(ARGS)
 
 bench: build  ## measure the speed of simulation and nodes
 	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)
