@@ -28,6 +28,7 @@ def test_inspect_a_real_bag(shared_data):
     assert '95 gaps, longest interval 2.041 s' in line
 
 
+@pytest.mark.slow
 def test_inspect_as_json(tmp_path):
     written = straight_pass(300)
     folder = write_pose_bag(tmp_path / 'pass', written)
@@ -61,6 +62,7 @@ def test_recover_does_what_inspect_says(cut_run, tmp_path):
     assert_refused(again, 'run_recovered already exists; choose another name')
 
 
+@pytest.mark.slow
 def test_recover_as_json(cut_run, tmp_path):
     done = installed_paint('recover', cut_run / 'run_0.mcap', '-o', tmp_path / 'whole', '--json')
     figures = json.loads(done.stdout)

@@ -61,6 +61,7 @@ def painted_door(tmp_path_factory):
     return folder, json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_the_door_is_painted(painted_door):
     folder, figures = painted_door
     assert sorted(file.name for file in folder.iterdir()) == FILES
@@ -78,6 +79,7 @@ def test_the_door_is_painted(painted_door):
     assert (folder / 'film.png').read_bytes().startswith(b'\x89PNG')
 
 
+@pytest.mark.slow
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
     recorded = read_trajectory(DOOR_BAG, None, '/atomizer/state')
@@ -169,6 +171,7 @@ def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_p
     assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
 
 
+@pytest.mark.slow
 def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_path):
     inside_out = trimesh.load_mesh(panel, process=False)
     inside_out.invert()
