@@ -73,11 +73,10 @@ def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     expected = reference_film_um(points, motion, model)
     integrator = FilmIntegrator(points, model, 'single')
     integrator.add(motion)
-    np.testing.assert_allclose(
-        integrator.raw_um, expected, atol=3e-6 * expected.max(), rtol=0.0
-    )
+    np.testing.assert_allclose(integrator.raw_um, expected, atol=3e-6 * expected.max(), rtol=0.0)
 
 
+@pytest.mark.slow
 def test_an_edited_law_is_compiled_anew(own):
     points, motion = panel(0.3, 0.05).points(), path_of(spot())
 
