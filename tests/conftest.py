@@ -12,8 +12,9 @@ import pytest
 
 # As the command does, before NumPy is loaded: see cli/main.py.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-# Two threads at least, also where there is one core: what threads may change is seen.
-os.environ.setdefault('NUMBA_NUM_THREADS', str(max(2, len(os.sched_getaffinity(0)))))
+# Two threads on any machine: enough to see whether they change the film, and not so many that
+# tests on several cores get in each other's way.
+os.environ.setdefault('NUMBA_NUM_THREADS', '2')
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
