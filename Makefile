@@ -2,10 +2,12 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test bench bench-diagnosis lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis lint format lock clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
+# Files of tests side by side, on four cores at the most.
+TESTS := pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 PIN := .venv/bin/uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest \
 	--no-annotate --custom-compile-command 'make lock' --upgrade
 
@@ -19,7 +21,10 @@ demo: build  ## paint a door through the nodes, recommend an index, explain a me
 	@$(IN_ENVIRONMENT) python demo/demo.py runs/demo
 
 test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
-	@$(IN_ENVIRONMENT) pytest $(ARGS)
+	@$(IN_ENVIRONMENT) $(TESTS) $(ARGS)
+
+test-fast: build  ## run the tests of less than a second each, none of them with a node: a minute
+	@$(IN_ENVIRONMENT) $(TESTS) -m 'not slow' $(ARGS)
 
 bench: build  ## measure the speed of simulation and nodes
 	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)

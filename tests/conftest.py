@@ -12,6 +12,9 @@ import pytest
 
 # As the command does, before NumPy is loaded: see cli/main.py.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+# Two threads on any machine: enough to see whether they change the film, and not so many that
+# tests on several cores get in each other's way.
+os.environ.setdefault('NUMBA_NUM_THREADS', '2')
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
@@ -19,6 +22,13 @@ SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 # The same examples on every run, and no deadline: the first call of a kernel compiles it.
 hypothesis.settings.register_profile('project', deadline=None, derandomize=True)
 hypothesis.settings.load_profile('project')
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Tests with nodes are slow: nodes find one another, wait and shut down in real time."""
+    for item in items:
+        if 'ros_domain' in item.fixturenames:
+            item.add_marker('slow')
 
 
 @pytest.fixture(scope='session')

@@ -1,11 +1,15 @@
 """A small campaign of the virtual paint shop: few parcels and readings, made in two seconds."""
 
+from functools import cache
 from pathlib import Path
 
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.readings.campaign import Campaign
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import generate
+
+# Tests that ask for the same campaign share it.
+generated = cache(generate)
 
 
 def small_campaign(folder: Path, **options) -> Campaign:
@@ -14,5 +18,5 @@ def small_campaign(folder: Path, **options) -> Campaign:
         'seed': 7, 'truth': 'air_drift', 'amplitude': 0.05, 'experiments': ('panel', 'door'),
         'readings': 40, 'repeats': 10, 'heldout': 1, 'style': 'columns', 'parcels': 100_000,
     } | options  # fmt: skip
-    write(generate(**chosen), folder)
+    write(generated(**chosen), folder)
     return read_campaign(folder / 'campaign.yaml')

@@ -1,31 +1,33 @@
-"""The command `paint` as a process."""
+"""The command `paint`, in this process as a rule and as a process where that is the point."""
 
-import os
+import io
 import subprocess
-import sys
+from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
-SOURCES = Path(__file__).resolve().parents[2] / 'ros2_ws/src/paint_deposition'
-COMMAND = [sys.executable, '-m', 'paint_deposition.cli.main']
+import pytest
 
-
-def environment() -> dict[str, str]:
-    """That of the tests, with the package's sources on the path."""
-    path = os.pathsep.join([str(SOURCES), os.environ.get('PYTHONPATH', '')])
-    return os.environ | {'PYTHONPATH': path}
+from paint_deposition.cli.main import run
 
 
 def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess:
-    """Run `paint` with these arguments to its end."""
-    return subprocess.run(
-        [*COMMAND, *map(str, arguments)],
-        capture_output=True,
-        text=True,
-        cwd=cwd,
-        env=environment(),
-        check=False,
-        timeout=100,
-    )
+    """Run `paint` with these arguments in this process: all but its start and its end."""
+    words = [str(argument) for argument in arguments]
+    output, errors = io.StringIO(), io.StringIO()
+    with (
+        pytest.MonkeyPatch.context() as place,
+        redirect_stdout(output),
+        redirect_stderr(errors),
+    ):
+        place.chdir(cwd or Path.cwd())
+        code = run(words)
+    return subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())
+
+
+def installed_paint(*arguments: object) -> subprocess.CompletedProcess:
+    """Run the installed `paint` with these arguments as a process of its own."""
+    command = ['paint', *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
 def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:

@@ -8,7 +8,7 @@ import trimesh
 from PIL import Image
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, installed_paint, paint
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
@@ -32,7 +32,7 @@ def model_file(tmp_path_factory):
 @pytest.fixture(scope='module')
 def calibrated(tmp_path_factory):
     folder = tmp_path_factory.mktemp('calibrated')
-    return paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
+    return installed_paint('calibrate', STUDY / 'campaign.yaml', '-o', folder), folder
 
 
 def is_picture(path) -> bool:
@@ -43,9 +43,10 @@ def is_picture(path) -> bool:
 # --- recommend
 
 
+@pytest.mark.slow
 def test_recommendation_is_printed_and_written(model_file, tmp_path):
     arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
-    done = paint('recommend', *arguments, '-o', tmp_path)
+    done = installed_paint('recommend', *arguments, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
     expected = recommend(MODEL, Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
     written = json.loads((tmp_path / 'recommendation.json').read_text())
@@ -102,6 +103,7 @@ def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
 # --- calibrate
 
 
+@pytest.mark.slow
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
     assert done.returncode == 0, done.stderr
@@ -116,6 +118,7 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
     assert 'warning: phi_rad is not determined' in done.stderr
 
 
+@pytest.mark.slow
 def test_calibrated_model_predicts_the_other_panels(calibrated, tmp_path):
     _, folder = calibrated
     model = folder / 'model.yaml'
@@ -128,6 +131,7 @@ def test_calibrated_model_predicts_the_other_panels(calibrated, tmp_path):
         assert panel['rmse_um'] < 0.85
 
 
+@pytest.mark.slow
 def test_calibration_as_json(tmp_path):
     done = paint('calibrate', STUDY / 'campaign.yaml', '-o', tmp_path, '--json')
     assert done.returncode == 0, done.stderr
@@ -136,6 +140,7 @@ def test_calibration_as_json(tmp_path):
     assert content['readings'] == 90
 
 
+@pytest.mark.slow
 def test_notes_on_a_campaign_are_told_when_piped(tmp_path):
     mesh = trimesh.load(STUDY / 'panel.stl', process=False)
     mesh.faces = mesh.faces[:, ::-1]
@@ -170,6 +175,7 @@ def test_readings_in_mixed_units_are_refused(tmp_path):
 # --- plan
 
 
+@pytest.mark.slow
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20)
@@ -199,9 +205,10 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
         assert film[name] == pytest.approx(content['film'][name], rel=1e-3), name
 
 
+@pytest.mark.slow
 def test_plan_tells_in_words_and_replaces_an_older_one(tmp_path):
     arguments = ('plan', '--mesh', SAMPLES / 'panel.stl', '--speed', 0.3, '-o', tmp_path)
-    done = paint(*arguments, '--direction', 'vertical', '--index', 0.3)
+    done = installed_paint(*arguments, '--direction', 'vertical', '--index', 0.3)
     assert done.returncode == 0, done.stderr
     assert 'vertical passes at 300 mm' in done.stdout
     assert 'on a plane: sigma_n' in done.stdout

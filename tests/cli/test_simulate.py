@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, installed_paint, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -53,7 +53,7 @@ def one_pass(tmp_path_factory):
 def painted_door(tmp_path_factory):
     """The sample door, painted along the sample recording, and what the command printed."""
     folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
-    done = paint(
+    done = installed_paint(
         'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
         '--target-um', 18, '--tolerance-um', 4,
     )  # fmt: skip
@@ -62,6 +62,7 @@ def painted_door(tmp_path_factory):
     return folder, json.loads(done.stdout)
 
 
+@pytest.mark.slow
 def test_the_door_is_painted(painted_door):
     folder, figures = painted_door
     assert sorted(file.name for file in folder.iterdir()) == FILES
@@ -79,6 +80,7 @@ def test_the_door_is_painted(painted_door):
     assert (folder / 'film.png').read_bytes().startswith(b'\x89PNG')
 
 
+@pytest.mark.slow
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
     recorded = read_trajectory(DOOR_BAG, None, '/atomizer/state')
@@ -170,6 +172,7 @@ def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_p
     assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
 
 
+@pytest.mark.slow
 def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_path):
     inside_out = trimesh.load_mesh(panel, process=False)
     inside_out.invert()

@@ -9,6 +9,8 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.fitting.study import Study
 from small_campaign import small_campaign
 
+pytestmark = pytest.mark.slow
+
 DRIFTING = DepositionModel(effects=(AirDrift(shift_down_m=0.02),))
 
 

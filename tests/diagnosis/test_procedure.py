@@ -20,6 +20,8 @@ from paint_deposition.files.json_files import json_text
 from paint_deposition.readings.campaign import Campaign, Experiment
 from small_campaign import small_campaign
 
+pytestmark = pytest.mark.slow
+
 DOOR = {
     'experiments': ('door',), 'readings': 60, 'repeats': 20, 'style': 'random',
     'parcels': 2_000_000, 'amplitude': None,

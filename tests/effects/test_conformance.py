@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from numba import float32, njit
 from pydantic import ValidationError
 
 from booth import (
@@ -22,6 +23,7 @@ from paint_deposition.effects.base import Effect, PathContext, Ray
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.kernel.laws import in_precision
 from reference import reference_film_um
 
 ALL = [*EFFECTS.values(), load_effect_file(SAMPLES / 'my_effect.py')]
@@ -146,17 +148,26 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
 
 
 @pytest.mark.parametrize('effect', WITH_LAW, ids=lambda effect: effect.id)
-@pytest.mark.parametrize(('precision', 'tolerance'), [('double', 2e-9), ('single', 3e-6)])
-def test_the_kernel_computes_the_law(effect: type[Effect], precision: str, tolerance: float):
+def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = door().points().select(slice(None, None, 7))
     path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
     model = MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(points, model, precision)
+    integrator = FilmIntegrator(points, model, 'double')
     integrator.add(path)
     expected = reference_film_um(points, path, model)
-    np.testing.assert_allclose(
-        integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
-    )
+    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
+
+
+@pytest.mark.parametrize('effect', WITH_LAW, ids=lambda effect: effect.id)
+def test_the_law_stays_in_single_precision(effect: type[Effect]):
+    """One number of double precision would carry the whole loop of the kernel into it."""
+    ray = Ray(*np.array([0.1, 0.2, 1.7, 0.6, 0.4], np.float32))
+    values = np.array(effect.typical().values(), np.float32)
+    for law in filter(None, (effect.flux_factor, effect.pattern_scale)):
+        compiled = njit(in_precision(law, np.float32))
+        assert compiled(ray, *values) == pytest.approx(law(ray, *values), rel=1e-6)
+        (signature,) = compiled.nopython_signatures
+        assert signature.return_type == float32
 
 
 @EFFECT
@@ -186,15 +197,18 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect],
     np.testing.assert_allclose(readings, sheet[some], rtol=0, atol=tolerance * sheet.max())
 
 
-def test_two_effects_with_laws_multiply():
+@pytest.mark.parametrize(('precision', 'tolerance'), [('double', 2e-9), ('single', 3e-6)])
+def test_laws_multiply(precision: str, tolerance: float):
     points = door().points().select(slice(None, None, 7))
     path = path_of(spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
     model = MODEL.model_copy(update={'effects': tuple(chosen)})
-    integrator = FilmIntegrator(points, model, 'double')
+    integrator = FilmIntegrator(points, model, precision)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
-    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0, atol=2e-9 * expected.max())
+    np.testing.assert_allclose(
+        integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
+    )
 
 
 def test_laws_of_absent_effects_kept_for_a_fit_change_nothing(passes):

@@ -29,6 +29,8 @@ from paint_deposition.readings.panel import Panel
 from paint_deposition.results.calibration import write_calibration
 from virtual_paint_shop.shop import panel_study
 
+pytestmark = pytest.mark.slow
+
 TRUTH = DepositionModel(
     planar=PlanarPattern(
         K1_cm3_per_s=1.6, K2=0.25, K3=0.25, phi_rad=0.0, r_m=0.2, sigma1_m=0.08, sigma2_m=0.14

@@ -93,6 +93,7 @@ def test_derivatives_are_those_of_the_prediction(forward, exact):
         assert found[:, k] == pytest.approx(slope, abs=0.01 * np.abs(slope).max()), k
 
 
+@pytest.mark.slow
 def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
     random = np.random.default_rng(4)
     parameters = FreeParameters.of(TRUTH)

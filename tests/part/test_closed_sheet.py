@@ -13,6 +13,8 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from surfaces import hemmed, solid, triangulated
 
+pytestmark = pytest.mark.slow
+
 STANDOFF_M = 0.25
 SIDES = {'-y': 0.0, '+x': 90.0, '+y': 180.0, '-x': 270.0, 'askew': 205.0}
 WIDTH_M, HEIGHT_M = 0.6, 0.5

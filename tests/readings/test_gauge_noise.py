@@ -62,6 +62,7 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
 # --- honest readings stay
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('scale', [0.3, 1.0, 3.0])
 @pytest.mark.parametrize('layout', LAYOUTS)
 def test_normal_readings_are_not_dropped(layout, scale):

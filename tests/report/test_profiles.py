@@ -1,6 +1,7 @@
 """The picture of profiles: measured, before and after."""
 
 import numpy as np
+import pytest
 from PIL import Image
 
 from paint_deposition.comparison.comparison import compare
@@ -11,6 +12,7 @@ from paint_deposition.report.style import ACCENT
 from small_campaign import small_campaign
 
 
+@pytest.mark.slow
 def test_columns_and_strips_are_drawn(tmp_path):
     for style in ('columns', 'random'):
         study = Study.of(small_campaign(tmp_path / style, experiments=('door',), style=style))

@@ -23,6 +23,8 @@ from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.report.page.report import write_report
 from small_campaign import small_campaign
 
+pytestmark = pytest.mark.slow
+
 VOID = {'meta', 'link', 'br', 'img', 'input', 'hr'}
 CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
 

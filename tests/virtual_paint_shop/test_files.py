@@ -108,6 +108,7 @@ def test_layouts_stay_on_the_part_and_repeat(campaign, style):
     assert part.edge_distance(spots.x_m, spots.z_m).min() > 0.0125
 
 
+@pytest.mark.slow
 def test_command_writes_a_campaign(tmp_path):
     command = (
         f'-m tests.virtual_paint_shop --seed 7 --truth gauge_zero --readings 30 --out {tmp_path}'

@@ -53,6 +53,7 @@ def test_pattern_scales_with_its_lengths():
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('tilt_deg', [0.0, 25.0])
 def test_all_solids_of_a_still_gun_are_on_a_wide_plane(tilt_deg):
     plane = Part('panel', 2.4, 2.4)
@@ -72,6 +73,7 @@ def test_all_solids_of_a_still_gun_are_on_a_wide_plane(tilt_deg):
     assert landed.sum() * 0.02**2 == pytest.approx(PATTERN.K1_cm3_per_s, rel=0.005)
 
 
+@pytest.mark.slow
 def test_clean_film_on_a_door_is_equation_2():
     """Bias below 0.05 um and counting noise below 0.3 um, at the default number of parcels."""
     rng = np.random.default_rng(8)

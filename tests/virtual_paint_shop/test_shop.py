@@ -15,6 +15,7 @@ from .parcels import conner_plume, half_width_m
 from .shop import generate, panel_study
 
 
+@pytest.mark.slow
 def test_same_seed_same_campaign_whatever_is_hidden():
     few = {'parcels': 300_000, 'readings': 40, 'repeats': 10, 'heldout': 10}
     clean, again = generate(5, **few), generate(5, **few)
@@ -59,6 +60,7 @@ def test_a_fixed_tool_axis_meets_the_surface_at_larger_angles():
     assert angles[0] > 0.2 > 0.15 > angles[1]
 
 
+@pytest.mark.slow
 def test_two_effects_and_two_parts():
     campaign = generate(
         3,
@@ -73,6 +75,7 @@ def test_two_effects_and_two_parts():
     assert json.dumps(campaign.truth)
 
 
+@pytest.mark.slow
 def test_panel_study_paints_one_bell_at_three_indexes():
     studies = [panel_study(1, index, parcels=1_000_000) for index in (0.577, 0.525, 0.625)]
     assert len({s.pattern for s in studies}) == 1

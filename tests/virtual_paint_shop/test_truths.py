@@ -12,6 +12,8 @@ from .parcels import Pattern
 from .truths import DOWN, library
 from .truths_film import run_down
 
+pytestmark = pytest.mark.slow
+
 FLAT = Part('door', 1.0, 1.0)
 DOOR = Part(
     'door',
