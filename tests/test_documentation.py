@@ -1,7 +1,9 @@
-"""Documentation names files that are there."""
+"""Documentation names files and shows layers that are there."""
 
 import re
+import sys
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -27,6 +29,19 @@ def test_modules_that_are_named_are_there(page: Path):
         assert (PACKAGE / module).is_file(), module
     for test in re.findall(r'`(tests/[\w/.]+)`', text):
         assert (ROOT / test).exists(), test
+
+
+@pytest.mark.skipif(sys.version_info < (3, 11), reason='tomllib comes with Python 3.11')
+def test_the_picture_shows_the_layers_that_the_linter_holds():
+    import tomllib
+
+    settings = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
+    contracts = settings['tool']['importlinter']['contracts']
+    held = next(contract['layers'] for contract in contracts if contract.get('exhaustive'))
+    picture = ElementTree.parse(ROOT / 'docs/images/architecture.svg')
+    (drawn,) = picture.iterfind('.//*[@id="layers"]')
+    shown = [text.text for text in drawn if text.get('class') == 'room']
+    assert shown == [' '.join(layer.split(' | ')) for layer in held]
 
 
 def headings(page: Path) -> set[str]:
