@@ -1,4 +1,4 @@
-# The front door. `make` alone lists what there is.
+# The front door of the project. `make` alone lists the targets.
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
@@ -14,10 +14,10 @@ PIN := .venv/bin/uv pip compile --quiet --universal --python-version 3.10 --fork
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
 
-build:  ## set up the environment and the workspace (minutes at first, then at once)
+build:  ## set up the environment and the workspace (takes minutes the first time only)
 	@setup/build.sh
 
-demo: build  ## paint a door through the nodes, recommend an index, explain a measured door
+demo: build  ## paint a door through the nodes, recommend an index, diagnose a measured door
 	@$(IN_ENVIRONMENT) python demo/demo.py runs/demo
 
 test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
@@ -38,12 +38,12 @@ lint: build  ## check style, types and the order of the rooms
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .
 
-lock: build  ## pin the newest versions that every supported Python can have
+lock: build  ## pin the newest library versions that all supported Pythons can use
 	$(PIN) requirements/core.in -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
 	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
 
-clean:  ## remove what was built, keep the environment
+clean:  ## remove everything that was built, keep the environment
 	rm -rf ros2_ws/{build,install,log} $(PACKAGE)/{build,*.egg-info} .setup .{pytest,mypy,ruff}_cache .hypothesis
 	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
 

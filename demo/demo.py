@@ -1,4 +1,4 @@
-"""A door painted live, an index recommended, a measured door explained: all of it in two minutes.
+"""Paint a door live, recommend an index, diagnose a measured door: all in two minutes.
 
 Starts the real nodes as processes, replays the sample trajectory onto the sample door, records
 the run, checks it against the offline film, asks the planner, and diagnoses the measured door.
@@ -28,12 +28,12 @@ PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE
 SAMPLES = Path(get_package_share_directory(PACKAGE)) / 'samples'
 DOOR, TRAJECTORY = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
 MEASURED = SAMPLES / 'measured_door'
-# In the folder of a demo: what it holds may be replaced by the next.
+# A folder with this file holds the results of a demo, which the next demo may replace.
 MARKER = '.paint_demo'
 
 
 def main() -> None:
-    """Run the demo; the results go to the folder given, those of an older demo are replaced."""
+    """Run the demo. The results go to the given folder; those of an older demo are replaced."""
     if len(sys.argv) != 2:
         refuse('give one folder for the results')
     folder = fresh_folder(Path(sys.argv[1]).resolve())
@@ -47,22 +47,22 @@ def main() -> None:
         recommend()
         rclpy.shutdown()
     diagnose(folder)
-    say('What there is now')
+    say('Results')
     for what, path in (
-        ('the run, for ros2 bag, Foxglove or rosbags', run),
-        ('the door in colours', film_csv.with_suffix('.ply')),
-        ('the door from the front', offline / 'film.png'),
-        ('where the model fails and why, for a browser', folder / 'diagnosis' / 'report.html'),
-        ('the model with what was missing', folder / 'diagnosis' / 'model.yaml'),
+        ('the recorded run, for ros2 bag, Foxglove or rosbags', run),
+        ('the painted door as a coloured mesh', film_csv.with_suffix('.ply')),
+        ('a picture of the painted door', offline / 'film.png'),
+        ('the report of the diagnosis, for a browser', folder / 'diagnosis' / 'report.html'),
+        ('the model with the missing effect', folder / 'diagnosis' / 'model.yaml'),
     ):
         print(f'  {what}:\n    {path}')
 
 
 def fresh_folder(folder: Path) -> Path:
-    """The folder, emptied if it is an older demo's; any other must be empty or not there."""
+    """The folder, emptied if it holds an older demo; any other must be empty or not exist."""
     if folder.exists() and not (folder / MARKER).is_file():
         if not folder.is_dir() or any(folder.iterdir()):
-            refuse(f'{folder} is there and no older demo; move it away or give another folder')
+            refuse(f'{folder} exists and is not from an older demo; give another folder')
     elif folder.exists():
         shutil.rmtree(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -78,7 +78,7 @@ def refuse(why: str) -> NoReturn:
 
 def paint_live(folder: Path) -> tuple[Path, Path]:
     """Paint the door through the nodes; returns the recorded run and the film's table."""
-    say('A door painted live')
+    say('Painting a door live, through the nodes')
     poses = len(read_trajectory(TRAJECTORY, state_topic='/atomizer/state'))
     with Cell(PREFIX) as cell:
         cell.start('deposition_simulator', mesh_file=DOOR, max_edge_length_m=0.01,
@@ -93,8 +93,8 @@ def paint_live(folder: Path) -> tuple[Path, Path]:
         paths = cell.save_film('live')
         run = cell.stop_recorder()
     print(
-        f'{stats.poses_received} poses, {stats.poses_rejected} rejected; film '
-        f'{stats.mean_um:.1f} um mean, {stats.std_dev_um:.1f} um standard deviation, '
+        f'{stats.poses_received} poses, {stats.poses_rejected} rejected; film thickness '
+        f'{stats.mean_um:.1f} µm mean, {stats.std_dev_um:.1f} µm standard deviation, '
         f'{100 * stats.coverage:.0f} % covered, capture fraction '
         f'{100 * stats.capture_fraction:.0f} %'
     )
@@ -102,7 +102,7 @@ def paint_live(folder: Path) -> tuple[Path, Path]:
 
 
 def paint_offline(folder: Path) -> Path:
-    """The same film from the command line, for its picture and to check the nodes."""
+    """Paint the same film from the command line, for its picture and to check the nodes."""
     output = folder / 'film'
     paint('simulate', '--mesh', DOOR, '--trajectory', TRAJECTORY, '--state-topic',
           '/atomizer/state', '-o', output, '--json')  # fmt: skip
@@ -110,7 +110,7 @@ def paint_offline(folder: Path) -> Path:
 
 
 def compare_films(live_csv: Path, run: Path, offline_csv: Path) -> None:
-    """Print how far the live and the recorded film are from the offline one."""
+    """Print how far the live and the recorded film differ from the offline one."""
     offline = np.loadtxt(offline_csv, delimiter=',', skiprows=1)[:, 3]
     live = np.loadtxt(live_csv, delimiter=',', skiprows=1)[:, 3]
     with AnyReader([run]) as reader:
@@ -119,12 +119,12 @@ def compare_films(live_csv: Path, run: Path, offline_csv: Path) -> None:
         recorded = reader.deserialize(raw, connection.msgtype).thickness_um
     for name, film in (('live', live), ('recorded', recorded)):
         off = np.abs(film - offline).max() / offline.max()
-        print(f'{name} film against the offline one: {off:.1e} of the peak apart')
+        print(f'{name} and offline film differ by at most {off:.1e} of the peak')
 
 
 def recommend() -> None:
     """Ask the running planner for an index."""
-    say('An index recommended by the running planner')
+    say('Asking the running planner for an index')
     with Cell(PREFIX) as cell:
         cell.start('index_planner')
         answer = cell.recommend_index(target_um=20.0, tolerance=0.05, width_m=0.9)
@@ -132,8 +132,8 @@ def recommend() -> None:
 
 
 def diagnose(folder: Path) -> None:
-    """Explain a measured door, and judge the models on readings they never saw."""
-    say('A measured door: what does the model of 2002 miss?')
+    """Diagnose a measured door, and judge the models on readings that no fit has seen."""
+    say('Diagnosing a measured door: what does the model of 2002 miss?')
     output = folder / 'diagnosis'
     paint('diagnose', MEASURED / 'campaign.yaml', '-o', output, show=True)
     errors = []
@@ -143,8 +143,8 @@ def diagnose(folder: Path) -> None:
         whole = json.loads(figures)['misfits'][0]
         errors.append(whole['rmse_um'])
     print(
-        f'{whole["readings"]} readings that no fit has seen: RMSE {errors[0]:.2f} um before, '
-        f'{errors[1]:.2f} um after'
+        f'{whole["readings"]} readings that no fit has seen: RMSE {errors[0]:.2f} µm before, '
+        f'{errors[1]:.2f} µm after'
     )
 
 

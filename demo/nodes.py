@@ -1,4 +1,4 @@
-"""The cell's nodes as processes, and the services and topics the demo uses of them."""
+"""The nodes of the cell as processes, and the services and topics that the demo uses."""
 
 import signal
 import subprocess
@@ -20,7 +20,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 
 
 class Cell:
-    """Starts nodes and, at the end, stops whatever still runs."""
+    """Starts nodes and, at the end, stops those that still run."""
 
     def __init__(self, prefix: Path) -> None:
         self._prefix = prefix
@@ -46,12 +46,12 @@ class Cell:
         self._processes[name] = subprocess.Popen(command)
 
     def wait_for_service(self, kind: type, name: str) -> None:
-        """Wait until a node offers a service; it is ready then."""
+        """Wait until a node offers a service, which it does when it is ready."""
         self._clients[name] = self._node.create_client(kind, name)
         self._until(self._clients[name].service_is_ready, f'the service {name}')
 
     def follow_poses(self, total: int) -> ThicknessStats:
-        """Show the poses arrive; returns the last statistics."""
+        """Show how the poses arrive; returns the last statistics."""
         newest: list[ThicknessStats] = []
         self._node.create_subscription(ThicknessStats, 'thickness/stats', newest.append, LATCHED)
         with tqdm(total=total, desc='painting', unit='pose') as bar:
@@ -66,7 +66,7 @@ class Cell:
         return newest[-1]
 
     def wait_for_end(self, name: str) -> None:
-        """Wait until a node ends by itself."""
+        """Wait until a node ends on its own."""
         process = self._processes.pop(name)
         if process.wait(timeout=DEADLINE_S):
             sys.exit(f'demo: {name} ended with exit code {process.returncode}')

@@ -1,4 +1,4 @@
-"""Draw the pictures of the documentation anew, with the commands that the documentation names.
+"""Draw the pictures of the documentation again, with the commands that the documentation names.
 
 Run it in the project's environment: `. setup/environment.sh; python docs/draw_images.py`.
 """
@@ -52,7 +52,7 @@ def of_the_door(profiles: Image.Image) -> Image.Image:
 
 
 def first_page(report: Path, picture: Path) -> None:
-    """Photograph the report, if there is a browser for it."""
+    """Take a screenshot of the report, if there is a browser."""
     browser = shutil.which('chromium') or shutil.which('google-chrome')
     if browser is None:
         return  # without a browser the old picture stays
@@ -65,7 +65,7 @@ def first_page(report: Path, picture: Path) -> None:
 
 
 def keep(picture: Image.Image, name: str) -> None:
-    """Save it no wider than pages show it, with all its colours."""
+    """Save a picture no wider than the pages show it, with all its colours."""
     path = IMAGES / name
     picture = picture.convert('RGB')
     picture.thumbnail((WIDEST_PX, WIDEST_PX), Image.Resampling.LANCZOS)

@@ -24,7 +24,7 @@ def test_a_folder_that_is_no_demo_is_left_alone(repository, tmp_path):
         assert done.returncode == 2
         assert done.stdout == ''
         (line,) = done.stderr.splitlines()
-        assert line.startswith(f'demo: {target} is there and no older demo; ')
+        assert line.startswith(f'demo: {target} exists and is not from an older demo; ')
     assert (tmp_path / 'readings/door.csv').read_text() == 'years of work'
 
 
