@@ -133,8 +133,8 @@ def refit_command(
 ) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
-    Writes model.yaml with its history and the other files that diagnose writes. To go on from
-    there, give that model.yaml as --model.
+    Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
+    on from there, give that model.yaml as --model.
     """
     from paint_deposition.api.inference import refit
     from paint_deposition.effects.catalogue import effect_class
