@@ -9,7 +9,7 @@ import pytest
 import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.campaign_file import EXPERIMENT_KEYS, TOP_KEYS, read_campaign
+from paint_deposition.files.campaign_file import _Entry, _File, read_campaign
 from paint_deposition.files.gauge_readings import REQUIRED, read_readings
 from paint_deposition.files.model_file import read_model
 
@@ -82,7 +82,7 @@ def test_campaign_can_be_read_and_tells_of_every_key(config):
     campaign = read_campaign(config / 'campaign.yaml')
     assert [experiment.name for experiment in campaign.experiments] == ['panel', 'door']
     text = (config / 'campaign.yaml').read_text()
-    for key in (*TOP_KEYS, *EXPERIMENT_KEYS):
+    for key in (*_File.model_fields, *_Entry.model_fields):
         assert re.search(rf'^[ -]*(# )?(- )?{key}:', text, re.M), key
 
 
@@ -91,7 +91,7 @@ def test_campaigns_commented_keys_are_as_good(config, tmp_path):
     text = text.replace('../ros2_ws', str(config.parent / 'ros2_ws'))
     text = re.sub(r'^    # (\w+: )', r'    \1', text, flags=re.M).replace('0.001', '1.0')
     entries = yaml.safe_load(text)['experiments']
-    assert set(EXPERIMENT_KEYS) <= set(entries[-1])
+    assert set(_Entry.model_fields) <= set(entries[-1])
     campaign = tmp_path / 'campaign.yaml'
     campaign.write_text(text)
     assert len(read_campaign(campaign).experiments) == 2

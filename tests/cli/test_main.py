@@ -8,6 +8,7 @@ import sys
 import click
 import pytest
 
+import paint_deposition
 from cli.command import assert_refused, paint
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
@@ -48,7 +49,7 @@ def test_every_command_explains_itself(command):
 def test_version():
     done = paint('--version')
     assert done.returncode == 0
-    assert done.stdout.startswith('paint ')
+    assert done.stdout.split()[:2] == ['paint', paint_deposition.__version__]
 
 
 def test_a_command_that_is_none_is_refused_with_the_nearest():

@@ -49,6 +49,7 @@ def shapeless():
     return fields, [random.normal(size=(READINGS, 4))]
 
 
+@pytest.mark.slow
 def test_the_p_value_is_uniform_where_nothing_is_missing(sensitivities, shapeless, monkeypatch):
     """With the noise known, and estimated with 15 degrees of freedom."""
     monkeypatch.setattr(model_space, 'DRAWS', 99)

@@ -26,6 +26,8 @@ from paint_deposition.fitting.study import TEXTURE_SHARE
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.readings.campaign import Campaign, Experiment
 
+pytestmark = pytest.mark.slow
+
 BASE = DepositionModel()
 PATH, _ = spray_path(passes((0.3, 1.1, 0.7, 1.5), samples=80))
 LIBRARY = {effect.id: effect for effect in (FogGradient, FlowDrift, AirDrift)}

@@ -61,6 +61,7 @@ def test_an_import_of_what_never_was_is_the_files_to_correct(own):
         load_effect_file(path)
 
 
+@pytest.mark.slow
 def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     path = own(
         ('* ray.speed_m_per_s', '* ray.standoff_ratio'),

@@ -105,6 +105,7 @@ def test_variants_have_files_of_their_own_so_that_processes_cannot_swap_them(emp
         assert sum(loaded.stats.cache_hits.values()) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('empty_cache')
 def test_a_kernel_that_another_process_compiled_is_found_again():
     """Fails where a release of Numba keeps compiled code by other rules than the name."""

@@ -15,6 +15,8 @@ from paint_deposition.model.projection import Projection
 from paint_deposition.results.fitted_model import write_fitted
 from small_campaign import small_campaign
 
+pytestmark = pytest.mark.slow
+
 BY_HAND = 0.3012345678901234
 
 

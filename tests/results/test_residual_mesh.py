@@ -14,6 +14,7 @@ from paint_deposition.results.residual_mesh import file_name, write_residual_mes
 from small_campaign import small_campaign
 
 
+@pytest.mark.slow
 def test_residuals_surround_their_readings_and_the_rest_is_grey(tmp_path):
     study = Study.of(small_campaign(tmp_path / 'campaign'))
     comparison = compare(study, DepositionModel())
