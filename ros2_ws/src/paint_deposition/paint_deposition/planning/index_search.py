@@ -68,20 +68,16 @@ class IndexCurve:
         """Intervals of the index in the range within which sigma_n keeps to the tolerance."""
         knots = [(float(i), float(s)) for i, s in zip(self.index_m, self.sigma_n, strict=True)]
         knots = sorted(knots + [(m.index_m, m.sigma_n) for m in self.minima])
-        windows: list[tuple[float, float]] = []
-        start = knots[0][0] if knots[0][1] <= tolerance else None
-        for (left, before), (right, after) in pairwise(knots):
-            if (before <= tolerance) == (after <= tolerance):
-                continue
-            crossing = _crossing_at(self.parallel.sigma_n, left, right, tolerance)
-            if start is None:
-                start = crossing
-            else:
-                windows.append((start, crossing))
-                start = None
-        if start is not None:
-            windows.append((start, knots[-1][0]))
-        return windows
+        ends = [
+            _crossing_at(self.parallel.sigma_n, left, right, tolerance)
+            for (left, before), (right, after) in pairwise(knots)
+            if (before <= tolerance) != (after <= tolerance)
+        ]
+        if knots[0][1] <= tolerance:
+            ends.insert(0, knots[0][0])
+        if knots[-1][1] <= tolerance:
+            ends.append(knots[-1][0])
+        return list(zip(ends[::2], ends[1::2], strict=True))
 
 
 def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:

@@ -45,28 +45,26 @@ def trajectory_of(
 
     Every pass and every transfer between passes starts and ends at rest, with trapezoidal speed.
     """
-    stamps, positions, rotations, triggers = [], [], [], []
+    legs: list[_Leg] = []
+    triggers = []
     clock = 0.0
     for number, planned in enumerate(passes):
         if number:
-            leg = _transfer(passes[number - 1], planned, style, rate_hz)
-            stamps.append(clock + leg.sample_s)
-            positions.append(leg.positions_m)
-            rotations.append(leg.quaternions)
-            clock += leg.duration_s
+            legs.append(_transfer(clock, passes[number - 1], planned, style, rate_hz))
+            clock += legs[-1].duration_s
         ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
-        leg = _followed(planned, ramp, rate_hz)
-        stamps.append(clock + leg.sample_s)
-        positions.append(leg.positions_m)
-        rotations.append(leg.quaternions)
         triggers += [clock + ramp.time_at_s(planned.on_m), clock + ramp.time_at_s(planned.off_m)]
-        clock += leg.duration_s
-    stamps_ns = start_ns + np.round(np.concatenate(stamps) * 1e9).astype(np.int64)
+        times = _sample_times(ramp.duration_s, rate_hz)
+        poses = _poses_at(planned, ramp.way_at_m(times))
+        legs.append(_Leg(clock + times, *poses, ramp.duration_s))
+        clock += ramp.duration_s
+    stamps_s = np.concatenate([leg.stamps_s for leg in legs])
+    stamps_ns = start_ns + np.round(stamps_s * 1e9).astype(np.int64)
     forward = np.append(True, np.diff(stamps_ns) > 0)
     return Trajectory(
         stamps_ns=stamps_ns[forward],
-        positions_m=np.concatenate(positions)[forward],
-        quaternions_xyzw=np.concatenate(rotations)[forward],
+        positions_m=np.concatenate([leg.positions_m for leg in legs])[forward],
+        quaternions_xyzw=np.concatenate([leg.quaternions for leg in legs])[forward],
         frame_id=frame_id,
         trigger_stamps_ns=start_ns + np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
@@ -81,19 +79,17 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Pla
         between = planned.along_m[inside][WAYPOINTS_PER_MOVE::WAYPOINTS_PER_MOVE].tolist()
         stops = [0.0, planned.on_m, *between, planned.off_m, float(planned.along_m[-1])]
         positions, quaternions = _poses_at(planned, np.array(stops))
-        for k, (position, quaternion) in enumerate(zip(positions, quaternions, strict=True)):
-            transfer = k == 0
-            speed = _transfer_speed(style) if transfer else planned.speed_m_per_s
-            spraying = 2 <= k < len(stops) - 1
-            moves.append(PlannedMove(position, quaternion, speed, spraying))
+        for k, pose in enumerate(zip(positions, quaternions, strict=True)):
+            speed = planned.speed_m_per_s if k else _transfer_speed(style)
+            moves.append(PlannedMove(*pose, speed, spraying=2 <= k < len(stops) - 1))
     return moves
 
 
 @dataclass(frozen=True)
 class _Leg:
-    """A timed stretch: samples with their times from its start, and how long it takes."""
+    """A timed stretch: samples with their times, and how long it takes."""
 
-    sample_s: np.ndarray
+    stamps_s: np.ndarray
     positions_m: np.ndarray
     quaternions: np.ndarray
     duration_s: float
@@ -130,13 +126,9 @@ class _Ramp:
         return 0.5 * self.rise_s + way_m / self.speed
 
 
-def _followed(planned: PlannedPass, ramp: _Ramp, rate_hz: float) -> _Leg:
-    times = _sample_times(ramp.duration_s, rate_hz)
-    positions, quaternions = _poses_at(planned, ramp.way_at_m(times))
-    return _Leg(times, positions, quaternions, ramp.duration_s)
-
-
-def _transfer(before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float) -> _Leg:
+def _transfer(
+    start_s: float, before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float
+) -> _Leg:
     """Straight from the end of a pass to the start of the next, turning evenly with the travel."""
     start, end = before.positions_m[-1], after.positions_m[0]
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
@@ -151,7 +143,8 @@ def _transfer(before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz
     if length > 0.0:
         share = ramp.way_at_m(share * ramp.duration_s) / length
     positions = start + share[:, np.newaxis] * (end - start)
-    return _Leg(times, positions, Slerp([0.0, 1.0], turn)(share).as_quat(), duration)
+    quaternions = Slerp([0.0, 1.0], turn)(share).as_quat()
+    return _Leg(start_s + times, positions, quaternions, duration)
 
 
 def _transfer_speed(style: PassStyle) -> float:

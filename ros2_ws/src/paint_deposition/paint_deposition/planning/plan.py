@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -74,18 +74,9 @@ class PlanRequest:
         Raises:
             PlanError: a value is impossible.
         """
-        return Request(
-            speed_m_per_s=self.speed_m_per_s,
-            target_um=self.target_um,
-            index_min_m=self.index_min_m,
-            index_max_m=self.index_max_m,
-            tolerance=self.tolerance,
-            width_m=width_m,
-            length_m=length_m,
-            one_way=self.one_way,
-            standoff_m=self.standoff_m,
-            travel_rad=self.travel_rad,
-        )
+        shared = {item.name for item in fields(Request)} & vars(self).keys()
+        asked = {name: getattr(self, name) for name in shared}
+        return Request(**asked, width_m=width_m, length_m=length_m)
 
 
 @dataclass(frozen=True)
@@ -180,18 +171,18 @@ def plan(
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    axes = pass_axes(surface, request.direction, _vector(request.outward))
+    axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
-    (first, last), extent = surface_map.extent_m
-    height = float(extent[1] - extent[0])
-    plane = recommend(model, request.for_plane(height, float(last - first)))
+    painted, area = surface_map.painted, surface.vertex_areas_m2[surface_map.painted]
+    (left, right), ends = surface_map.extent_m.tolist()
+    height = ends[1] - ends[0]
+    plane = recommend(model, request.for_plane(height, right - left))
     index_range = _index_range(request, plane)
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
         lambda share: progress('single passes', share),
     )  # fmt: skip
-    ends = float(extent[0]), float(extent[1])
     placing = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
     on_part = centred(films, ends, count, plane.index_m)
@@ -204,22 +195,17 @@ def plan(
         film, emitted = _simulated(
             surface, model, trajectory, lambda share: progress('film', share)
         )
-        mean, sigma_n = _evenness(
-            film[surface_map.painted], surface.vertex_areas_m2[surface_map.painted]
-        )
+        mean, sigma_n = _evenness(film[painted], area)
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     statistics = film_statistics(
-        film[surface_map.painted],
-        surface.vertex_areas_m2[surface_map.painted],
-        emitted,
-        target_um=request.target_um or 0.0,
-        target_tolerance_um=0.1 * (request.target_um or 0.0),
-    )
+        film[painted], area, emitted,
+        target_um=request.target_um or 0.0, target_tolerance_um=0.1 * (request.target_um or 0.0),
+    )  # fmt: skip
     return Plan(
-        surface, request, style, placing, passes, trajectory, film, surface_map.painted,
+        surface, request, style, placing, passes, trajectory, film, painted,
         statistics, sigma_n, plane, on_part,
     )  # fmt: skip
 
@@ -269,7 +255,3 @@ def _evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
     weight = area_m2 / area_m2.sum()
     mean = float(weight @ film_um)
     return mean, math.sqrt(float(weight @ (film_um - mean) ** 2)) / mean
-
-
-def _vector(values: tuple[float, float, float] | None) -> np.ndarray | None:
-    return None if values is None else np.asarray(values, dtype=float)

@@ -54,15 +54,9 @@ class PassSetup:
         """Endlessly many of these passes at a speed [m/s]."""
         options = {'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad}
         first = sampled_collapse(model, speed_m_per_s, **options)
-        if self.one_way:
-            return ParallelPasses.one_way(first)
-        if not model.effects:
-            return (
-                ParallelPasses(first, first.mirrored())
-                if self.gun_turns
-                else ParallelPasses.one_way(first)
-            )
         # An effect may tell forth from back, or up from down.
+        if self.one_way or not (self.gun_turns or model.effects):
+            return ParallelPasses.one_way(first)
         second = sampled_collapse(
             model, speed_m_per_s, backwards=True, turned=self.gun_turns, **options
         )

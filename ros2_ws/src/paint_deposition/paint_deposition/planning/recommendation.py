@@ -103,30 +103,12 @@ class Recommendation:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
+        figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'setup')}
+        assumed = ('travel', 'gun_turns', 'travel_rad', 'standoff_m', 'assumption')
         return {
-            'index_m': self.index_m,
-            'sigma_n': self.sigma_n,
-            'index_range_m': list(self.index_range_m),
-            'tolerance': self.tolerance,
-            'windows_m': [list(window) for window in self.windows_m],
-            'minima': [{'index_m': m.index_m, 'sigma_n': m.sigma_n} for m in self.minima],
-            'mean_um': self.mean_um,
-            'speed_m_per_s': self.speed_m_per_s,
-            'target_um': self.target_um,
-            'passes': self.passes,
-            'cycle_time_s': self.cycle_time_s,
-            'width_m': self.width_m,
-            'length_m': self.length_m,
-            'sigma_n_over_width': self.sigma_n_over_width,
-            'travel': self.travel,
-            'gun_turns': self.setup.gun_turns,
-            'travel_rad': self.setup.travel_rad,
-            'standoff_m': self.setup.standoff_m,
-            'half_width_m': self.half_width_m,
-            'index_drift_m': self.index_drift_m and list(self.index_drift_m),
-            'standoff_drift_m': self.standoff_drift_m and list(self.standoff_drift_m),
-            'assumption': self.setup.assumption,
-            'notes': list(self.notes),
+            **figures,
+            **{name: getattr(self.setup, name) for name in assumed},
+            'minima': [vars(minimum) for minimum in self.minima],
             'curve': {
                 'index_m': self.curve.index_m.tolist(),
                 'sigma_n': self.curve.sigma_n.tolist(),
@@ -249,7 +231,8 @@ def _notes(
 ) -> list[str]:
     notes = [setup.assumption]
     if not setup.one_way:
-        there = _held_otherwise(model, setup, curve.parallel, speed).sigma_n(best.index_m)
+        otherwise = replace(setup, gun_turns=not setup.gun_turns)
+        there = otherwise.parallel_passes(model, speed).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
             how = (
                 'keeping its orientation'
@@ -274,19 +257,6 @@ def _notes(
     if on_film:
         notes.append(f'left out, for they act on the finished film: {", ".join(on_film)}')
     return notes
-
-
-def _held_otherwise(
-    model: DepositionModel, setup: PassSetup, parallel: ParallelPasses, speed: float
-) -> ParallelPasses:
-    if model.effects:
-        return replace(setup, gun_turns=not setup.gun_turns).parallel_passes(model, speed)
-    first = parallel.first
-    return (
-        ParallelPasses.one_way(first)
-        if setup.gun_turns
-        else ParallelPasses(first, first.mirrored())
-    )
 
 
 def _acts_on_film(effect: Effect) -> bool:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
@@ -55,7 +56,7 @@ class PassAxes:
 
 
 def pass_axes(
-    surface: Surface, direction: str = 'horizontal', outward: np.ndarray | None = None
+    surface: Surface, direction: str = 'horizontal', outward: ArrayLike | None = None
 ) -> PassAxes:
     """Axes for horizontal or vertical passes.
 
@@ -123,17 +124,18 @@ class SurfaceMap:
         count = np.ceil((high - low) / cell).astype(int) + 1
         self._lines = [low[k] + cell * np.arange(count[k]) for k in range(2)]
         self._cell_m = cell
-        fields = self._smoothed(weight)
-        self._splines = [RectBivariateSpline(*self._lines, field) for field in fields]
+        # Outside their grid splines keep the values of its border.
+        self._splines = [
+            RectBivariateSpline(*self._lines, field) for field in self._smoothed(weight)
+        ]
 
     def height_m(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
         """(N,) smoothed coordinate along outward [m]."""
-        return self._splines[0].ev(*self._held(travel_m, across_m))
+        return self._splines[0].ev(travel_m, across_m)
 
     def normals(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
         """(N, 3) unit normals of the smoothed surface, in the part's frame."""
-        place = self._held(travel_m, across_m)
-        slopes = [spline.ev(*place) for spline in self._splines[1:]]
+        slopes = [spline.ev(travel_m, across_m) for spline in self._splines[1:]]
         normals = np.stack([-slopes[0], -slopes[1], np.ones(len(slopes[0]))], axis=1)
         return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes.matrix.T
 
@@ -149,12 +151,6 @@ class SurfaceMap:
         distance = np.abs(self.surface_m[:, 1] - across_m)
         near = self.surface_m[distance <= max(band_m, distance.min() + self._cell_m), 0]
         return float(near.min()), float(near.max())
-
-    def _held(self, travel_m: np.ndarray, across_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return (
-            np.clip(travel_m, self._lines[0][0], self._lines[0][-1]),
-            np.clip(across_m, self._lines[1][0], self._lines[1][-1]),
-        )
 
     def _smoothed(self, weight: np.ndarray) -> list[np.ndarray]:
         """Height and both slopes on the grid, by planes fitted with Gaussian weights."""
