@@ -3,10 +3,9 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from paint_deposition.part.edge_distance import without_seams
+from paint_deposition.part.groups import connected
 from paint_deposition.part.hems import hem_folds
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 
@@ -51,23 +50,26 @@ def next_half_edge(half_edges: np.ndarray) -> np.ndarray:
     return half_edges - half_edges % 3 + (half_edges + 1) % 3
 
 
+def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(3 F, 2, 3) ends of all half-edges [m]."""
+    return vertices_m[np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)]
+
+
 def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
     """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
     normals = face_normals(vertices_m, faces)
     one, other = normals[edges.paired[:, 0] // 3], normals[edges.paired[:, 1] // 3]
-    along = vertices_m[np.roll(faces, -1, axis=1).ravel()] - vertices_m[faces.ravel()]
+    start, end = half_edges_m(vertices_m, faces)[edges.paired[:, 0]].transpose(1, 0, 2)
     turning = np.cross(one, other)
     angle = np.arctan2(np.linalg.norm(turning, axis=1), np.einsum('ij,ij->i', one, other))
-    convex = np.einsum('ij,ij->i', turning, along[edges.paired[:, 0]]) >= 0.0
+    convex = np.einsum('ij,ij->i', turning, end - start) >= 0.0
     return np.where(convex, angle, -angle)
 
 
 def rim_folds(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
     """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem."""
     folds = folds_rad(vertices_m, faces, edges)
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    half_edge = edges.paired[:, 0]
-    ends = np.stack([vertices_m[start[half_edge]], vertices_m[end[half_edge]]], axis=1)
+    ends = half_edges_m(vertices_m, faces)[edges.paired[:, 0]]
     area = face_areas_m2(vertices_m, faces)[edges.paired // 3].min(axis=1)
     width = 2.0 * area / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     return (folds >= RIM_FOLD_RAD) | hem_folds(ends, folds, width, RIM_FOLD_RAD)
@@ -84,12 +86,8 @@ def split_at_creases(
     sharp = np.abs(folds_rad(vertices_m, faces, edges)) > CREASE_RAD
     smooth = edges.paired[~sharp & ~rim]
     one, other = smooth.T
-    joined = np.concatenate(
-        [np.stack([one, next_half_edge(other)]), np.stack([next_half_edge(one), other])], axis=1
-    )
-    corners = faces.size
-    links = coo_matrix((np.ones(joined.shape[1]), joined), shape=(corners, corners))
-    count, label = connected_components(links, directed=False)
+    joined = [[one, next_half_edge(other)], [next_half_edge(one), other]]
+    count, label = connected(np.concatenate(joined, axis=1).T, faces.size)
     origin = np.empty(count, dtype=np.int64)
     origin[label] = faces.ravel()
     return origin, label.reshape(-1, 3).astype(np.int64)
@@ -99,9 +97,5 @@ def rim_segments_m(
     vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, rim: np.ndarray
 ) -> np.ndarray:
     """(B, 2, 3) ends of segments where the surface ends or, at (E,) ``rim``, folds back [m]."""
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-
-    def segments(half_edges: np.ndarray) -> np.ndarray:
-        return np.stack([vertices_m[start[half_edges]], vertices_m[end[half_edges]]], axis=1)
-
-    return np.concatenate([without_seams(segments(edges.single)), segments(edges.paired[rim, 0])])
+    ends = half_edges_m(vertices_m, faces)
+    return np.concatenate([without_seams(ends[edges.single]), ends[edges.paired[rim, 0]]])

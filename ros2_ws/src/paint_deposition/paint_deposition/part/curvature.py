@@ -1,9 +1,9 @@
 """Signed curvature of the surface, from how its normals turn within a physical radius."""
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from paint_deposition.part.creases import RIM_FOLD_RAD
+from paint_deposition.part.groups import near_pairs
 
 RADIUS_M = 0.03
 # Surface whose normal points further away than this is another side of the part.
@@ -11,7 +11,6 @@ OTHER_SIDE_COSINE = -0.25
 # Surface that has turned so far away from the gun within the radius lies round a rim.
 RIM_COSINE = np.cos(RIM_FOLD_RAD)
 SAME_PLACE_M = 1e-6
-BLOCK = 4096
 
 
 def curvature_per_m(
@@ -39,18 +38,12 @@ def curvature_per_m(
         surface_m, surface_normals, surface_areas_m2: (S, 3), (S, 3), (S,) samples of the surface.
         radius_m: of the neighbourhood [m].
     """
-    tree = cKDTree(surface_m)
     result = np.empty(len(points_m))
-    for start in range(0, len(points_m), BLOCK):
-        block = slice(start, start + BLOCK)
-        near = cKDTree(points_m[block]).sparse_distance_matrix(
-            tree, radius_m, output_type='ndarray'
-        )
-        i, j = near['i'], near['j']
+    for block, i, j, distance_m in near_pairs(points_m, surface_m, radius_m):
         offset = surface_m[j] - points_m[block][i]
         same_side = _same_side(normals[block][i], surface_normals[j], offset)
         i, j, offset = i[same_side], j[same_side], offset[same_side]
-        weight = surface_areas_m2[j] * (1.0 - (near['v'][same_side] / radius_m) ** 2) ** 2
+        weight = surface_areas_m2[j] * (1.0 - (distance_m[same_side] / radius_m) ** 2) ** 2
         axes = tangents(normals[block])
         place = np.einsum('kni,ni->kn', axes[:, i], offset)
         lean = np.einsum('kni,ni->kn', axes[:, i], surface_normals[j])

@@ -3,6 +3,7 @@
 import numpy as np
 from scipy.spatial import cKDTree
 
+# Pieces of edges so short that the nearest has one of the nearest middles [m].
 PIECE_M = 0.002
 CANDIDATES = 4
 # Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
@@ -14,7 +15,7 @@ def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
     """(N,) straight distance to the nearest of the (B, 2, 3) rim segments, inf without any [m]."""
     if not len(rim_m):
         return np.full(len(points_m), np.inf)
-    pieces = _cut(rim_m)[0]
+    pieces = cut_segments(rim_m, PIECE_M)[0]
     near = cKDTree(pieces.mean(axis=1)).query(points_m, k=min(CANDIDATES, len(pieces)))[1]
     near = near.reshape(len(points_m), -1)
     return _distance_m(points_m[:, None, :], pieces[near]).min(axis=1)
@@ -29,7 +30,7 @@ def without_seams(segments_m: np.ndarray) -> np.ndarray:
     """
     if not len(segments_m):
         return segments_m
-    pieces, segment = _cut(segments_m)
+    pieces, segment = cut_segments(segments_m, PIECE_M)
     middles = segments_m.mean(axis=1)
     reach_m = 0.5 * PIECE_M + SEAM_M
     near = cKDTree(middles).sparse_distance_matrix(
@@ -54,10 +55,10 @@ def _distance_m(points_m: np.ndarray, segments_m: np.ndarray) -> np.ndarray:
     return np.linalg.norm(way - share[..., None] * along, axis=-1)
 
 
-def _cut(segments_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Pieces so short that the nearest has one of the nearest middles, and whose they are."""
+def cut_segments(segments_m: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Equal pieces (P, 2, 3) no longer than wanted of (B, 2, 3) segments, and (P,) whose."""
     along = segments_m[:, 1] - segments_m[:, 0]
-    count = np.maximum(1, np.ceil(np.linalg.norm(along, axis=1) / PIECE_M)).astype(int)
+    count = np.maximum(1, np.ceil(np.linalg.norm(along, axis=1) / longest_m)).astype(int)
     segment = np.repeat(np.arange(len(segments_m)), count)
     step = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
     ends = (step[:, None] + np.array([0.0, 1.0])) / count[segment][:, None]

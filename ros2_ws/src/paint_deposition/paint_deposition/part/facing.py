@@ -25,11 +25,6 @@ class Facing:
     back: int
     past: int
 
-    @property
-    def reversed(self) -> bool:
-        """Whether most poses that look at the part look at its back."""
-        return self.back > self.front
-
 
 def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:
     """Count what the gun looks at.
@@ -38,9 +33,7 @@ def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Fac
         positions_m: (N, 3) TCP [m]; long recordings are thinned to MAX_POSES.
         z_axes: (N, 3) tool z, from the bell to the surface.
     """
-    normals, axes, past = _met(surface, positions_m, z_axes)
-    front = int(np.sum(np.einsum('ij,ij->i', normals, axes) < 0.0))
-    return Facing(front, len(normals) - front, past)
+    return _met(surface, positions_m, z_axes)[0]
 
 
 def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
@@ -56,12 +49,10 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
         The surface itself if it faces the gun; turned and with a note, since it would stay bare,
         if most poses that look at it look at its back; else with another outward side.
     """
-    normals, axes, _ = _met(surface, positions_m, z_axes)
-    away = np.einsum('ij,ij->i', normals, axes) >= 0.0
-    back, front = int(away.sum()), int(np.sum(~away))
-    if back > front:
+    seen, axes = _met(surface, positions_m, z_axes)
+    if seen.back > seen.front:
         note = (
-            f'{back} of {back + front} poses look at the back of the mesh: its '
+            f'{seen.back} of {seen.back + seen.front} poses look at the back of the mesh: its '
             'triangles were turned round'
         )
         surface = replace(
@@ -82,11 +73,12 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
 
 def _met(
     surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """Normals (M, 3) where poses look at the surface, their tool z (M, 3), and how many miss."""
+) -> tuple[Facing, np.ndarray]:
+    """What poses look at, and tool z (M, 3) of those that look at the surface."""
     some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
     positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
     face = surface.occluder.first_faces(positions_m, z_axes)
     met = face >= 0
     normals = face_normals(surface.vertices_m, surface.faces[face[met]])
-    return normals, z_axes[met], int(np.sum(~met))
+    front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
+    return Facing(front, len(normals) - front, int(np.sum(~met))), z_axes[met]

@@ -1,11 +1,10 @@
 """Hems and rounded rims: strips where the surface turns away within a sheet's thickness."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
-from paint_deposition.part.refinement import face_areas_m2
+from paint_deposition.part.edge_distance import cut_segments
+from paint_deposition.part.groups import connected, near_pairs
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
@@ -15,7 +14,6 @@ WIDEST_STRIP_M = 0.02
 LEAST_FOLD_RAD = np.radians(4.0)
 PIECE_M = 0.005
 PARALLEL_COSINE = 0.8
-BLOCK = 4096
 
 
 def hem_folds(
@@ -37,19 +35,13 @@ def hem_folds(
     along = ends_m[rows, 1] - ends_m[rows, 0]
     length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
     along = along / length[:, None]
-    count = np.maximum(1, np.ceil(length / PIECE_M)).astype(int)
-    whose = np.repeat(np.arange(len(rows)), count)
-    step = np.arange(len(whose)) - np.repeat(np.cumsum(count) - count, count)
-    half = 0.5 * (length / count)[whose]
-    middle = ends_m[rows, 0][whose] + ((2 * step + 1) * half)[:, None] * along[whose]
+    pieces, whose = cut_segments(ends_m[rows], PIECE_M)
+    half = 0.5 * (length / np.bincount(whose))[whose]
+    middle = pieces.mean(axis=1)
     fold = folds_rad[rows]
-    tree = cKDTree(middle)
     turn = fold[whose]
-    for start in range(0, len(middle), BLOCK):
-        near = cKDTree(middle[start : start + BLOCK]).sparse_distance_matrix(
-            tree, REACH_M, output_type='ndarray'
-        )
-        i, j = near['i'] + start, near['j']
+    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
+        i = i + block.start
         parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
         beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
         i, j = i[beside], j[beside]
@@ -73,8 +65,7 @@ def strip_vertices(
         hem_half_edges: (H,) both half-edges of each fold of a hem, as numbered by ``Edges``.
     """
     patch = _patch_of_vertex(patches, len(vertices_m))
-    ends = vertices_m[patches], vertices_m[np.roll(patches, -1, axis=1)]
-    length_m = np.linalg.norm(ends[1] - ends[0], axis=2).ravel()[hem_half_edges]
+    length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
     of_face = patch[patches[:, 0]]
     border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
     area = np.bincount(of_face, face_areas_m2(vertices_m, patches), minlength=patch.max() + 1)
@@ -89,6 +80,4 @@ def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarra
 
 
 def _patch_of_vertex(faces: np.ndarray, count: int) -> np.ndarray:
-    linked = np.concatenate([faces[:, :2], faces[:, 1:]]).T
-    links = coo_matrix((np.ones(linked.shape[1]), linked), shape=(count, count))
-    return connected_components(links, directed=False)[1]
+    return connected(np.concatenate([faces[:, :2], faces[:, 1:]]), count)[1]

@@ -40,11 +40,8 @@ def mean_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
         np.linalg.norm(np.cross(ahead, behind), axis=2), np.einsum('ijk,ijk->ij', ahead, behind)
     )
     weighted = angle[:, :, None] * face_normals(vertices_m, faces)[:, None, :]
-    summed = np.empty((len(vertices_m), 3))
-    for axis in range(3):
-        summed[:, axis] = np.bincount(
-            faces.ravel(), weighted[:, :, axis].ravel(), minlength=len(vertices_m)
-        )
+    summed = np.zeros((len(vertices_m), 3))
+    np.add.at(summed, faces, weighted)
     return summed / np.maximum(np.linalg.norm(summed, axis=1, keepdims=True), 1e-12)
 
 

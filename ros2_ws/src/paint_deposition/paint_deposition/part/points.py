@@ -63,7 +63,9 @@ class SurfacePoints:
             'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
             'edge_distance_m': _default(edge_distance_m, lambda: np.full(count, np.inf)),
             'sky_view_factor': _default(sky_view_factor, lambda: np.ones(count)),
-            'height_fraction': _default(height_fraction, self._own_height_fraction),
+            'height_fraction': _default(
+                height_fraction, lambda: heights(self.positions_m, self.positions_m, self.down)
+            ),
             'slope_per_m': _default(slope_per_m, lambda: csr_matrix((count, count))),
         }
 
@@ -134,17 +136,19 @@ class SurfacePoints:
             value = self._covariates[name] = value()
         return value
 
-    def _own_height_fraction(self) -> np.ndarray:
-        height = -self.positions_m @ self.down
-        extent = np.ptp(height) if len(height) else 0.0
-        return (height - height.min()) / extent if extent > 0 else np.zeros(len(height))
-
 
 def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
     """(3,) centre of the bounding box of (V, 3) points [m]."""
     if not len(positions_m):
         return np.zeros(3)
     return 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
+
+
+def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """(N,) heights of (N, 3) positions, 0 at the lowest of (V, 3) others to 1 at the highest."""
+    height, others = -positions_m @ down, -among_m @ down
+    extent = np.ptp(others) if len(others) else 0.0
+    return (height - others.min()) / extent if extent else np.zeros(len(height))
 
 
 def _default(given: Any, otherwise: Callable[[], Any]) -> Any:

@@ -1,11 +1,10 @@
 """From the triangles of a file to a conforming mesh of bounded edge length."""
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from paint_deposition.errors import MeshError
+from paint_deposition.part.groups import connected
 from paint_deposition.part.slivers import CutEdges, cut_edges, cut_slivers, find_slivers
 
 WELD_M = 1e-6
@@ -19,20 +18,12 @@ def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     Returns:
         Vertices (V, 3) [m] in the order in which they first appear, and faces (F, 3) on them.
     """
-    unique, first, label = np.unique(vertices_m, axis=0, return_index=True, return_inverse=True)
-    label = label.ravel()
+    unique, label = np.unique(vertices_m, axis=0, return_inverse=True)
     close = cKDTree(unique).query_pairs(WELD_M, output_type='ndarray')
-    if len(close):
-        links = coo_matrix((np.ones(len(close)), close.T), shape=(len(unique), len(unique)))
-        count, group = connected_components(links, directed=False)
-        label = group[label]
-        lowest = np.full(count, len(vertices_m))
-        np.minimum.at(lowest, group, first)
-        first = lowest
+    group = connected(close, len(unique))[1][label.ravel()]
+    first = np.unique(group, return_index=True)[1]
     order = np.argsort(first)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order))
-    return vertices_m[first[order]], rank[label][faces]
+    return vertices_m[first[order]], np.argsort(order)[group][faces]
 
 
 def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -44,6 +35,12 @@ def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) unit normals by the right-hand rule."""
     vectors = _face_vectors(vertices_m, faces)
     return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+
+def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F, 3) lengths of the edges from each corner to the next [m]."""
+    corners = vertices_m[faces]
+    return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
 
 
 def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -212,8 +209,7 @@ def _halves(vertices_m: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _refuse_too_many(vertices_m: np.ndarray, faces: np.ndarray, edge_m: float) -> None:
-    corners = vertices_m[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = edge_lengths_m(vertices_m, faces).max(axis=1)
     # Halving ends between half the length and the length: up to 8 triangles an edge squared.
     by_area = 8.0 * face_areas_m2(vertices_m, faces) / edge_m**2
     expected = float(np.maximum(np.maximum(by_area, 4.0 * longest / edge_m), 1.0).sum())

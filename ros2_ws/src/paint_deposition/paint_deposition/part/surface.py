@@ -11,8 +11,8 @@ from paint_deposition.part import creases, curvature, edge_distance, hems, slope
 from paint_deposition.part.locating import Location, SurfaceLocator
 from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
-from paint_deposition.part.points import SurfacePoints, box_centre_m
-from paint_deposition.part.refinement import face_areas_m2, refine
+from paint_deposition.part.points import SurfacePoints, box_centre_m, heights
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine
 from paint_deposition.part.visibility import Occluder
 
 # A gun whose mean direction is shorter has turned to more sides of the part than one.
@@ -103,10 +103,8 @@ class Surface:
     @cached_property
     def mesh_id(self) -> str:
         """Digest of the refined mesh: the same for the same vertices and faces in one order."""
-        digest = hashlib.sha256()
-        digest.update(self.vertices_m.astype('<f8').tobytes())
-        digest.update(self.faces.astype('<i8').tobytes())
-        return digest.hexdigest()[:16]
+        content = self.vertices_m.astype('<f8').tobytes() + self.faces.astype('<i8').tobytes()
+        return hashlib.sha256(content).hexdigest()[:16]
 
     @property
     def area_m2(self) -> float:
@@ -190,7 +188,7 @@ class Surface:
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
             'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
             'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),
-            'height_fraction': lambda: self._height_fraction(positions_m),
+            'height_fraction': lambda: heights(positions_m, self.vertices_m, self.down),
         }
 
     @cached_property
@@ -206,8 +204,7 @@ class Surface:
     @cached_property
     def longest_edge_m(self) -> float:
         """Longest edge after refinement [m]."""
-        corners = self.vertices_m[self.faces]
-        return float(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max())
+        return float(edge_lengths_m(self.vertices_m, self.faces).max())
 
     def _curvature_per_m(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         centre_normals = self.normals[self.faces].sum(axis=1)
@@ -224,8 +221,3 @@ class Surface:
             np.concatenate([vertex_areas, areas]),
             max(curvature.RADIUS_M, self.longest_edge_m),
         )
-
-    def _height_fraction(self, positions_m: np.ndarray) -> np.ndarray:
-        heights = -self.vertices_m @ self.down
-        lowest, extent = heights.min(), np.ptp(heights)
-        return (-positions_m @ self.down - lowest) / extent if extent else 0.0 * positions_m[:, 0]
