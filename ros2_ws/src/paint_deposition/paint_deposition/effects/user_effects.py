@@ -5,6 +5,7 @@ import hashlib
 import inspect
 import re
 import sys
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -119,12 +120,9 @@ def _new_place(error: Exception) -> str | None:
 def _line_in(error: Exception, path: Path) -> str:
     if isinstance(error, SyntaxError):
         return f', line {error.lineno}'
-    traceback, number = error.__traceback__, None
-    while traceback is not None:
-        if traceback.tb_frame.f_code.co_filename == str(path):
-            number = traceback.tb_lineno
-        traceback = traceback.tb_next
-    return f', line {number}' if number else ''
+    frames = traceback.extract_tb(error.__traceback__)
+    numbers = [frame.lineno for frame in frames if frame.filename == str(path)]
+    return f', line {numbers[-1]}' if numbers else ''
 
 
 def _one_line(error: Exception) -> str:

@@ -4,7 +4,7 @@ import copy
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numba
 import numpy as np
@@ -16,6 +16,7 @@ from paint_deposition.kernel.accumulation import compile_kernel
 from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 Precision = Literal['single', 'double']
 # Lines of sight are traced anew after this travel of the emission point [m].
@@ -26,14 +27,6 @@ BATCH = 2048
 _KERNEL_LOCK = threading.Lock()
 # Fewer rays, points times sub-steps, are painted before other threads wake.
 FEW_RAYS = 500_000
-
-
-class Occluder(Protocol):
-    """Anything that can tell which points are seen from where."""
-
-    def visible(self, origins_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
-        """(S, V) bool: whether each point (V, 3) is seen from each origin (S, 3)."""
-        ...
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from operator import attrgetter
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator, Occluder, Precision
+from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.motion.motion_log import (
     DEFAULT_LIMIT_POSES,
     MotionLog,
@@ -19,6 +19,7 @@ from paint_deposition.motion.motion_log import (
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change so much older than the newest pose is from a stream that begins again [ns].

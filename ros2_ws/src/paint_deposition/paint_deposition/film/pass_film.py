@@ -61,13 +61,12 @@ def collapse_um(
     for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')
-    x = np.asarray(x_m, dtype=float)
     if model.effects:
         way = -1.0 if backwards else 1.0
         roll = travel_rad + (math.pi if turned else 0.0)
-        return pass_film_um(model, x, way * speed_m_per_s, standoff, roll)
+        return pass_film_um(model, x_m, way * speed_m_per_s, standoff, roll)
     shrinking = model.projection.model_plane_m / (standoff + model.projection.emission_offset_m)
-    across = -shrinking * x if turned else shrinking * x
+    across = (-shrinking if turned else shrinking) * x_m
     return shrinking / speed_m_per_s * line_integral_um_m_per_s(model.planar, across, travel_rad)
 
 
@@ -76,8 +75,7 @@ def sampled_collapse(
 ) -> SampledCollapse:
     """``collapse_um`` sampled finely enough for sums over passes; options as there."""
     standoff = options.get('standoff_m') or model.projection.nominal_standoff_m
-    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
-    widening = max((standoff + offset) / omega, 1e-6)
+    widening = max(_widening(model, standoff), 1e-6)
     reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
     count = math.ceil(2.0 * reach / finest * SAMPLES_PER_SIGMA)
@@ -103,11 +101,10 @@ def pass_film_um(
         standoff_m: TCP to plane [m].
         roll_rad: direction of forward travel in the tool's x-y frame [rad].
     """
-    x = np.atleast_1d(x_m)
-    points = SurfacePoints(x[:, None] * ACROSS, np.tile(OUTWARD, (len(x), 1)))
+    points = SurfacePoints(x_m[:, None] * ACROSS, np.tile(OUTWARD, (len(x_m), 1)))
     integrator = FilmIntegrator(points, model, precision='double')
     integrator.add(_straight_pass(model, velocity_m_per_s, standoff_m, roll_rad))
-    return integrator.raw_um.reshape(np.shape(x_m))
+    return integrator.raw_um
 
 
 def _straight_pass(
@@ -130,10 +127,15 @@ def _straight_pass(
     )
 
 
+def _widening(model: DepositionModel, standoff_m: float) -> float:
+    """How many times wider the pattern is at the standoff than on the model plane."""
+    distance = standoff_m + model.projection.emission_offset_m
+    return distance / model.projection.model_plane_m
+
+
 def _graded_steps(model: DepositionModel, standoff_m: float) -> tuple[np.ndarray, np.ndarray]:
     """Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u)."""
-    omega, offset = model.projection.model_plane_m, model.projection.emission_offset_m
-    widening = (standoff_m + offset) / omega
+    widening = _widening(model, standoff_m)
     far = 1.5 * model.reach_m * widening
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
     u_far = math.asinh(far / FINEST_STEP_M)

@@ -32,18 +32,13 @@ class PoseBatch:
     def select(self, rows: slice | list[int]) -> 'PoseBatch':
         """The chosen rows."""
         chosen = rows if isinstance(rows, slice) else np.array(rows, dtype=np.int64)
-        return PoseBatch(
-            self.stamps_ns[chosen], self.positions_m[chosen], self.quaternions_xyzw[chosen]
-        )
+        return PoseBatch(*(column[chosen] for column in vars(self).values()))
 
     @staticmethod
     def joined(batches: list['PoseBatch']) -> 'PoseBatch':
         """At least one batch, one after the other."""
-        return PoseBatch(
-            np.concatenate([batch.stamps_ns for batch in batches]),
-            np.concatenate([batch.positions_m for batch in batches]),
-            np.concatenate([batch.quaternions_xyzw for batch in batches]),
-        )
+        columns = zip(*(vars(batch).values() for batch in batches), strict=True)
+        return PoseBatch(*map(np.concatenate, columns))
 
 
 class MotionLog:

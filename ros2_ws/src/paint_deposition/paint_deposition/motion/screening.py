@@ -81,11 +81,8 @@ class PoseScreen:
         self.counts.not_finite += int(np.count_nonzero(~finite))
         self.counts.not_unit_quaternions += int(np.count_nonzero(finite & ~unit))
         good = finite & unit
-        return PoseBatch(
-            poses.stamps_ns[good],
-            poses.positions_m[good],
-            quaternions[good] / norms[good, np.newaxis],
-        )
+        rotations = quaternions[good] / norms[good, np.newaxis]
+        return PoseBatch(poses.stamps_ns[good], poses.positions_m[good], rotations)
 
     def _step_to(self, stamp_ns: int) -> None:
         if self.newest_ns is not None and stamp_ns - self.newest_ns > self.max_gap_ns:

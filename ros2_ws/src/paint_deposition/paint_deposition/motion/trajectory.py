@@ -1,6 +1,6 @@
 """A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
 
-from dataclasses import dataclass, field, fields
+from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
@@ -33,12 +33,7 @@ class PoseCounts:
 
     def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""
-        counts = {item.name: int(getattr(self, item.name)) for item in fields(self)}
-        return counts | {'rejected': self.rejected}
-
-
-def _no_stamps() -> np.ndarray:
-    return np.empty(0, dtype=np.int64)
+        return asdict(self) | {'rejected': self.rejected}
 
 
 @dataclass(frozen=True)
@@ -64,7 +59,7 @@ class Trajectory:
     positions_m: np.ndarray
     quaternions_xyzw: np.ndarray
     frame_id: str = ''
-    trigger_stamps_ns: np.ndarray = field(default_factory=_no_stamps)
+    trigger_stamps_ns: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
     notes: tuple[str, ...] = ()
     source: str = 'trajectory'
