@@ -85,7 +85,8 @@ def door_outline() -> np.ndarray:
         pieces.append(rounded(into[-1], corners[n], out[0]))
         end = np.linalg.norm(out - corners[(n + 1) % 4], axis=1) > radii[(n + 1) % 4]
         pieces.append(out[end])
-    return evenly(np.concatenate(pieces), SPACING_M)
+    outline = np.concatenate(pieces)
+    return evenly(np.concatenate([outline, outline[:1]]), SPACING_M, endpoint=False)
 
 
 def bowed(start: np.ndarray, end: np.ndarray, bow_m: float) -> np.ndarray:
@@ -96,17 +97,18 @@ def bowed(start: np.ndarray, end: np.ndarray, bow_m: float) -> np.ndarray:
     return start + t * way + 4.0 * bow_m * t * (1.0 - t) * outward
 
 
-def rounded(start: np.ndarray, corner: np.ndarray, end: np.ndarray) -> np.ndarray:
+def rounded(
+    start: np.ndarray, corner: np.ndarray, end: np.ndarray, points: int = 200
+) -> np.ndarray:
     """A quadratic Bezier round the corner."""
-    t = np.linspace(0.0, 1.0, 200)[:, None]
+    t = np.linspace(0.0, 1.0, points)[:, None]
     return (1 - t) ** 2 * start + 2 * t * (1 - t) * corner + t**2 * end
 
 
-def evenly(closed_line: np.ndarray, spacing_m: float) -> np.ndarray:
-    """Points at equal distances along a closed line."""
-    line = np.concatenate([closed_line, closed_line[:1]])
+def evenly(line: np.ndarray, spacing_m: float, endpoint: bool = True) -> np.ndarray:
+    """Points at equal distances along a line."""
     along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    at = np.linspace(0.0, along[-1], round(along[-1] / spacing_m), endpoint=False)
+    at = np.linspace(0.0, along[-1], round(along[-1] / spacing_m), endpoint)
     return np.stack([np.interp(at, along, line[:, axis]) for axis in range(2)], axis=1)
 
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from make_door import door_depth, ramp
+from make_door import door_depth, evenly, ramp, rounded
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -110,14 +110,10 @@ def route(job: Job) -> np.ndarray:
     corners = np.stack([job.passes[:, 0] - way, job.passes[:, 1] + way], axis=1).reshape(-1, 2)
     pieces = [corners[:1]]
     for before, corner, after in zip(corners[:-2], corners[1:-1], corners[2:], strict=True):
-        t = np.linspace(0.0, 1.0, 100)[:, None]
         enter = corner + CORNER_RADIUS_M * unit(before - corner)
         leave = corner + CORNER_RADIUS_M * unit(after - corner)
-        pieces.append((1 - t) ** 2 * enter + 2 * t * (1 - t) * corner + t**2 * leave)
-    line = np.concatenate([*pieces, corners[-1:]])
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    at = np.linspace(0.0, along[-1], round(along[-1] / STEP_M))
-    return np.stack([np.interp(at, along, line[:, axis]) for axis in range(2)], axis=1)
+        pieces.append(rounded(enter, corner, leave, points=100))
+    return evenly(np.concatenate([*pieces, corners[-1:]]), STEP_M)
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
