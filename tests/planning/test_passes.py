@@ -27,7 +27,7 @@ def bowed():
 
 @pytest.fixture(scope='module')
 def motion(bowed):
-    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part', start_ns=7)
+    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part')
 
 
 def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
@@ -69,7 +69,7 @@ def test_poses_come_at_250_hertz_and_forward(motion):
     assert step_ms.min() > 0.0
     assert step_ms.max() <= 4.001
     assert np.median(step_ms) == pytest.approx(4.0, abs=0.01)
-    assert motion.stamps_ns[0] == 7
+    assert motion.stamps_ns[0] == 0
     _, counts = spray_path(motion)
     assert (counts.rejected, counts.gaps) == (0, 0)
 

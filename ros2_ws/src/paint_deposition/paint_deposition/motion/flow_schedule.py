@@ -39,16 +39,10 @@ class FlowSchedule:
         """Times (C,) int64 at which the flow changes; flow (C + 1,) before, between and after."""
         if not self._changes:
             return np.empty(0, dtype=np.int64), np.ones(1)
-        stamps: list[int] = []
-        flows = [0.0]
-        for stamp, flow in self._changes:
-            if stamps and stamp == stamps[-1]:
-                stamps.pop()
-                flows.pop()
-            if flow != flows[-1]:
-                stamps.append(stamp)
-                flows.append(flow)
-        return np.array(stamps, dtype=np.int64), np.array(flows)
+        last_at = dict(self._changes)
+        stamps, flows = np.array([*last_at], np.int64), np.array([0.0, *last_at.values()])
+        changes = np.diff(flows) != 0.0
+        return stamps[changes], np.append(0.0, flows[1:][changes])
 
     def forget(self, until_ns: int) -> None:
         """Drop changes that no longer matter from a time on."""

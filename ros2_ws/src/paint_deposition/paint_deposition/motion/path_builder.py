@@ -67,7 +67,6 @@ class PathBuilder:
         self._finished: list[SprayPath] = []
         self._gap_before_next = False
         self._states: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
-        self._held: list[SprayPath] = []
 
     @property
     def counts(self) -> PoseCounts:
@@ -122,11 +121,9 @@ class PathBuilder:
         self._cut_segments(until_ns)
         if self._integrated_ns is not None:
             self._flow.forget(self._integrated_ns)
-        pieces, self._finished = self._finished, []
-        if self.whole_strokes:
-            return self._whole_strokes(pieces, finish)
-        pieces, self._held = self._held + pieces, []
-        return SprayPath.joined(pieces) if pieces else SprayPath.empty()
+        path = SprayPath.joined([SprayPath.empty(), *self._finished])
+        self._finished = []
+        return self._whole_strokes(path, finish) if self.whole_strokes and len(path) else path
 
     def _cut_segments(self, until_ns: int | None) -> None:
         if not self._waiting:
@@ -184,13 +181,7 @@ class PathBuilder:
             from_turn_m=from_turn,
         )
 
-    def _whole_strokes(self, pieces: list[SprayPath], finish: bool) -> SprayPath:
-        held = self._held + pieces
-        if not held:
-            return SprayPath.empty()
-        path = SprayPath.joined(held)
-        if not len(path):
-            return path
+    def _whole_strokes(self, path: SprayPath, finish: bool) -> SprayPath:
         stroke = path.stroke
         ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
         # The last stroke's end shows with the first row of the next, which the look ahead needs.
@@ -203,7 +194,7 @@ class PathBuilder:
             path.from_turn_m,
         )
         complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
-        self._held = [path.select(slice(ready, None))]
+        self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
 
 
@@ -215,9 +206,7 @@ def spray_path(
 ) -> tuple[SprayPath, PoseCounts]:
     """Screen a whole recording and cut it into sub-steps; also returns what was dropped."""
     builder = PathBuilder(max_pose_gap_s, max_step_m, whole_strokes)
-    for stamp_ns, flow in zip(
-        trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow.tolist(), strict=True
-    ):
-        builder.add_trigger(stamp_ns, flow)
+    for change in zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True):
+        builder.add_trigger(*change)
     builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
     return builder.take(finish=True), builder.counts

@@ -38,7 +38,6 @@ def trajectory_of(
     passes: tuple[PlannedPass, ...],
     style: PassStyle,
     frame_id: str = '',
-    start_ns: int = 0,
     rate_hz: float = POSE_RATE_HZ,
 ) -> Trajectory:
     """The timed motion: poses at an even rate, and the trigger.
@@ -59,14 +58,14 @@ def trajectory_of(
         legs.append(_Leg(clock + times, *poses, ramp.duration_s))
         clock += ramp.duration_s
     stamps_s = np.concatenate([leg.stamps_s for leg in legs])
-    stamps_ns = start_ns + np.round(stamps_s * 1e9).astype(np.int64)
+    stamps_ns = np.round(stamps_s * 1e9).astype(np.int64)
     forward = np.append(True, np.diff(stamps_ns) > 0)
     return Trajectory(
         stamps_ns=stamps_ns[forward],
         positions_m=np.concatenate([leg.positions_m for leg in legs])[forward],
         quaternions_xyzw=np.concatenate([leg.quaternions for leg in legs])[forward],
         frame_id=frame_id,
-        trigger_stamps_ns=start_ns + np.round(np.array(triggers) * 1e9).astype(np.int64),
+        trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
     )
 

@@ -245,9 +245,8 @@ def _simulated(
     progress: Callable[[float], None],
 ) -> tuple[np.ndarray, float]:
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    occluder = surface.occluder if model.shadow > 0.0 else None
-    integrator = FilmIntegrator(surface.points(), model, occluder=occluder)
-    integrator.add(path, progress=lambda done: progress(min(done / max(len(path), 1), 1.0)))
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.emitted_cm3
 
 

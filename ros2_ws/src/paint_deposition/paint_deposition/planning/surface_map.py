@@ -78,18 +78,18 @@ def pass_axes(
                 'the part is closed, it has no side to paint from; say where the gun stands '
                 '(outward)'
             )
-    outward = np.asarray(outward, dtype=float)
-    if not np.linalg.norm(outward) > 0.0:
+    side = np.asarray(outward, dtype=float)
+    if not np.linalg.norm(side) > 0.0:
         raise PlanError('outward is a vector of length 0; give the direction to the gun')
-    outward = outward / np.linalg.norm(outward)
-    if np.linalg.norm(np.cross(outward, surface.down)) < 0.1:
+    side = side / np.linalg.norm(side)
+    if np.linalg.norm(np.cross(side, surface.down)) < 0.1:
         raise PlanError(
             'gravity points along the gun: level is not defined; give gravity in the plane of '
             'the part (down)'
         )
     toward = across_axis if direction == 'horizontal' else downhill_axis
-    travel = toward(outward, surface.down)
-    return PassAxes(surface.centre_m, travel, np.cross(-outward, travel), outward)
+    travel = toward(side, surface.down)
+    return PassAxes(surface.centre_m, travel, np.cross(-side, travel), side)
 
 
 class SurfaceMap:
