@@ -1,6 +1,7 @@
 """Errors that a user can act on: one line naming the thing, its value and the remedy."""
 
 import difflib
+import math
 from collections.abc import Iterable
 
 # Names less alike than this share, as difflib measures it, are not taken for each other.
@@ -29,6 +30,17 @@ class ReadingsError(PaintError):
 
 class PlanError(PaintError):
     """A request for passes or an index has no answer."""
+
+
+def require_above_zero(**values: float) -> None:
+    """Refuse what is no number above 0, by its name.
+
+    Raises:
+        PlanError: a value is not.
+    """
+    for name, value in values.items():
+        if not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f'{name} is {value:g}; give a number above 0')
 
 
 def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str:

@@ -6,8 +6,7 @@ from scipy.sparse import csr_matrix, eye_array
 from paint_deposition.part.curvature import tangents
 from paint_deposition.part.refinement import face_normals
 
-# Vertices up to this many edges away shape the parabola, near ones by far the most.
-RINGS = 2
+# Near vertices shape the parabola by far the most.
 NEARNESS = 12.0
 # A fit that turns the normal further than this has met something else than a curve.
 LARGEST_CORRECTION_COSINE = np.cos(np.radians(15.0))
@@ -46,14 +45,11 @@ def mean_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _neighbours(faces: np.ndarray, count: int) -> csr_matrix:
-    """(V, V) sparse: which vertices shape the parabola at each, itself among them."""
+    """(V, V) sparse: which vertices shape the parabola at each, those up to two edges away."""
     start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     linked = csr_matrix((np.ones(len(start)), (start, end)), shape=(count, count))
     linked = linked + linked.T + eye_array(count, format='csr')
-    around = linked
-    for _ in range(RINGS - 1):
-        around = around @ linked
-    return around.tocsr()
+    return linked @ linked
 
 
 def _fitted_normals(

@@ -97,8 +97,6 @@ def _best_of(
     # Lines further out than the films that are kept are not considered.
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)
     high = min(high, widest)
-    if low > high:
-        return None
     index = np.linspace(low, high, INDICES if high > low and passes > 1 else 1)
     offset = np.linspace(-0.5, 0.5, OFFSETS)
     indices, offsets = (grid.ravel() for grid in np.meshgrid(index, offset))

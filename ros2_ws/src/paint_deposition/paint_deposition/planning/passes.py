@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PlanError, require_above_zero
 from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
@@ -36,10 +36,11 @@ class PassStyle:
     one_way: bool = False
 
     def __post_init__(self) -> None:
-        for name in ('standoff_m', 'speed_m_per_s', 'acceleration_m_per_s2'):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0.0):
-                raise PlanError(f'{name} is {value:g}; give a number above 0')
+        require_above_zero(
+            standoff_m=self.standoff_m,
+            speed_m_per_s=self.speed_m_per_s,
+            acceleration_m_per_s2=self.acceleration_m_per_s2,
+        )
         for name in ('overspray_m', 'band_m'):
             value = getattr(self, name)
             if not (math.isfinite(value) and value >= 0.0):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import require_above_zero
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path_builder import spray_path
@@ -231,8 +231,7 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
 
 def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, float]:
     if request.index_m is not None:
-        if not (math.isfinite(request.index_m) and request.index_m > 0.0):
-            raise PlanError(f'index_m is {request.index_m:g}; give a number above 0')
+        require_above_zero(index_m=request.index_m)
         return request.index_m, request.index_m
     low, high = (share * plane.index_m for share in INDEX_SHARES)
     return request.index_min_m or low, request.index_max_m or high

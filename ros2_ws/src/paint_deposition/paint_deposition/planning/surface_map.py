@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PlanError, require_above_zero
 from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
@@ -105,8 +105,7 @@ class SurfaceMap:
     """
 
     def __init__(self, surface: Surface, axes: PassAxes, radius_m: float) -> None:
-        if not (math.isfinite(radius_m) and radius_m > 0.0):
-            raise PlanError(f'smoothing_radius_m is {radius_m:g}; give a number above 0')
+        require_above_zero(smoothing_radius_m=radius_m)
         self.axes = axes
         self.radius_m = radius_m
         facing = surface.normals @ axes.outward
