@@ -35,7 +35,7 @@ from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import qos
 
-MODULE = 'paint_deposition.nodes.recording.run_recorder'
+MODULE = 'run_recorder'
 
 
 def pose(stamp_ns: int, x_m: float = 0.0, frame_id: str = 'door') -> PoseStamped:

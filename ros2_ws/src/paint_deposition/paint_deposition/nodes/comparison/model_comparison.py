@@ -21,11 +21,11 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import ColouredMesh
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
-from paint_deposition.nodes.runtime.process import run_node
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
@@ -34,6 +34,23 @@ from paint_deposition.readings.residuals import Residuals
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25
+
+COMPARISON = dict(
+    **PAINTING,
+    measurements_file=NodeParameter(
+        '',
+        'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
+        fixed_because='the film is painted where they were taken; restart the node',
+    ),
+    color_max_um=thickness(
+        'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+    ),
+    color_radius_m=NodeParameter(
+        0.0,
+        'How far around a reading the surface has its colour; 0: from their spacing [m]',
+        (0.0, 5.0),
+    ),
+)
 
 
 class ModelComparison(PaintingNode):
@@ -44,28 +61,7 @@ class ModelComparison(PaintingNode):
     spread over the surface around them for display only.
     """
 
-    PARAMETERS = (
-        *PaintingNode.PARAMETERS,
-        NodeParameter(
-            'measurements_file',
-            '',
-            'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
-            is_path=True,
-            fixed_because='the film is painted where they were taken; restart the node',
-        ),
-        thickness(
-            'color_max_um',
-            description='Residual at the ends of the colours; 0: a quarter of the thickest '
-            'reading [µm]',
-        ),
-        NodeParameter(
-            'color_radius_m',
-            0.0,
-            'How far around a reading the surface has its colour; 0: from their spacing [m]',
-            low=0.0,
-            high=5.0,
-        ),
-    )
+    PARAMETERS = COMPARISON
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)
@@ -212,8 +208,3 @@ class ModelComparison(PaintingNode):
         response.message = self.summary()
         self.get_logger().info(response.message)
         return response
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(ModelComparison)

@@ -21,21 +21,43 @@ from visualization_msgs.msg import Marker, MarkerArray
 from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import ColourScale, film_scale
 from paint_deposition.film.integrator import FilmIntegrator, Precision
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.statistics import (
+    DEFAULT_PAINTED_ABOVE_UM,
+    FilmStatistics,
+    film_statistics,
+)
 from paint_deposition.nodes.painting.film_messages import FilmCloud, FilmField, stats_message
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import film_status, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.simulator_parameters import SIMULATOR
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import ColouredMesh
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.results.film import write_film
 
 STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+
+SIMULATOR = dict(
+    **PAINTING,
+    precision=NodeParameter(
+        'single',
+        'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
+        choices=('single', 'double'),
+        fixed_because='the film so far was summed in it; restart the node',
+    ),
+    color_min_um=thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
+    color_max_um=thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
+    painted_above_um=thickness(
+        'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
+    ),
+    target_um=thickness('Film wanted; 0: none [µm]'),
+    target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
+    output_directory=NodeParameter('runs', 'Where ~/save_film writes [path]'),
+)
 
 
 class DepositionSimulator(PaintingNode):
@@ -45,7 +67,7 @@ class DepositionSimulator(PaintingNode):
     changes, and once more when somebody new listens. Everything shows all poses received.
     """
 
-    PARAMETERS = (*PaintingNode.PARAMETERS, *SIMULATOR)
+    PARAMETERS = SIMULATOR
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
@@ -250,8 +272,3 @@ class DepositionSimulator(PaintingNode):
                 return error
 
         return write
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(DepositionSimulator)

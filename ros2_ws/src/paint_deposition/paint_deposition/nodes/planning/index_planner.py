@@ -15,17 +15,74 @@ from rclpy.time import Time
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.planning.planner_parameters import PLANNER
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
-from paint_deposition.planning.index_request import Request
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    direction,
+    fixed,
+    mesh_parameters,
+    thickness,
+)
+from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
+from paint_deposition.planning.plan import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 
 SPACING_M = 0.02
+
+PLANNER = dict(
+    **model_parameters(''),
+    width_m=NodeParameter(
+        0.0, 'Width to paint where a request gives none; 0: none [m]', (0.0, 100.0)
+    ),
+    length_m=NodeParameter(
+        0.0, 'Length of a pass, for the cycle time; 0: as long as the width [m]', (0.0, 100.0)
+    ),
+    standoff_m=NodeParameter(
+        0.0,
+        'Distance of the TCP from the part; 0: the part lies on the model plane [m]',
+        (0.0, 5.0),
+    ),
+    travel_rad=NodeParameter(
+        0.0,
+        "Direction of the first pass in the tool's x-y frame, from x to y [rad]",
+        (-2.0 * math.pi, 2.0 * math.pi),
+    ),
+    gun_turns=NodeParameter(
+        False,
+        'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
+        'orientation and lays the same profile both ways [-]',
+    ),
+    **fixed(
+        'passes are planned once, when the node starts; restart the node with the new value',
+        **mesh_parameters(max_edge_length_m=0.02),
+        direction=NodeParameter(
+            'horizontal',
+            'How planned passes run on the part [name]',
+            choices=('horizontal', 'vertical'),
+        ),
+        speed_m_per_s=NodeParameter(
+            0.3, 'Speed of planned passes; 0: from target_um [m/s]', (0.0, FASTEST_M_PER_S)
+        ),
+        target_um=thickness('Mean film of planned passes where speed_m_per_s is 0 [µm]'),
+        index_m=NodeParameter(
+            0.0, 'Distance between planned passes; 0: the most even [m]', (0.0, 10.0)
+        ),
+        smoothing_radius_m=NodeParameter(
+            DEFAULT_SMOOTHING_RADIUS_M,
+            'What is finer than this on the part is not followed [m]',
+            (0.005, 2.0),
+        ),
+        acceleration_m_per_s2=NodeParameter(
+            2.0, 'Acceleration of the robot [m/s^2]', (0.05, 50.0)
+        ),
+        outward=direction(
+            'Direction from the part to the gun, any length; empty: the mean normal [-]'
+        ),
+    ),
+)
 
 
 class IndexPlanner(PaintNode):
@@ -180,8 +237,3 @@ def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
         q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()
         message.poses.append(pose)
     return message
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(IndexPlanner)

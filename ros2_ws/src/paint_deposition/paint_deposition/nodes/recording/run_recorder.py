@@ -18,14 +18,13 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
-from paint_deposition.nodes.recording.recorder_parameters import RECORDER
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
@@ -46,6 +45,25 @@ POSES_A_REPORT = 50
 POSE_QUEUE_DEPTH = 5000
 QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
+
+RECORDER = fixed(
+    "the run's file is open; call ~/stop and start another recorder",
+    topics=NodeParameter(
+        [],
+        'Topics to record; empty: motion, film, plan, diagnostics and parameter changes [topics]',
+        element=str,
+    ),
+    output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
+    name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
+    compression=NodeParameter(
+        'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
+    ),
+    max_pose_gap_s=NodeParameter(
+        0.25, 'Longest interval between pose stamps that is no gap [s]', (0.001, 60.0)
+    ),
+    mesh_file=NodeParameter('', 'Mesh whose digest to keep with the run; empty: none [path]'),
+    model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
+)
 
 
 class RunRecorder(PaintNode):
@@ -238,8 +256,3 @@ def _offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
     return (
         offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
     )
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(RunRecorder)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any
 
@@ -21,16 +22,40 @@ from paint_deposition.files.recordings.bags import (
     read_trajectory,
 )
 from paint_deposition.nodes.replay.flow_control import FlowControl
-from paint_deposition.nodes.replay.player_parameters import PLAYER
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 
 CLOCK_PERIOD_S = 0.01
 STOP_NOTICED_S = 0.05
+
+PLAYER = fixed(
+    'the replay has begun with it; start another player',
+    bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
+    pose_topic=NodeParameter(
+        '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"
+    ),
+    state_topic=NodeParameter(
+        '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
+    ),
+    rate=NodeParameter(
+        1.0,
+        'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
+        (0.0, math.inf),
+    ),
+    loop=NodeParameter(False, 'Start again at the end [true/false]'),
+    start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
+    wait_for_subscribers=NodeParameter(
+        1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
+    ),
+    window=NodeParameter(
+        200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
+    ),
+    publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
+)
 
 
 class BagPlayer(PaintNode):
@@ -191,8 +216,3 @@ class BagPlayer(PaintNode):
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(BagPlayer)
