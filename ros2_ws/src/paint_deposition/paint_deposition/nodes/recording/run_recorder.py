@@ -223,7 +223,7 @@ class RunRecorder(PaintNode):
 
     def _status(self) -> Status:
         try:
-            size, free = self._run.bytes_written, shutil.disk_usage(self._run.folder).free
+            size, free = self._run.path.stat().st_size, shutil.disk_usage(self._run.folder).free
         except OSError as error:
             gone = f'{self._run.path}: {error.strerror}; nothing more can be recorded there'
             if self._error is None:

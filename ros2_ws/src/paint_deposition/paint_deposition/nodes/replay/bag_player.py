@@ -128,7 +128,7 @@ class BagPlayer(PaintNode):
                     # Its log times only serve where the recorder's clock is the robot's.
                     read_trajectory(values['bag'], poses.name, states.name)
                 return poses, states
-            unused = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
+            unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'

@@ -41,7 +41,7 @@ def replay_messages(bag: Bag, poses: BagTopic, states: BagTopic | None) -> Itera
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
     if states is None or states.type == BOOL_TYPE:
         return _state_of_bool
-    if bag.type_hash(states.name) == definitions.installed(STATE_TYPE).type_hash:
+    if bag.type_hash(states) == definitions.installed(STATE_TYPE).type_hash:
         return lambda message: message.cdr
     # Recorded with another version of the message: fields of the same name are taken over.
     return lambda message: serialize_message(_state_of(bag.decode(message)))
