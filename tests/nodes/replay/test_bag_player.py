@@ -14,6 +14,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
@@ -62,10 +63,10 @@ class Listener(Node):
         self.order: list[str] = []
         self.reports = reports
         self.create_subscription(
-            PoseStamped, 'atomizer/pose', self.take_pose, qos.replayed(5_000), raw=True
+            PoseStamped, 'atomizer/pose', self.take_pose, QoSProfile(depth=5_000), raw=True
         )
         self.create_subscription(
-            AtomizerState, 'atomizer/state', self.take_state, qos.replayed(5_000)
+            AtomizerState, 'atomizer/state', self.take_state, QoSProfile(depth=5_000)
         )
         self.publisher = (
             self.create_publisher(PoseProgress, 'atomizer/progress', qos.PROGRESS)

@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
-from rclpy.time import Time
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.comparison.residual_field import reached, spreading
@@ -24,7 +22,7 @@ from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import ColouredMesh
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -73,7 +71,7 @@ class ModelComparison(PaintingNode):
                 ('comparison/legend', MarkerArray),
             )
         }
-        self.create_service(Trigger, '~/compare', self._compare)
+        self.offer('~/compare', self._compare)
         self._shown: FilmIntegrator | None = None
         tasks = painting_tasks(self) | {'comparison': self._status}
         self._diagnostics = Diagnostics(self, tasks)
@@ -161,7 +159,8 @@ class ModelComparison(PaintingNode):
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self._readings.positions_m[residuals.worst].tolist()
-        message = ComparisonStats(
+        return ComparisonStats(
+            header=header(self.frame.frame_id, stamp_ns),
             model=self._model_name,
             readings=len(residuals),
             readings_painted=int(residuals.painted.sum()),
@@ -173,9 +172,6 @@ class ModelComparison(PaintingNode):
             worst_position=Point(x=x, y=y, z=z),
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
-        message.header.frame_id = self.frame.frame_id
-        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        return message
 
     def summary(self) -> str:
         """The comparison in one line."""
@@ -202,9 +198,8 @@ class ModelComparison(PaintingNode):
             },
         )
 
-    def _compare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _compare(self) -> tuple[bool, str]:
         self.up_to_date()
-        response.success = True
-        response.message = self.summary()
-        self.get_logger().info(response.message)
-        return response
+        found = self.summary()
+        self.get_logger().info(found)
+        return True, found

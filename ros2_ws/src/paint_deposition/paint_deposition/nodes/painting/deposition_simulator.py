@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import time
 from collections.abc import Callable, Mapping
@@ -15,12 +16,11 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import ColourScale, film_scale
-from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import (
     DEFAULT_PAINTED_ABOVE_UM,
     FilmStatistics,
@@ -28,11 +28,11 @@ from paint_deposition.film.statistics import (
 )
 from paint_deposition.nodes.painting.film_messages import FilmCloud, FilmField, stats_message
 from paint_deposition.nodes.painting.legend import legend
-from paint_deposition.nodes.painting.painting_diagnostics import film_status, painting_tasks
+from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
+from paint_deposition.nodes.runtime.diagnostics import Diagnostics
 from paint_deposition.nodes.runtime.messages import ColouredMesh
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
@@ -81,7 +81,7 @@ class DepositionSimulator(PaintingNode):
                 ('thickness/field', ThicknessField, qos.RESULTS),
             )
         }
-        self.create_service(Trigger, '~/reset', self._reset)
+        self.offer('~/reset', self._reset)
         # In a group of its own: while it waits for the disk, poses must not wait for it.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
@@ -92,16 +92,15 @@ class DepositionSimulator(PaintingNode):
         self._greeted = 0
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
-        self._diagnostics = Diagnostics(self, painting_tasks(self) | {'film': self._film_status})
+        last = 'last publication [ms]'
+        tasks = painting_tasks(self, lambda: {last: f'{self._publish_s * 1e3:.0f}'})
+        self._diagnostics = Diagnostics(self, tasks)
         self.publish()
 
     # --- the part and its film
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return surface.points()
-
-    def _precision(self) -> Precision:
-        return self.values['precision']
 
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
@@ -189,26 +188,17 @@ class DepositionSimulator(PaintingNode):
         message.longest_gap_s = shown[3]
         self._outputs['thickness/stats'].publish(message)
 
-    def _film_status(self) -> Status:
-        status = film_status(self)
-        last_ms = f'{self._publish_s * 1e3:.0f}'
-        return Status(
-            status.level, status.message, {**status.values, 'last publication [ms]': last_ms}
-        )
-
     # --- services
 
     def close(self) -> None:
         self._saving.shutdown()
 
-    def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _reset(self) -> tuple[bool, str]:
         poses = self.film.counts.received
         self.reset()
         self._shown = None
         self.publish()
-        response.success = True
-        response.message = f'bare metal again; {poses} poses forgotten'
-        return response
+        return True, f'bare metal again; {poses} poses forgotten'
 
     async def _save_film(
         self, request: SaveFilm.Request, response: SaveFilm.Response
@@ -223,26 +213,24 @@ class DepositionSimulator(PaintingNode):
         self.up_to_date()
         film = self.film.up_to_date()
         written: Future = Future(executor=self.executor)
-        job = self._film_to_save(stem, film)
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
         written.add_done_callback(lambda _: None)
-        self._saving.submit(lambda: written.set_result(job()))
-        outcome: Any = await written
-        if isinstance(outcome, Exception):
-            response.message = str(outcome)
+        self._saving.submit(self._film_to_save(stem, film)).add_done_callback(written.set_result)
+        saved: Any = await written
+        try:
+            paths = saved.result()
+        except Exception as error:  # the caller of the service is told
+            response.message = str(error)
             return response
         response.success = True
-        response.paths = [str(path) for path in outcome]
-        response.message = f'wrote {", ".join(path.name for path in outcome)}'
+        response.paths = [str(path) for path in paths]
+        response.message = f'wrote {", ".join(path.name for path in paths)}'
         return response
 
-    def _film_to_save(
-        self, stem: str, film: FilmIntegrator
-    ) -> Callable[[], list[Path] | Exception]:
-        """A function that writes the film as it is now; it returns the paths, or the error."""
+    def _film_to_save(self, stem: str, film: FilmIntegrator) -> Callable[[], list[Path]]:
+        """A function that writes the film as it is now and returns the paths."""
         surface, film_um, values = self.surface, film.film_um, self.values
-        figures = self.statistics(film_um, film.emitted_cm3)
         details = {
             'mesh_file': values['mesh_file'],
             'mesh_id': self.mesh_id,
@@ -253,22 +241,14 @@ class DepositionSimulator(PaintingNode):
             'poses': self.film.counts.to_dict(),
             'poses_in_other_frames': dict(self.input.refused_frames),
         }
-        folder = Path(values['output_directory'])
-        colours = values['color_min_um'], values['color_max_um']
-
-        def write() -> list[Path] | Exception:
-            try:
-                return write_film(
-                    folder,
-                    surface,
-                    film_um,
-                    figures,
-                    stem=stem,
-                    statistics_file=f'{stem}.json',
-                    details=details,
-                    color_range_um=colours,
-                )
-            except Exception as error:  # the caller of the service is told
-                return error
-
-        return write
+        return functools.partial(
+            write_film,
+            Path(values['output_directory']),
+            surface,
+            film_um,
+            self.statistics(film_um, film.emitted_cm3),
+            stem=stem,
+            statistics_file=f'{stem}.json',
+            details=details,
+            color_range_um=(values['color_min_um'], values['color_max_um']),
+        )

@@ -10,13 +10,13 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
-from rclpy.time import Time
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.parameters import (
@@ -123,17 +123,18 @@ class IndexPlanner(PaintNode):
         return _fill(response, answer)
 
     def _asked_for(self, request: RecommendIndex.Request) -> Request:
+        # In requests and parameters 0 stands for none.
         return Request(
-            speed_m_per_s=_given(request.speed_m_per_s),
-            target_um=_given(request.target_um),
-            index_min_m=_given(request.index_min_m),
-            index_max_m=_given(request.index_max_m),
-            tolerance=_given(request.tolerance),
-            width_m=_given(request.width_m) or _given(self.values['width_m']),
-            length_m=_given(self.values['length_m']),
+            speed_m_per_s=request.speed_m_per_s or None,
+            target_um=request.target_um or None,
+            index_min_m=request.index_min_m or None,
+            index_max_m=request.index_max_m or None,
+            tolerance=request.tolerance or None,
+            width_m=request.width_m or self.values['width_m'] or None,
+            length_m=self.values['length_m'] or None,
             one_way=request.one_way,
             gun_turns=self.values['gun_turns'],
-            standoff_m=_given(self.values['standoff_m']),
+            standoff_m=self.values['standoff_m'] or None,
             travel_rad=self.values['travel_rad'],
         )
 
@@ -150,10 +151,10 @@ class IndexPlanner(PaintNode):
             self._model,
             PlanRequest(
                 direction=values['direction'],
-                speed_m_per_s=_given(values['speed_m_per_s']),
-                target_um=_given(values['target_um']),
-                index_m=_given(values['index_m']),
-                standoff_m=_given(values['standoff_m']),
+                speed_m_per_s=values['speed_m_per_s'] or None,
+                target_um=values['target_um'] or None,
+                index_m=values['index_m'] or None,
+                standoff_m=values['standoff_m'] or None,
                 smoothing_radius_m=values['smoothing_radius_m'],
                 acceleration_m_per_s2=values['acceleration_m_per_s2'],
                 travel_rad=values['travel_rad'],
@@ -181,11 +182,6 @@ class IndexPlanner(PaintNode):
             'requests': self._asked,
         }
         return Status(self._last.level, self._last.message, values)
-
-
-def _given(value: float) -> float | None:
-    """A number of a request or parameter, in which 0 stands for none."""
-    return None if value == 0.0 else value
 
 
 def _or_nan(value: float | None) -> float:
@@ -223,15 +219,10 @@ def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
     travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
     kept = np.append(True, np.diff(travelled) > 0.0)
     kept[-1] = True
-    message = Path()
-    message.header.frame_id = trajectory.frame_id
-    message.header.stamp = Time(nanoseconds=start_ns).to_msg()
-    first_ns = int(trajectory.stamps_ns[0])
+    stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]
+    message = Path(header=header(trajectory.frame_id, start_ns))
     for row in np.flatnonzero(kept):
-        pose = PoseStamped()
-        pose.header.frame_id = trajectory.frame_id
-        stamp_ns = start_ns + int(trajectory.stamps_ns[row]) - first_ns
-        pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        pose = PoseStamped(header=header(trajectory.frame_id, int(stamps_ns[row])))
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z = trajectory.positions_m[row].tolist()
         q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()

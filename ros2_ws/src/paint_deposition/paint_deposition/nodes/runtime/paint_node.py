@@ -13,6 +13,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rclpy.timer import Timer
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import ParameterTable, declare_parameters
@@ -72,6 +73,15 @@ class PaintNode(Node):
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
+
+    def offer(self, name: str, answer: Callable[[], tuple[bool, str]]) -> None:
+        """A service std_srvs/Trigger; `answer` says whether all went well, and what happened."""
+
+        def respond(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = answer()
+            return response
+
+        self.create_service(Trigger, name, respond)
 
     def finish(self, exit_code: int = 0) -> None:
         """Ask the process to end; the callback that runs is completed first."""

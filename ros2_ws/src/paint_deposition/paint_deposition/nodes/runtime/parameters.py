@@ -73,8 +73,8 @@ class NodeParameter:
             read_only=bool(self.fixed_because),
         )
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:
-            low, high = (int(min(bound, INT64_MAX)) for bound in self.bounds)
-            descriptor.integer_range = [IntegerRange(from_value=low, to_value=high)]
+            least, most = (int(min(bound, INT64_MAX)) for bound in self.bounds)
+            descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
         elif self.bounds:
             low, high = self.bounds
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
