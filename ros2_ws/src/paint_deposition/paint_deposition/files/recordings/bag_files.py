@@ -4,8 +4,6 @@ Only the types of the topics that are read are parsed: one exotic topic, such as
 events that rosbags does not understand, does not make the poses beside it unreadable.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -64,10 +62,8 @@ class Bag:
 
     def find(self, name: str) -> BagTopic | None:
         """The topic of that name, given with or without a leading slash."""
-        for topic in self.topics:
-            if topic.name.lstrip('/') == name.lstrip('/'):
-                return topic
-        return None
+        wanted = name.lstrip('/')
+        return next((topic for topic in self.topics if topic.name.lstrip('/') == wanted), None)
 
     def type_hash(self, topic: BagTopic) -> str:
         """RIHS01 hash of a topic's type as the bag defines it."""

@@ -1,7 +1,5 @@
 """What a bag holds, at a glance: its topics, and how good its streams of poses are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -3,8 +3,6 @@
 Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
 """
 
-from __future__ import annotations
-
 import struct
 from dataclasses import replace
 from io import BytesIO

@@ -1,7 +1,5 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import struct

@@ -1,7 +1,5 @@
 """Message definitions as rosbag2 stores them beside the messages: text with dependencies, hash."""
 
-from __future__ import annotations
-
 import functools
 import json
 from dataclasses import dataclass
