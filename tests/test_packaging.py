@@ -42,15 +42,9 @@ def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
 
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    _, module_name = getattr(executables, node).args
-    module = importlib.import_module(f'{PACKAGE}.nodes.{module_name}.{node}')
-    (table,) = (
-        thing.PARAMETERS
-        for thing in vars(module).values()
-        if isinstance(thing, type) and thing.__module__ == module.__name__
-        and hasattr(thing, 'PARAMETERS')
-    )  # fmt: skip
-    return {row.name: row for row in table}
+    _, folder, node_class = getattr(executables, node).args
+    module = importlib.import_module(f'{PACKAGE}.nodes.{folder}.{node}')
+    return getattr(module, node_class).PARAMETERS
 
 
 def cell_parameters() -> dict[str, dict]:

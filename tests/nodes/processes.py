@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 class NodeProcess:
-    """`module`'s main() in a new process; `parameters` go on its command line.
+    """An executable in a new process; `parameters` go on its command line.
 
     Output goes to `<log>.out` and `<log>.err`. Use as a context manager: it is killed at the end.
     """
@@ -16,14 +16,17 @@ class NodeProcess:
     def __init__(
         self,
         log: Path,
-        module: str,
+        executable: str,
         *,
         code: str = '',
         ros_arguments: tuple[str, ...] = (),
         **parameters: object,
     ) -> None:
         self._out, self._err = log.with_suffix('.out'), log.with_suffix('.err')
-        program = code or f'import sys; from {module} import main; sys.exit(main())'
+        program = code or (
+            f'import sys; from paint_deposition.nodes.executables import {executable}; '
+            f'sys.exit({executable}())'
+        )
         arguments = [
             part
             for name, value in parameters.items()

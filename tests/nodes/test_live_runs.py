@@ -21,10 +21,10 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import qos
 
-SIMULATOR = 'paint_deposition.nodes.painting.deposition_simulator'
-COMPARISON = 'paint_deposition.nodes.comparison.model_comparison'
-PLAYER = 'paint_deposition.nodes.replay.bag_player'
-RECORDER = 'paint_deposition.nodes.recording.run_recorder'
+SIMULATOR = 'deposition_simulator'
+COMPARISON = 'model_comparison'
+PLAYER = 'bag_player'
+RECORDER = 'run_recorder'
 EDGE_M = 0.03
 # Several processes start one after the other, on a busy machine in half a minute each.
 pytestmark = pytest.mark.timeout(600)

@@ -11,6 +11,7 @@ from rosbags.rosbag2 import Reader
 
 from files.recorded import straight_pass
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings import mcap_run
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
@@ -81,13 +82,13 @@ def test_a_cut_run_becomes_a_whole_one(tmp_path, cut_run, given):
 
 
 @pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
-def test_the_beginning_of_a_cut_chunk_is_read(tmp_path, compression):
+def test_the_beginning_of_a_cut_chunk_is_read(tmp_path, monkeypatch, compression):
     """Recorders with large chunks leave most of a cut file in the last one."""
     rng = np.random.default_rng(8)
     bits = rng.integers(2, size=20_000).tolist()
-    with RunWriter(
-        tmp_path / 'run', compression=compression, chunk_bytes=10**7, chunk_seconds=1e9
-    ) as writer:
+    monkeypatch.setattr(mcap_run, 'CHUNK_BYTES', 10**7)
+    monkeypatch.setattr(mcap_run, 'CHUNK_SECONDS', 1e9)
+    with RunWriter(tmp_path / 'run', compression=compression) as writer:
         writer.add_topic(RunTopic('/gun', BOOL, standard(BOOL)))
         for number, bit in enumerate(bits):
             writer.write('/gun', b'\0\1\0\0' + bytes([bit]), number, number)

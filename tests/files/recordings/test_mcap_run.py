@@ -17,6 +17,7 @@ from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings import mcap_run
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import standard
@@ -139,9 +140,10 @@ def test_a_topic_is_added_once(tmp_path):
             writer.add_topic(gun_topic())
 
 
-def test_open_chunk_is_closed_by_age(tmp_path):
+def test_open_chunk_is_closed_by_age(tmp_path, monkeypatch):
     """No message may wait in memory for longer than half a second and a call."""
-    writer = RunWriter(tmp_path / 'run', chunk_seconds=0.05)
+    monkeypatch.setattr(mcap_run, 'CHUNK_SECONDS', 0.05)
+    writer = RunWriter(tmp_path / 'run')
     writer.add_topic(gun_topic())
     writer.write('/gun', TRUE_CDR, 1, 1)
     assert not chunks_of(writer)

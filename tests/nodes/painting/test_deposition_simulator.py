@@ -140,7 +140,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
     motion = two_passes(poses=1500, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
-    player = 'paint_deposition.nodes.replay.bag_player'
+    player = 'bag_player'
     with NodeProcess(tmp_path / 'player', player, bag=bag) as replay:
         wait_until(lambda: replay.exit_code is not None, what='the replay')
     wait_until(lambda: node.film.counts.received == len(motion), what='every pose painted')

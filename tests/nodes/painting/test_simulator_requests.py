@@ -100,11 +100,11 @@ def test_changes_that_cannot_be_are_refused_with_the_reason(simulator, values, r
 
 def test_every_parameter_says_what_it_is_and_whether_it_can_change(simulator):
     node = simulator()
-    for row in DepositionSimulator.PARAMETERS:
-        descriptor = node.describe_parameter(row.name)
-        assert len(descriptor.description) > 10, row.name
-        assert '[' in descriptor.description, row.name
-        assert descriptor.read_only == bool(row.fixed_because), row.name
+    for name, row in DepositionSimulator.PARAMETERS.items():
+        descriptor = node.describe_parameter(name)
+        assert len(descriptor.description) > 10, name
+        assert '[' in descriptor.description, name
+        assert descriptor.read_only == bool(row.fixed_because), name
         if descriptor.read_only:
             assert 'cannot change' in descriptor.additional_constraints
 

@@ -188,7 +188,7 @@ def test_bad_parameters_stop_the_node(ros_context, values):
 
 
 def test_bad_model_ends_the_process_with_one_line_and_exit_code_2(ros_domain, tmp_path):
-    module = 'paint_deposition.nodes.planning.index_planner'
+    module = 'index_planner'
     with NodeProcess(tmp_path / 'planner', module, model_file='nowhere.yaml') as process:
         assert process.wait() == 2
         assert process.err.count('\n') == 1

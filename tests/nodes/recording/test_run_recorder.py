@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import PoseProgress, ThicknessStats
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from rosbags.rosbag2 import Reader
@@ -35,7 +35,8 @@ from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import qos
 
-MODULE = 'paint_deposition.nodes.recording.run_recorder'
+BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
+MODULE = 'run_recorder'
 
 
 def pose(stamp_ns: int, x_m: float = 0.0, frame_id: str = 'door') -> PoseStamped:
@@ -89,7 +90,7 @@ def publisher(cell, wait_until):
 def finish(recorder: RunRecorder) -> dict:
     """End the recording and return the information of its metadata file."""
     recorder.close()
-    content = yaml.safe_load((recorder.folder / 'metadata.yaml').read_text())
+    content = yaml.safe_load((recorder.run.folder / 'metadata.yaml').read_text())
     return content['rosbag2_bagfile_information']
 
 
@@ -131,10 +132,10 @@ def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_unti
     information = finish(recorder)
     assert counts(information)['/atomizer/pose'] == 900
     assert counts(information)['/atomizer/state'] == 2
-    assert [m for m in messages(recorder.folder) if m[0] == '/atomizer/pose'] == [
+    assert [m for m in messages(recorder.run.folder) if m[0] == '/atomizer/pose'] == [
         m for m in messages(bag) if m[0] == '/atomizer/pose'
     ]
-    again = read_trajectory(recorder.folder, None, '/atomizer/state')
+    again = read_trajectory(recorder.run.folder, None, '/atomizer/state')
     for name in ('stamps_ns', 'positions_m', 'trigger_stamps_ns', 'trigger_flow'):
         np.testing.assert_array_equal(getattr(again, name), getattr(written, name))
 
@@ -144,23 +145,25 @@ def test_latched_messages_are_recorded_as_latched(record, cell, wait_until):
     latched = cell.create_publisher(ThicknessStats, 'thickness/stats', qos.LATCHED)
     latched.publish(ThicknessStats(mean_um=41.5))
     recorder = record()
-    wait_until(lambda: recorder.recorded('thickness/stats') == 1, what='the latched message')
+    wait_until(
+        lambda: recorder.run.counts.get('/thickness/stats', 0) == 1, what='the latched message'
+    )
     information = finish(recorder)
     (profile,) = offered(information, '/thickness/stats')
     assert profile['durability'] == 'transient_local'
     assert profile['reliability'] == 'reliable'
-    ((_, data),) = messages(recorder.folder)
+    ((_, data),) = messages(recorder.run.folder)
     # Not byte by byte: what pads a message is left as it was in memory.
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
 
 
-@pytest.mark.parametrize('profile', [qos.poses(50), qos.replayed(50)])
+@pytest.mark.parametrize('profile', [BEST_EFFORT, QoSProfile(depth=50)])
 def test_both_reliabilities_connect(record, publisher, wait_until, profile):
     recorder = record()
     poses = publisher(PoseStamped, 'atomizer/pose', profile)
     for k in range(20):
         poses.publish(pose(START_NS + k * 4_000_000))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 20, what='the poses')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 20, what='the poses')
     information = finish(recorder)
     (recorded,) = offered(information, '/atomizer/pose')
     assert recorded['reliability'] == profile.reliability.name.lower()
@@ -168,14 +171,14 @@ def test_both_reliabilities_connect(record, publisher, wait_until, profile):
 
 def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until, cell):
     recorder = record()
-    first = publisher(PoseStamped, 'atomizer/pose', qos.replayed(50))
+    first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=50))
     first.publish(pose(START_NS))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 1, what='the first pose')
-    second = publisher(PoseStamped, 'atomizer/pose', qos.poses(50))
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
+    second = publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
     wait_until(lambda: first.get_subscription_count() == 1, what='one subscription')
     first.publish(pose(START_NS + 1))
     second.publish(pose(START_NS + 2))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 3, what='the poses of both')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 3, what='the poses of both')
     finish(recorder)
 
 
@@ -183,32 +186,32 @@ def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, 
     recorder = record(topics=['chatter', '/cell/gun', 'never'])
     chatter = publisher(String, 'chatter', qos.RESULTS)
     gun = publisher(Bool, '/cell/gun', qos.RESULTS)
-    other = cell.create_publisher(PoseStamped, 'atomizer/pose', qos.replayed())
+    other = cell.create_publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     other.publish(pose(START_NS))
     chatter.publish(String(data='hello'))
     gun.publish(Bool(data=True))
-    wait_until(lambda: recorder.message_count == 2, what='both messages')
+    wait_until(lambda: recorder.run.message_count == 2, what='both messages')
     assert counts(finish(recorder)) == {'/chatter': 1, '/cell/gun': 1}
 
 
 def test_relative_topics_follow_the_namespace(record, publisher, wait_until):
     recorder = record(namespace='/cell1')
-    poses = publisher(PoseStamped, '/cell1/atomizer/pose', qos.replayed())
+    poses = publisher(PoseStamped, '/cell1/atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 1, what='the pose')
+    wait_until(lambda: recorder.run.message_count == 1, what='the pose')
     assert counts(finish(recorder)) == {'/cell1/atomizer/pose': 1}
 
 
 def test_gaps_and_missed_messages_are_counted(record, publisher, wait_until):
     recorder = record(topics=['atomizer/pose'], max_pose_gap_s=0.1)
-    poses = publisher(PoseStamped, 'atomizer/pose', qos.replayed())
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     stamps_ns = START_NS + np.array([0, 4, 8, 508, 512, 612, 613]) * 1_000_000
     for stamp in stamps_ns.tolist():
         poses.publish(pose(stamp))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 7, what='the poses')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 7, what='the poses')
     recorder.close()
     # 500 ms is a gap, 100 ms is just none.
-    assert recorder.summary() == f'7 messages, 1 gaps, file complete: {recorder.folder}'
+    assert recorder.summary() == f'7 messages, 1 gaps, file complete: {recorder.run.folder}'
 
 
 def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_until):
@@ -216,23 +219,23 @@ def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_un
     recorder = record(topics=['chatter'])
     chatter = publisher(String, 'chatter', QoSProfile(depth=1000))
     chatter.publish(String(data='first'))
-    wait_until(lambda: recorder.message_count == 1, what='the first message')
+    wait_until(lambda: recorder.run.message_count == 1, what='the first message')
     # Nobody runs the recorder's callbacks meanwhile.
     for k in range(300):
         chatter.publish(String(data=str(k)))
     chatter.wait_for_all_acked()
-    wait_until(lambda: recorder.message_count >= 101, what='what is left')
+    wait_until(lambda: recorder.run.message_count >= 101, what='what is left')
     recorder.close()
-    lost = 301 - recorder.message_count
+    lost = 301 - recorder.run.message_count
     assert lost > 0
-    assert f'{recorder.message_count} messages, {lost} missed' in recorder.summary()
+    assert f'{recorder.run.message_count} messages, {lost} missed' in recorder.summary()
 
 
 def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_until):
     recorder = record()
-    poses = publisher(PoseStamped, 'atomizer/pose', qos.replayed(1_000))
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=1_000))
     poses.publish(pose(START_NS))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 1, what='the first pose')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
     for k in range(1, 500):
         poses.publish(pose(START_NS + k))
     poses.wait_for_all_acked()
@@ -243,7 +246,7 @@ def test_the_recorder_reports_progress(record, publisher, wait_until, cell):
     record()
     reports = []
     cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, qos.PROGRESS)
-    poses = publisher(PoseStamped, 'atomizer/pose', qos.replayed())
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS + 7))
     wait_until(lambda: reports and reports[-1].poses_received == 1, what='a report')
     assert stamp_ns(reports[-1].header) == START_NS + 7
@@ -251,17 +254,17 @@ def test_the_recorder_reports_progress(record, publisher, wait_until, cell):
 
 def test_stop_finishes_the_run(record, publisher, wait_until, cell):
     recorder = record()
-    poses = publisher(PoseStamped, 'atomizer/pose', qos.replayed())
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS))
-    wait_until(lambda: recorder.recorded('atomizer/pose') == 1, what='the pose')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the pose')
     client = cell.create_client(Trigger, 'run_recorder/stop')
     wait_until(client.service_is_ready, what='the service')
     future = client.call_async(Trigger.Request())
     wait_until(future.done, what='the answer')
     assert future.result().success
-    assert future.result().message.endswith(f'file complete: {recorder.folder}')
+    assert future.result().message.endswith(f'file complete: {recorder.run.folder}')
     assert recorder.finished.result() == 0
-    assert (recorder.folder / 'metadata.yaml').exists()
+    assert (recorder.run.folder / 'metadata.yaml').exists()
 
 
 def test_what_the_run_was_made_with_is_kept(record, tmp_path):
@@ -284,9 +287,9 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
     )
     (result,) = planner.set_parameters([Parameter('width_m', value=0.75)])
     assert result.successful
-    wait_until(lambda: recorder.recorded('/parameter_events') >= 1, what='the event')
+    wait_until(lambda: recorder.run.counts.get('/parameter_events', 0) >= 1, what='the event')
     finish(recorder)
-    with open_bag(recorder.folder) as bag:
+    with open_bag(recorder.run.folder) as bag:
         (event,) = (event for _, _, event in bag.decoded(['/parameter_events']))
     assert event.node == '/index_planner'
     (change,) = event.changed_parameters
@@ -297,7 +300,7 @@ def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
     record()
     got = []
     cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
-    poses = publisher(PoseStamped, 'atomizer/pose', qos.replayed())
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS))
 
     def told() -> bool:
@@ -353,7 +356,8 @@ class RobotStream:
 
     def __init__(self, cell: Node) -> None:
         self.sent = 0
-        self._publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', qos.replayed(2_000))
+        profile = QoSProfile(depth=2_000)
+        self._publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._start_s = time.monotonic()
         cell.create_timer(0.004, self._publish)
 
@@ -371,7 +375,7 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
     with NodeProcess(
         tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run', topics='[/pose]'
     ) as process:
-        poses = publisher(PoseStamped, '/pose', qos.replayed(100))
+        poses = publisher(PoseStamped, '/pose', QoSProfile(depth=100))
         for number in range(100):
             poses.publish(pose(START_NS + number * 4_000_000))
 

@@ -14,6 +14,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
@@ -62,10 +63,10 @@ class Listener(Node):
         self.order: list[str] = []
         self.reports = reports
         self.create_subscription(
-            PoseStamped, 'atomizer/pose', self.take_pose, qos.replayed(5_000), raw=True
+            PoseStamped, 'atomizer/pose', self.take_pose, QoSProfile(depth=5_000), raw=True
         )
         self.create_subscription(
-            AtomizerState, 'atomizer/state', self.take_state, qos.replayed(5_000)
+            AtomizerState, 'atomizer/state', self.take_state, QoSProfile(depth=5_000)
         )
         self.publisher = (
             self.create_publisher(PoseProgress, 'atomizer/progress', qos.PROGRESS)
@@ -417,7 +418,7 @@ def test_the_process_ends_with_what_it_did(ros_domain, listen, wait_until, pass_
     listener = listen()
     with NodeProcess(
         tmp_path / 'player',
-        'paint_deposition.nodes.replay.bag_player',
+        'bag_player',
         bag=pass_bag,
         state_topic='/atomizer/state',
         rate='0.0',
@@ -429,9 +430,7 @@ def test_the_process_ends_with_what_it_did(ros_domain, listen, wait_until, pass_
 
 
 def test_an_interrupt_ends_a_waiting_player(ros_domain, wait_until, pass_bag, tmp_path):
-    with NodeProcess(
-        tmp_path / 'player', 'paint_deposition.nodes.replay.bag_player', bag=pass_bag
-    ) as process:
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=pass_bag) as process:
         wait_until(lambda: 'waiting for 1 subscribers' in process.err)
         process.interrupt_as_launch_does()
         assert process.wait() == 0
@@ -446,9 +445,7 @@ def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_u
     content[len(content) // 2] ^= 0xFF
     path.write_bytes(content)
     listen()
-    with NodeProcess(
-        tmp_path / 'player', 'paint_deposition.nodes.replay.bag_player', bag=bag, rate='0.0'
-    ) as process:
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag, rate='0.0') as process:
         wait_until(lambda: process.exit_code is not None, what='the end')
         assert process.exit_code == 2
         assert f'run: paint recover {bag}' in process.err

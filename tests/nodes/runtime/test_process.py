@@ -16,10 +16,10 @@ from paint_deposition.nodes.runtime.process import run_node
 
 
 class Worker(PaintNode):
-    PARAMETERS = (
-        NodeParameter('does', 'run', 'What it does [word]'),
-        NodeParameter('rate_hz', 1.0, 'Rate [Hz]', low=0.1),
-    )
+    PARAMETERS = {
+        'does': NodeParameter('run', 'What it does [word]'),
+        'rate_hz': NodeParameter(1.0, 'Rate [Hz]', (0.1, float('inf'))),
+    }
 
     def __init__(self, **kwargs):
         super().__init__('worker', **kwargs)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 
 import click
@@ -42,7 +43,7 @@ def inspect_command(
     refuse_gun_signal(recording, gun_signal)
     summary = summarise(recording, max_pose_gap_s)
     if as_json:
-        click.echo(json_text(summary.to_dict()))
+        click.echo(json_text(asdict(summary)))
     else:
         click.echo(_table(summary))
 

@@ -11,17 +11,19 @@ REMEDIES = {
 }
 
 
-def _run(name: str, module: str) -> int:
+def _run(name: str, folder: str, node_class: str) -> int:
     """Load a node's module and run it; returns the process's exit code."""
     for needed, remedy in REMEDIES.items():
         if find_spec(needed) is None:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
-    return importlib.import_module(f'paint_deposition.nodes.{module}.{name}').main()
+    module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
+    process = importlib.import_module('paint_deposition.nodes.runtime.process')
+    return process.run_node(getattr(module, node_class))
 
 
-bag_player = partial(_run, 'bag_player', 'replay')
-deposition_simulator = partial(_run, 'deposition_simulator', 'painting')
-index_planner = partial(_run, 'index_planner', 'planning')
-model_comparison = partial(_run, 'model_comparison', 'comparison')
-run_recorder = partial(_run, 'run_recorder', 'recording')
+bag_player = partial(_run, 'bag_player', 'replay', 'BagPlayer')
+deposition_simulator = partial(_run, 'deposition_simulator', 'painting', 'DepositionSimulator')
+index_planner = partial(_run, 'index_planner', 'planning', 'IndexPlanner')
+model_comparison = partial(_run, 'model_comparison', 'comparison', 'ModelComparison')
+run_recorder = partial(_run, 'run_recorder', 'recording', 'RunRecorder')

@@ -4,11 +4,10 @@ Only the types of the topics that are read are parsed: one exotic topic, such as
 events that rosbags does not understand, does not make the poses beside it unreadable.
 """
 
-from __future__ import annotations
-
-import functools
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -25,7 +24,8 @@ from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_
 ROS2_SUFFIXES = ('.mcap', '.db3')
 
 
-class BagTopic(NamedTuple):
+@dataclass(frozen=True)
+class BagTopic:
     """A topic of a bag; `type` is written as ROS 2 does (`pkg/msg/Type`), for ROS 1 as well."""
 
     name: str
@@ -47,99 +47,69 @@ class Bag:
 
     def __init__(self, path: Path, reader: Ros1Reader | Ros2Reader) -> None:
         self.path = path
-        self.is_ros1 = isinstance(reader, Ros1Reader)
         self._reader = reader
+        self._is_ros1 = isinstance(reader, Ros1Reader)
+        self._stores: dict[str, Typestore] = {}
+        counts: Counter[tuple[str, str]] = Counter()
+        for connection in reader.connections:
+            counts[connection.topic, connection.msgtype] += connection.msgcount
+        # In order of their names, those without messages included.
+        self.topics = [BagTopic(*key, count) for key, count in sorted(counts.items())]
 
-    @functools.cached_property
-    def topics(self) -> list[BagTopic]:
-        """Topics in order of their names, those without messages included."""
-        counts: dict[tuple[str, str], int] = {}
-        for connection in self._reader.connections:
-            key = (connection.topic, connection.msgtype)
-            counts[key] = counts.get(key, 0) + connection.msgcount
-        return [BagTopic(name, type_, count) for (name, type_), count in sorted(counts.items())]
-
-    def topics_of(self, message_type: str) -> list[str]:
-        return [topic.name for topic in self.topics if topic.type == message_type]
+    def topics_of(self, *types: str) -> list[BagTopic]:
+        """Topics of these types, those of the first type first."""
+        return [topic for type_ in types for topic in self.topics if topic.type == type_]
 
     def find(self, name: str) -> BagTopic | None:
         """The topic of that name, given with or without a leading slash."""
-        for topic in self.topics:
-            if topic.name.lstrip('/') == name.lstrip('/'):
-                return topic
-        return None
+        wanted = name.lstrip('/')
+        return next((topic for topic in self.topics if topic.name.lstrip('/') == wanted), None)
 
-    def type_hash(self, name: str) -> str:
+    def type_hash(self, topic: BagTopic) -> str:
         """RIHS01 hash of a topic's type as the bag defines it."""
         with _reading(self.path):
-            connection = self._connection(name)
-            return self._types(connection).hash_rihs01(connection.msgtype)
+            return self._types(topic.name).hash_rihs01(topic.type)
 
     def decode(self, message: RawMessage) -> Any:
         """The message object of rosbags for one of this bag's messages."""
         with _reading(self.path):
-            connection = self._connection(message.topic)
-            types = self._ros2_types(connection) if self.is_ros1 else self._types(connection)
-            return types.deserialize_cdr(message.cdr, message.type)
-
-    def _connection(self, topic: str) -> Connection:
-        return next(c for c in self._reader.connections if c.topic == topic)
+            return self._types(message.topic).deserialize_cdr(message.cdr, message.type)
 
     def messages(self, topics: Sequence[str] = ()) -> Iterator[RawMessage]:
         """Messages of these topics (all, if none are named) in the order of their log time."""
         with _reading(self.path):
-            for connection, log_time_ns, data in self._raw(topics):
-                if self.is_ros1:
-                    types = self._ros2_types(connection)
-                    data = bytes(types.ros1_to_cdr(data, connection.msgtype))
-                yield RawMessage(connection.topic, connection.msgtype, log_time_ns, bytes(data))
+            chosen = [c for c in self._reader.connections if not topics or c.topic in topics]
+            for connection, log_time_ns, data in self._reader.messages(connections=chosen):
+                topic, type_ = connection.topic, connection.msgtype
+                cdr = self._types(topic).ros1_to_cdr(data, type_) if self._is_ros1 else data
+                yield RawMessage(topic, type_, log_time_ns, bytes(cdr))
 
     def decoded(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
         """(topic, log time [ns], message object of rosbags) of these topics."""
-        with _reading(self.path):
-            for connection, log_time_ns, data in self._raw(topics):
-                types = self._types(connection)
-                decode = types.deserialize_ros1 if self.is_ros1 else types.deserialize_cdr
-                yield connection.topic, log_time_ns, decode(data, connection.msgtype)
+        for message in self.messages(topics):
+            yield message.topic, message.log_time_ns, self.decode(message)
 
-    def _raw(self, topics: Sequence[str]) -> Iterator[tuple[Connection, int, bytes]]:
-        chosen = [c for c in self._reader.connections if not topics or c.topic in topics]
-        return self._reader.messages(connections=chosen)
+    def _types(self, topic: str) -> Typestore:
+        """What a topic's messages consist of; ROS 1's headers as in ROS 2, without a number."""
+        if topic not in self._stores:
+            connection = next(c for c in self._reader.connections if c.topic == topic)
+            store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
+            types = self._definitions(connection)
+            store.register({name: types[name] for name in types if name not in store.fielddefs})
+            self._stores[topic] = store
+        return self._stores[topic]
 
-    @functools.cached_property
-    def _stores(self) -> dict[str, Typestore]:
-        return {}
-
-    def _types(self, connection: Connection) -> Typestore:
-        store = self._stores.get(connection.msgtype)
-        if store is None:
-            store = get_typestore(Stores.EMPTY)
-            store.register(self._definitions(connection))
-            self._stores[connection.msgtype] = store
-        return store
-
-    @functools.cached_property
-    def _converter(self) -> Typestore:
-        return get_typestore(definitions.STANDARD_STORE)
-
-    def _ros2_types(self, connection: Connection) -> Typestore:
-        """ROS 2's layout of a ROS 1 type: its header has no sequence number."""
-        store = self._converter
-        if connection.msgtype not in store.fielddefs:
-            own = self._definitions(connection)
-            store.register({name: own[name] for name in own if name not in store.fielddefs})
-        return store
-
-    def _definitions(self, connection: Connection) -> dict:
+    @staticmethod
+    def _definitions(connection: Connection) -> dict:
         kind, text = connection.msgdef
         if kind == MessageDefinitionFormat.MSG:
             return get_types_from_msg(text, connection.msgtype)
         if kind == MessageDefinitionFormat.IDL:
             return get_types_from_idl(text)
-        standard = get_typestore(definitions.STANDARD_STORE)
-        if connection.msgtype in standard.fielddefs:
-            return dict(standard.fielddefs)
         # Older sqlite3 bags hold no definitions at all.
+        standard = get_typestore(definitions.STANDARD_STORE).fielddefs
+        if connection.msgtype in standard:
+            return dict(standard)
         return get_types_from_msg(
             definitions.installed(connection.msgtype).text, connection.msgtype
         )
@@ -167,30 +137,20 @@ def _refuse_what_is_no_bag(path: Path) -> None:
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
     if path.is_dir():
-        if not any(file.suffix in ROS2_SUFFIXES or _compressed(file) for file in path.iterdir()):
+        names = [file.name.removesuffix('.zstd') for file in path.iterdir()]
+        if not any(name.endswith(ROS2_SUFFIXES) for name in names):
             raise RecordingError(f'{path} is not a rosbag2 folder: it holds no .mcap or .db3 file')
-        for file in mcap_files(path):
-            _refuse_unfinished(file, path)
-        if not (path / 'metadata.yaml').is_file():
-            raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
-        return
-    if path.suffix not in ('.bag', *ROS2_SUFFIXES):
+    elif path.suffix not in ('.bag', *ROS2_SUFFIXES):
         raise RecordingError(
             f'{path} is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap file'
         )
-    if path.stat().st_size == 0:
+    elif path.stat().st_size == 0:
         raise RecordingError(f'{path} is empty')
-    if path.suffix == '.mcap':
-        _refuse_unfinished(path, path)
-
-
-def _compressed(file: Path) -> bool:
-    return file.suffix == '.zstd' and file.with_suffix('').suffix in ROS2_SUFFIXES
-
-
-def _refuse_unfinished(file: Path, named: Path) -> None:
-    if is_unfinished(file):
-        raise RecordingError(_unfinished(named, f'{file.name} has no end'))
+    for file in mcap_files(path):
+        if is_unfinished(file):
+            raise RecordingError(_unfinished(path, f'{file.name} has no end'))
+    if path.is_dir() and not (path / 'metadata.yaml').is_file():
+        raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
 
 
 def _unfinished(path: Path, reason: str) -> str:

@@ -1,8 +1,6 @@
 """What a bag holds, at a glance: its topics, and how good its streams of poses are."""
 
-from __future__ import annotations
-
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -41,24 +39,16 @@ class BagSummary:
     pose_streams: list[PoseStream]
     triggers: list[str]
 
-    def to_dict(self) -> dict:
-        return {
-            'path': self.path,
-            'topics': [topic._asdict() for topic in self.topics],
-            'pose_streams': [asdict(stream) for stream in self.pose_streams],
-            'triggers': self.triggers,
-        }
-
 
 def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
     """Look at every topic of a bag and read its poses; a longer interval is counted as a gap."""
     with open_bag(path) as bag:
         topics = bag.topics
-        triggers = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
+        triggers = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
     streams = [
         _pose_stream(path, topic.name, max_pose_gap_s)
-        for topic in topics
-        if topic.type == POSE_TYPE and topic.message_count
+        for topic in bag.topics_of(POSE_TYPE)
+        if topic.message_count
     ]
     return BagSummary(str(path), topics, streams, triggers)
 

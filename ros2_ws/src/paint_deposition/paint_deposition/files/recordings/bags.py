@@ -1,12 +1,10 @@
 """A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
 
-from __future__ import annotations
-
-import math
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from rosbags.typesys import get_typestore
@@ -52,15 +50,13 @@ def read_trajectory(
         poses = choose_pose_topic(bag, pose_topic)
         state = choose_state_topic(bag, state_topic) if state_topic else None
         notes = () if state else _unused_triggers(bag)
-        read = _read_poses(bag, poses)
+        trajectory, log_times_ns = _read_poses(bag, poses)
         changes = sorted(_flow_changes(bag, state), key=lambda change: change[0]) if state else []
         if state and state.type == BOOL_TYPE:
-            _refuse_other_clock(bag, state, read)
-    return Trajectory(
-        stamps_ns=read.stamps_ns,
-        positions_m=read.positions_m,
-        quaternions_xyzw=read.quaternions_xyzw,
-        frame_id=read.frame_id,
+            offset_ns = float(np.median(log_times_ns - trajectory.stamps_ns))
+            _refuse_other_clock(bag, state, poses, offset_ns * 1e-9)
+    return replace(
+        trajectory,
         trigger_stamps_ns=np.array([stamp for stamp, _ in changes], dtype=np.int64),
         trigger_flow=np.array([flow for _, flow in changes], dtype=float),
         notes=notes,
@@ -74,7 +70,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
         if len(candidates) != 1:
             listed = _listed(candidates, 'PoseStamped')
             raise RecordingError(f'{bag.path}: name a pose topic; {listed}')
-        name = candidates[0]
+        name = candidates[0].name
     topic = _choose_topic(bag, name, (POSE_TYPE,), 'PoseStamped')
     if topic.message_count == 0:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
@@ -87,7 +83,7 @@ def choose_state_topic(bag: Bag, name: str) -> BagTopic:
 
 
 def _choose_topic(bag: Bag, name: str, types: tuple[str, ...], kind: str) -> BagTopic:
-    listed = _listed([topic for type_ in types for topic in bag.topics_of(type_)], kind)
+    listed = _listed(bag.topics_of(*types), kind)
     topic = bag.find(name)
     if topic is None:
         raise RecordingError(f'{bag.path} has no topic {name}; {listed}')
@@ -103,21 +99,16 @@ def stamp_ns(header: Any) -> int:
     return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
-def _listed(candidates: list[str], kind: str) -> str:
+def _listed(candidates: list[BagTopic], kind: str) -> str:
     if not candidates:
         return f'it has no {kind} topic'
-    return f'its {kind} topics: {" ".join(candidates)}'
+    return f'its {kind} topics: {" ".join(topic.name for topic in candidates)}'
 
 
 def _unused_triggers(bag: Bag) -> tuple[str, ...]:
     """One note that names the topics that could be the trigger; none where there are none."""
     # States say what they are, a Bool may be anything: the first is the likeliest trigger.
-    topics = [
-        topic
-        for kind in (STATE_TYPE, BOOL_TYPE)
-        for topic in bag.topics
-        if topic.type == kind and topic.message_count
-    ]
+    topics = [topic for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE) if topic.message_count]
     if not topics:
         return ()
     named = ' and '.join(f'{topic.name} ({topic.type})' for topic in topics)
@@ -128,16 +119,8 @@ def _unused_triggers(bag: Bag) -> tuple[str, ...]:
     )
 
 
-class _Poses(NamedTuple):
-    topic: str
-    stamps_ns: np.ndarray
-    log_times_ns: np.ndarray
-    positions_m: np.ndarray
-    quaternions_xyzw: np.ndarray
-    frame_id: str
-
-
-def _read_poses(bag: Bag, topic: BagTopic) -> _Poses:
+def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
+    """The poses of a topic, and the times (N,) int64 at which they were logged [ns]."""
     stamps, log_times, rows = [], [], []
     frames: Counter[str] = Counter()
     for _, log_time_ns, message in bag.decoded([topic.name]):
@@ -160,14 +143,13 @@ def _read_poses(bag: Bag, topic: BagTopic) -> _Poses:
             'let the publisher stamp each pose'
         )
     values = np.array(rows, dtype=float)
-    return _Poses(
-        topic.name,
+    trajectory = Trajectory(
         np.array(stamps, dtype=np.int64),
-        np.array(log_times, dtype=np.int64),
         np.ascontiguousarray(values[:, :3]),
         np.ascontiguousarray(values[:, 3:]),
         next(iter(frames)),
     )
+    return trajectory, np.array(log_times, dtype=np.int64)
 
 
 def _flow_changes(bag: Bag, topic: BagTopic) -> Iterator[tuple[int, float]]:
@@ -184,11 +166,10 @@ def _flow_changes(bag: Bag, topic: BagTopic) -> Iterator[tuple[int, float]]:
         yield stamp, relative_flow(message.spraying, message.flow)
 
 
-def _refuse_other_clock(bag: Bag, state: BagTopic, poses: _Poses) -> None:
-    offset_s = float(np.median((poses.log_times_ns - poses.stamps_ns) * 1e-9))
+def _refuse_other_clock(bag: Bag, state: BagTopic, poses: BagTopic, offset_s: float) -> None:
     if abs(offset_s) > MAX_CLOCK_OFFSET_S:
         raise RecordingError(
-            f'{state.name} in {bag.path} has no stamps, and {poses.topic} was logged '
+            f'{state.name} in {bag.path} has no stamps, and {poses.name} was logged '
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead of {BOOL_TYPE}'
         )
 
@@ -210,16 +191,28 @@ def write_pose_bag(
         raise RecordingError(
             f'{folder}: a Bool trigger cannot hold flow {min(levels):g}; use 0 and 1'
         )
+    poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
+    broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
+    if len(broken):
+        raise RecordingError(
+            f'pose {broken[0]} of {len(trajectory)} is not finite; nothing written'
+        )
     types = get_typestore(definitions.STANDARD_STORE)
+    triggers = zip(trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow, strict=True)
+    # Behind the time, what comes first of those at one time.
+    entries: list[tuple[int, int, Any]] = [(time_ns, 0, flow > 0.0) for time_ns, flow in triggers]
+    entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
         _add_topic(run, pose_topic, POSE_TYPE)
         if len(trajectory.trigger_stamps_ns):
             _add_topic(run, state_topic, BOOL_TYPE)
-        for topic, time_ns, message, message_type in _in_order(
-            trajectory, types, pose_topic, state_topic
-        ):
-            cdr = bytes(types.serialize_cdr(message, message_type))
-            run.write(topic, cdr, time_ns, time_ns)
+        for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
+            if is_pose:
+                pose = _pose(types, time_ns, trajectory.frame_id, poses[content].tolist())
+                cdr = types.serialize_cdr(pose, POSE_TYPE)
+            else:
+                cdr = types.serialize_cdr(types.types[BOOL_TYPE](content), BOOL_TYPE)
+            run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
     return run.folder
 
 
@@ -228,37 +221,13 @@ def _add_topic(run: RunWriter, name: str, message_type: str) -> None:
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 
-def _in_order(
-    trajectory: Trajectory, types: Typestore, pose_topic: str, state_topic: str
-) -> Iterator[tuple[str, int, object, str]]:
-    bool_class = types.types[BOOL_TYPE]
-    triggers = [
-        (int(stamp), 0, state_topic, bool_class(flow > 0.0), BOOL_TYPE)
-        for stamp, flow in zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True)
-    ]
-    poses = [
-        (int(stamp), 1, pose_topic, _pose(types, int(stamp), trajectory, row), POSE_TYPE)
-        for row, stamp in enumerate(trajectory.stamps_ns)
-    ]
-    for time_ns, _, topic, message, message_type in sorted(
-        triggers + poses, key=lambda item: item[:2]
-    ):
-        yield topic, time_ns, message, message_type
-
-
-def _pose(types: Typestore, time_ns: int, trajectory: Trajectory, row: int) -> object:
+def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:
     make = types.types
-    sec, nanosec = divmod(time_ns, 1_000_000_000)
-    x, y, z = trajectory.positions_m[row].tolist()
-    quaternion = trajectory.quaternions_xyzw[row].tolist()
-    if not all(map(math.isfinite, (x, y, z, *quaternion))):
-        raise RecordingError(f'pose {row} of {len(trajectory)} is not finite; nothing written')
+    stamp = make['builtin_interfaces/msg/Time'](*divmod(time_ns, 1_000_000_000))
     return make[POSE_TYPE](
-        make['std_msgs/msg/Header'](
-            make['builtin_interfaces/msg/Time'](sec, nanosec), trajectory.frame_id
-        ),
+        make['std_msgs/msg/Header'](stamp, frame_id),
         make['geometry_msgs/msg/Pose'](
-            make['geometry_msgs/msg/Point'](x, y, z),
-            make['geometry_msgs/msg/Quaternion'](*quaternion),
+            make['geometry_msgs/msg/Point'](*values[:3]),
+            make['geometry_msgs/msg/Quaternion'](*values[3:]),
         ),
     )

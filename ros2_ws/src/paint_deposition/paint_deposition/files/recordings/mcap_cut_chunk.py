@@ -3,17 +3,18 @@
 Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
 """
 
-from __future__ import annotations
-
 import struct
+from dataclasses import replace
+from io import BytesIO
 
 import lz4.frame
 import zstandard
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
 from mcap.opcode import Opcode
 from mcap.records import Chunk
 
-# opcode, record length; start and end time, uncompressed size, CRC, length of the compression name
-HEAD = struct.Struct('<BQQQQII')
+# opcode, record length
 RECORD_HEAD = struct.Struct('<BQ')
 
 
@@ -22,21 +23,17 @@ def readable_beginning(record: bytes) -> Chunk | None:
 
     The checksum of the chunk covers all of it and cannot be checked any more.
     """
-    if len(record) < HEAD.size or record[0] != Opcode.CHUNK:
+    if record[:1] != bytes([Opcode.CHUNK]):
         return None
-    _, _, start_ns, end_ns, _, _, name_length = HEAD.unpack_from(record)
-    data_at = HEAD.size + name_length + 8
-    compression = record[HEAD.size : HEAD.size + name_length].decode('ascii', errors='replace')
-    whole = _whole_records(_decompressed(record[data_at:], compression))
-    if not whole:
+    try:
+        chunk = Chunk.read(ReadDataStream(BytesIO(record[RECORD_HEAD.size :])))
+    except (McapError, struct.error, ValueError, OverflowError):
         return None
-    return Chunk(
-        compression='',
-        data=whole,
-        message_end_time=end_ns,
-        message_start_time=start_ns,
-        uncompressed_crc=0,
-        uncompressed_size=len(whole),
+    data = _whole_records(_decompressed(chunk.data, chunk.compression))
+    if not data:
+        return None
+    return replace(
+        chunk, compression='', data=data, uncompressed_crc=0, uncompressed_size=len(data)
     )
 
 

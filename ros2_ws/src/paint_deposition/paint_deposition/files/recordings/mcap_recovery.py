@@ -1,7 +1,5 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import struct
@@ -144,17 +142,20 @@ class _Survey:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
 
+    def note(self, record: McapRecord) -> None:
+        if isinstance(record, Metadata) and record.name == 'rosbag2':
+            self.information = _mapping(record) or self.information
+        elif isinstance(record, Schema):
+            self.schemas[record.id] = record
+        elif isinstance(record, Channel):
+            self.channels[record.id] = record
+
 
 def _survey(file: Path) -> _Survey:
     survey = _Survey()
     with file.open('rb') as stream:
-        for record in _records(file, stream, Recovery(file)):
-            if isinstance(record, Metadata) and record.name == 'rosbag2':
-                survey.information = _mapping(record) or survey.information
-            elif isinstance(record, Schema):
-                survey.schemas[record.id] = record
-            elif isinstance(record, Channel):
-                survey.channels[record.id] = record
+        for record in _records(file, stream, []):
+            survey.note(record)
     return survey
 
 
@@ -166,7 +167,7 @@ def _mapping(record: Metadata) -> dict:
     return content if isinstance(content, dict) else {}
 
 
-def _records(file: Path, stream: BinaryIO, recovery: Recovery) -> Iterator[McapRecord]:
+def _records(file: Path, stream: BinaryIO, breaks: list[str]) -> Iterator[McapRecord]:
     """Records up to the break, which is noted; chunks are not opened."""
     size = file.stat().st_size
     reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
@@ -184,7 +185,7 @@ def _records(file: Path, stream: BinaryIO, recovery: Recovery) -> Iterator[McapR
         if beginning:
             yield beginning
         reason = 'the end is missing' if cut else str(error)
-        recovery.breaks.append(f'{file.name} breaks off at byte {record_at} of {size}: {reason}')
+        breaks.append(f'{file.name} breaks off at byte {record_at} of {size}: {reason}')
 
 
 def _copy(
@@ -194,28 +195,18 @@ def _copy(
     recovery: Recovery,
     on_bytes: Callable[[int], None],
 ) -> None:
-    schemas, channels = dict(survey.schemas), dict(survey.channels)
-    topics: dict[int, str | None] = {}
-
-    def topic_of(channel_id: int) -> str | None:
-        if channel_id in channels and channel_id not in topics:
-            topics[channel_id] = _add_topic(channels[channel_id], schemas, writer, recovery)
-        return topics.get(channel_id)
-
     with file.open('rb') as stream:
         position = 0
-        for record in _records(file, stream, recovery):
+        for record in _records(file, stream, recovery.breaks):
             for inner in _opened(record, recovery):
-                if isinstance(inner, Schema):
-                    schemas[inner.id] = inner
-                elif isinstance(inner, Channel):
-                    channels[inner.id] = inner
-                    topic_of(inner.id)
+                survey.note(inner)
+                if isinstance(inner, Channel):
+                    _is_kept(inner, survey, writer, recovery)
                 elif isinstance(inner, Message):
                     # The chunk that introduced the channel may be among the damaged ones.
-                    topic = topic_of(inner.channel_id)
-                    if topic:
-                        writer.write(topic, inner.data, inner.log_time, inner.publish_time)
+                    channel = survey.channels.get(inner.channel_id)
+                    if channel and _is_kept(channel, survey, writer, recovery):
+                        writer.write(channel.topic, inner.data, inner.log_time, inner.publish_time)
             on_bytes(stream.tell() - position)
             position = stream.tell()
 
@@ -230,20 +221,19 @@ def _opened(record: McapRecord, recovery: Recovery) -> list[McapRecord]:
         return []
 
 
-def _add_topic(
-    channel: Channel, schemas: dict[int, Schema], writer: RunWriter, recovery: Recovery
-) -> str | None:
-    schema = schemas.get(channel.schema_id)
+def _is_kept(channel: Channel, survey: _Survey, writer: RunWriter, recovery: Recovery) -> bool:
+    """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
+    schema = survey.schemas.get(channel.schema_id)
     if schema is None or channel.message_encoding != 'cdr':
         if channel.topic not in recovery.skipped_topics:
             recovery.skipped_topics.append(channel.topic)
-        return None
+        return False
     if channel.topic not in writer.counts:
         definition = Definition(
             schema.data.decode(), channel.metadata.get('topic_type_hash', ''), schema.encoding
         )
         writer.add_topic(RunTopic(channel.topic, schema.name, definition, _qos(channel)))
-    return channel.topic
+    return True
 
 
 def _qos(channel: Channel) -> list[Qos]:

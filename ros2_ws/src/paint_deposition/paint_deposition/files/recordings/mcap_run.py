@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from io import BufferedWriter, FileIO
 from pathlib import Path
@@ -91,8 +92,6 @@ class RunWriter:
         custom_data: Mapping[str, str] | None = None,
         compression: str = 'zstd',
         ros_distro: str | None = None,
-        chunk_bytes: int = CHUNK_BYTES,
-        chunk_seconds: float = CHUNK_SECONDS,
     ) -> None:
         self.folder = Path(folder)
         self.path = self.folder / f'{self.folder.name}_0.mcap'
@@ -105,44 +104,53 @@ class RunWriter:
         self._schemas: dict[str, int] = {}
         self._first_ns = NO_TIME_NS
         self._last_ns = 0
-        self._chunk_seconds = chunk_seconds
         self._chunk_opened_s: float | None = None
         self._failure: str | None = None
         self._raw = self._create()
         self._stream = BufferedWriter(self._raw)
         self._writer = Writer(
             self._stream,
-            chunk_size=chunk_bytes,
+            chunk_size=CHUNK_BYTES,
             compression=COMPRESSIONS[compression],
             index_types=INDEXES,
         )
-        self._guarded(self._start)
+        with self._guarded():
+            self._writer.start(profile='ros2', library='paint_deposition')
+            self._write_metadata_record()
+            self._writer.flush()
 
     @property
     def message_count(self) -> int:
         return sum(self.counts.values())
 
-    @property
-    def bytes_written(self) -> int:
-        """Size of the file so far [bytes]."""
-        return self.path.stat().st_size
-
     def add_topic(self, topic: RunTopic) -> None:
         """Make a topic known; one that never gets a message is still listed in the metadata."""
         if topic.name in self._topics:
             raise RecordingError(f'{topic.name} is already recorded in {self.folder}')
-        self._guarded(self._register, topic)
+        with self._guarded():
+            if topic.type not in self._schemas:
+                definition = topic.definition
+                self._schemas[topic.type] = self._writer.register_schema(
+                    topic.type, definition.encoding, definition.text.encode()
+                )
+            self._channels[topic.name] = self._writer.register_channel(
+                topic.name,
+                'cdr',
+                self._schemas[topic.type],
+                {
+                    'offered_qos_profiles': _yaml(dump_qos_v9(list(topic.qos))).strip(),
+                    'topic_type_hash': topic.definition.type_hash,
+                },
+            )
+        self._topics[topic.name] = topic
+        self.counts[topic.name] = 0
 
     def write(self, topic: str, cdr: bytes, log_time_ns: int, publish_time_ns: int) -> None:
         """Append a message: when it was received, and when its publisher sent it."""
-        self._guarded(
-            self._writer.add_message,
-            self._channels[topic],
-            log_time_ns,
-            cdr,
-            publish_time_ns,
-            self.counts[topic],
-        )
+        with self._guarded():
+            self._writer.add_message(
+                self._channels[topic], log_time_ns, cdr, publish_time_ns, self.counts[topic]
+            )
         self.counts[topic] += 1
         self._first_ns = min(self._first_ns, log_time_ns)
         self._last_ns = max(self._last_ns, log_time_ns)
@@ -153,14 +161,16 @@ class RunWriter:
     def close_old_chunk(self) -> None:
         """Hand the open chunk to the operating system if it is older than half a second."""
         opened = self._chunk_opened_s
-        if opened is not None and time.monotonic() - opened >= self._chunk_seconds:
-            self._guarded(self._writer.flush)
+        if opened is not None and time.monotonic() - opened >= CHUNK_SECONDS:
+            with self._guarded():
+                self._writer.flush()
             self._chunk_opened_s = None
 
     def finish(self) -> Path:
         """Complete the run and return its folder."""
         if not self.complete:
-            self._guarded(self._finish)
+            with self._guarded():
+                self._finish()
             self.complete = True
         return self.folder
 
@@ -187,12 +197,13 @@ class RunWriter:
         except OSError as error:
             raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
 
-    def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
-        """Run a step that writes; the first failure is the last write."""
+    @contextmanager
+    def _guarded(self) -> Iterator[None]:
+        """Around every write; the first failure is the last write."""
         if self._failure:
             raise RecordingError(self._failure)
         try:
-            step(*arguments)
+            yield
         except OSError as error:
             self._failure = (
                 f'{self.folder} is incomplete after {self.message_count} messages: '
@@ -201,30 +212,6 @@ class RunWriter:
             # Closing below the buffer drops what the full disk did not take.
             self._raw.close()
             raise RecordingError(self._failure) from None
-
-    def _start(self) -> None:
-        self._writer.start(profile='ros2', library='paint_deposition')
-        self._write_metadata_record()
-        self._writer.flush()
-
-    def _register(self, topic: RunTopic) -> None:
-        if topic.type not in self._schemas:
-            definition = topic.definition
-            self._schemas[topic.type] = self._writer.register_schema(
-                topic.type, definition.encoding, definition.text.encode()
-            )
-        profiles = dump_qos_v9(list(topic.qos))
-        self._channels[topic.name] = self._writer.register_channel(
-            topic.name,
-            'cdr',
-            self._schemas[topic.type],
-            {
-                'offered_qos_profiles': _yaml(profiles).strip(),
-                'topic_type_hash': topic.definition.type_hash,
-            },
-        )
-        self._topics[topic.name] = topic
-        self.counts[topic.name] = 0
 
     def _finish(self) -> None:
         self._writer.flush()

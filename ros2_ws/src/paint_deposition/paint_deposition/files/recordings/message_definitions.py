@@ -1,7 +1,5 @@
 """Message definitions as rosbag2 stores them beside the messages: text with dependencies, hash."""
 
-from __future__ import annotations
-
 import functools
 import json
 from dataclasses import dataclass
@@ -39,13 +37,22 @@ def installed(message_type: str) -> Definition:
 
     Raises RecordingError when the installation has no such message.
     """
-    own = _share_file(message_type, '.msg').read_text()
-    parts = [own]
-    for dependency in _dependencies(message_type):
-        package, _, name = dependency.split('/')
-        text = _share_file(dependency, '.msg').read_text()
+    texts: dict[str, str] = {}  # each type once, depth first, as rosbag2 orders them
+
+    def collect(name: str) -> None:
+        texts[name] = _share_file(name, '.msg').read_text()
+        for used in sorted(_used_types(texts[name], name)):
+            if used not in texts:
+                collect(used)
+
+    collect(message_type)
+    parts = [texts.pop(message_type)]
+    for used, text in texts.items():
+        package, _, name = used.split('/')
         parts.append(f'{SEPARATOR}\nMSG: {package}/{name}\n{text}')
-    return Definition('\n'.join(parts), _installed_hash(message_type))
+    description = json.loads(_share_file(message_type, '.json').read_text())
+    hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
+    return Definition('\n'.join(parts), hashes.get(message_type, ''))
 
 
 @functools.cache
@@ -54,20 +61,6 @@ def standard(message_type: str) -> Definition:
     store = get_typestore(STANDARD_STORE)
     text, _ = store.generate_msgdef(message_type, ros_version=2)
     return Definition(text, store.hash_rihs01(message_type))
-
-
-def _dependencies(message_type: str) -> list[str]:
-    """Types used by a type, each once, depth first, as rosbag2 orders them."""
-    found: dict[str, None] = {}
-
-    def collect(name: str) -> None:
-        for used in sorted(_used_types(_share_file(name, '.msg').read_text(), name)):
-            if used not in found:
-                found[used] = None
-                collect(used)
-
-    collect(message_type)
-    return list(found)
 
 
 def _used_types(text: str, message_type: str) -> set[str]:
@@ -84,10 +77,7 @@ def _used_types(text: str, message_type: str) -> set[str]:
 
 def _share_file(message_type: str, suffix: str) -> Path:
     # ROS is imported where it is used: reading and writing bags must work without it.
-    from ament_index_python.packages import (
-        PackageNotFoundError,
-        get_package_share_directory,
-    )
+    from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
 
     try:
         package, kind, name = message_type.split('/')
@@ -99,9 +89,3 @@ def _share_file(message_type: str, suffix: str) -> Path:
     if not path.is_file():
         raise RecordingError(f'{message_type} is not installed: {path} is missing')
     return path
-
-
-def _installed_hash(message_type: str) -> str:
-    description = json.loads(_share_file(message_type, '.json').read_text())
-    hashes = {entry['type_name']: entry['hash_string'] for entry in description['type_hashes']}
-    return hashes.get(message_type, '')

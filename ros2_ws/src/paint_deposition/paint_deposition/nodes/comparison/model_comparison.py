@@ -8,8 +8,6 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
-from rclpy.time import Time
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.comparison.residual_field import reached, spreading
@@ -21,11 +19,11 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import ColouredMesh
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
-from paint_deposition.nodes.runtime.process import run_node
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
@@ -34,6 +32,23 @@ from paint_deposition.readings.residuals import Residuals
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25
+
+COMPARISON = dict(
+    **PAINTING,
+    measurements_file=NodeParameter(
+        '',
+        'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
+        fixed_because='the film is painted where they were taken; restart the node',
+    ),
+    color_max_um=thickness(
+        'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+    ),
+    color_radius_m=NodeParameter(
+        0.0,
+        'How far around a reading the surface has its colour; 0: from their spacing [m]',
+        (0.0, 5.0),
+    ),
+)
 
 
 class ModelComparison(PaintingNode):
@@ -44,28 +59,7 @@ class ModelComparison(PaintingNode):
     spread over the surface around them for display only.
     """
 
-    PARAMETERS = (
-        *PaintingNode.PARAMETERS,
-        NodeParameter(
-            'measurements_file',
-            '',
-            'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
-            is_path=True,
-            fixed_because='the film is painted where they were taken; restart the node',
-        ),
-        thickness(
-            'color_max_um',
-            description='Residual at the ends of the colours; 0: a quarter of the thickest '
-            'reading [µm]',
-        ),
-        NodeParameter(
-            'color_radius_m',
-            0.0,
-            'How far around a reading the surface has its colour; 0: from their spacing [m]',
-            low=0.0,
-            high=5.0,
-        ),
-    )
+    PARAMETERS = COMPARISON
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)
@@ -77,7 +71,7 @@ class ModelComparison(PaintingNode):
                 ('comparison/legend', MarkerArray),
             )
         }
-        self.create_service(Trigger, '~/compare', self._compare)
+        self.offer('~/compare', self._compare)
         self._shown: FilmIntegrator | None = None
         tasks = painting_tasks(self) | {'comparison': self._status}
         self._diagnostics = Diagnostics(self, tasks)
@@ -165,7 +159,8 @@ class ModelComparison(PaintingNode):
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self._readings.positions_m[residuals.worst].tolist()
-        message = ComparisonStats(
+        return ComparisonStats(
+            header=header(self.frame.frame_id, stamp_ns),
             model=self._model_name,
             readings=len(residuals),
             readings_painted=int(residuals.painted.sum()),
@@ -177,9 +172,6 @@ class ModelComparison(PaintingNode):
             worst_position=Point(x=x, y=y, z=z),
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
-        message.header.frame_id = self.frame.frame_id
-        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        return message
 
     def summary(self) -> str:
         """The comparison in one line."""
@@ -206,14 +198,8 @@ class ModelComparison(PaintingNode):
             },
         )
 
-    def _compare(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _compare(self) -> tuple[bool, str]:
         self.up_to_date()
-        response.success = True
-        response.message = self.summary()
-        self.get_logger().info(response.message)
-        return response
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(ModelComparison)
+        found = self.summary()
+        self.get_logger().info(found)
+        return True, found

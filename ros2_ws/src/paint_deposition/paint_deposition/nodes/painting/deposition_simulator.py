@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import time
 from collections.abc import Callable, Mapping
@@ -15,27 +16,48 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
-from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import ColourScale, film_scale
-from paint_deposition.film.integrator import FilmIntegrator, Precision
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.statistics import (
+    DEFAULT_PAINTED_ABOVE_UM,
+    FilmStatistics,
+    film_statistics,
+)
 from paint_deposition.nodes.painting.film_messages import FilmCloud, FilmField, stats_message
 from paint_deposition.nodes.painting.legend import legend
-from paint_deposition.nodes.painting.painting_diagnostics import film_status, painting_tasks
+from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.simulator_parameters import SIMULATOR
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import Diagnostics, Status
+from paint_deposition.nodes.runtime.diagnostics import Diagnostics
 from paint_deposition.nodes.runtime.messages import ColouredMesh
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.results.film import write_film
 
 STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+
+SIMULATOR = dict(
+    **PAINTING,
+    precision=NodeParameter(
+        'single',
+        'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
+        choices=('single', 'double'),
+        fixed_because='the film so far was summed in it; restart the node',
+    ),
+    color_min_um=thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
+    color_max_um=thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
+    painted_above_um=thickness(
+        'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
+    ),
+    target_um=thickness('Film wanted; 0: none [µm]'),
+    target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
+    output_directory=NodeParameter('runs', 'Where ~/save_film writes [path]'),
+)
 
 
 class DepositionSimulator(PaintingNode):
@@ -45,7 +67,7 @@ class DepositionSimulator(PaintingNode):
     changes, and once more when somebody new listens. Everything shows all poses received.
     """
 
-    PARAMETERS = (*PaintingNode.PARAMETERS, *SIMULATOR)
+    PARAMETERS = SIMULATOR
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
@@ -59,7 +81,7 @@ class DepositionSimulator(PaintingNode):
                 ('thickness/field', ThicknessField, qos.RESULTS),
             )
         }
-        self.create_service(Trigger, '~/reset', self._reset)
+        self.offer('~/reset', self._reset)
         # In a group of its own: while it waits for the disk, poses must not wait for it.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
@@ -70,16 +92,15 @@ class DepositionSimulator(PaintingNode):
         self._greeted = 0
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
-        self._diagnostics = Diagnostics(self, painting_tasks(self) | {'film': self._film_status})
+        last = 'last publication [ms]'
+        tasks = painting_tasks(self, lambda: {last: f'{self._publish_s * 1e3:.0f}'})
+        self._diagnostics = Diagnostics(self, tasks)
         self.publish()
 
     # --- the part and its film
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return surface.points()
-
-    def _precision(self) -> Precision:
-        return self.values['precision']
 
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
@@ -167,26 +188,17 @@ class DepositionSimulator(PaintingNode):
         message.longest_gap_s = shown[3]
         self._outputs['thickness/stats'].publish(message)
 
-    def _film_status(self) -> Status:
-        status = film_status(self)
-        last_ms = f'{self._publish_s * 1e3:.0f}'
-        return Status(
-            status.level, status.message, {**status.values, 'last publication [ms]': last_ms}
-        )
-
     # --- services
 
     def close(self) -> None:
         self._saving.shutdown()
 
-    def _reset(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+    def _reset(self) -> tuple[bool, str]:
         poses = self.film.counts.received
         self.reset()
         self._shown = None
         self.publish()
-        response.success = True
-        response.message = f'bare metal again; {poses} poses forgotten'
-        return response
+        return True, f'bare metal again; {poses} poses forgotten'
 
     async def _save_film(
         self, request: SaveFilm.Request, response: SaveFilm.Response
@@ -201,26 +213,24 @@ class DepositionSimulator(PaintingNode):
         self.up_to_date()
         film = self.film.up_to_date()
         written: Future = Future(executor=self.executor)
-        job = self._film_to_save(stem, film)
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
         written.add_done_callback(lambda _: None)
-        self._saving.submit(lambda: written.set_result(job()))
-        outcome: Any = await written
-        if isinstance(outcome, Exception):
-            response.message = str(outcome)
+        self._saving.submit(self._film_to_save(stem, film)).add_done_callback(written.set_result)
+        saved: Any = await written
+        try:
+            paths = saved.result()
+        except Exception as error:  # the caller of the service is told
+            response.message = str(error)
             return response
         response.success = True
-        response.paths = [str(path) for path in outcome]
-        response.message = f'wrote {", ".join(path.name for path in outcome)}'
+        response.paths = [str(path) for path in paths]
+        response.message = f'wrote {", ".join(path.name for path in paths)}'
         return response
 
-    def _film_to_save(
-        self, stem: str, film: FilmIntegrator
-    ) -> Callable[[], list[Path] | Exception]:
-        """A function that writes the film as it is now; it returns the paths, or the error."""
+    def _film_to_save(self, stem: str, film: FilmIntegrator) -> Callable[[], list[Path]]:
+        """A function that writes the film as it is now and returns the paths."""
         surface, film_um, values = self.surface, film.film_um, self.values
-        figures = self.statistics(film_um, film.emitted_cm3)
         details = {
             'mesh_file': values['mesh_file'],
             'mesh_id': self.mesh_id,
@@ -231,27 +241,14 @@ class DepositionSimulator(PaintingNode):
             'poses': self.film.counts.to_dict(),
             'poses_in_other_frames': dict(self.input.refused_frames),
         }
-        folder = Path(values['output_directory'])
-        colours = values['color_min_um'], values['color_max_um']
-
-        def write() -> list[Path] | Exception:
-            try:
-                return write_film(
-                    folder,
-                    surface,
-                    film_um,
-                    figures,
-                    stem=stem,
-                    statistics_file=f'{stem}.json',
-                    details=details,
-                    color_range_um=colours,
-                )
-            except Exception as error:  # the caller of the service is told
-                return error
-
-        return write
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(DepositionSimulator)
+        return functools.partial(
+            write_film,
+            Path(values['output_directory']),
+            surface,
+            film_um,
+            self.statistics(film_um, film.emitted_cm3),
+            stem=stem,
+            statistics_file=f'{stem}.json',
+            details=details,
+            color_range_um=(values['color_min_um'], values['color_max_um']),
+        )

@@ -11,6 +11,7 @@ from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 
 from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.nodes.runtime.messages import header
 
 
 class FilmCloud:
@@ -32,8 +33,8 @@ class FilmCloud:
             row_step=size * len(positions_m),
             data=array('B', bytes(size * len(positions_m))),
             is_dense=True,
+            header=header(frame_id, 0),
         )
-        self._message.header.frame_id = frame_id
         self._values = np.frombuffer(self._message.data, np.float32).reshape(-1, len(self.FIELDS))
         self._values[:, :3] = positions_m
 
@@ -49,9 +50,10 @@ class FilmField:
 
     def __init__(self, vertex_count: int, mesh_id: str, frame_id: str) -> None:
         self._message = ThicknessField(
-            mesh_id=mesh_id, thickness_um=array('f', bytes(4 * vertex_count))
+            header=header(frame_id, 0),
+            mesh_id=mesh_id,
+            thickness_um=array('f', bytes(4 * vertex_count)),
         )
-        self._message.header.frame_id = frame_id
         self._values = np.frombuffer(self._message.thickness_um, np.float32)
 
     def message(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
@@ -63,9 +65,7 @@ class FilmField:
 
 def stats_message(frame_id: str, stamp_ns: int, figures: FilmStatistics) -> ThicknessStats:
     """The film's figures; counts of poses are the caller's to add."""
-    message = ThicknessStats()
-    message.header.frame_id = frame_id
-    message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+    message = ThicknessStats(header=header(frame_id, stamp_ns))
     for name in (
         'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
         'painted_volume_cm3', 'capture_fraction',

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import Pose, Transform
+from geometry_msgs.msg import Pose
 from rclpy.node import Node
 from rclpy.time import Time
 
@@ -37,12 +37,6 @@ class Rigid:
             ]
         )
         return Rigid(rotation, (x, y, z, w), np.asarray(values[:3], dtype=float))
-
-    @staticmethod
-    def of_message(transform: Transform) -> Rigid:
-        """From a message of tf2."""
-        t, q = transform.translation, transform.rotation
-        return Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
 
     def inverse(self) -> Rigid:
         """The inverse transform."""
@@ -107,17 +101,13 @@ class PartFrame:
                 self.frame_id, frame_id.lstrip('/'), Time(nanoseconds=stamp_ns)
             )
         except tf2_ros.ExtrapolationException as error:
-            raise NoTransform(
-                f'tf does not cover the time of the poses ({_one_line(error)}); publish it '
-                'by the same clock as the poses',
-                may_come=True,
-            ) from None
+            reason = f'tf does not cover the time of the poses ({_one_line(error)}); publish it '
+            raise NoTransform(reason + 'by the same clock as the poses', may_come=True) from None
         except tf2_ros.TransformException as error:
-            raise NoTransform(
-                f'tf knows no transform between them ({_one_line(error)}); {GIVE_FRAMES}',
-                may_come=True,
-            ) from None
-        return Rigid.of_message(found.transform)
+            reason = f'tf knows no transform between them ({_one_line(error)}); {GIVE_FRAMES}'
+            raise NoTransform(reason, may_come=True) from None
+        t, q = found.transform.translation, found.transform.rotation
+        return Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
 
 
 def _one_line(error: Exception) -> str:

@@ -8,6 +8,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import TABLE, ColourScale
+from paint_deposition.nodes.runtime.messages import white_marker
 from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
@@ -40,19 +41,10 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
     return MarkerArray(markers=[bar, *labels])
 
 
-def _marker(kind: int, number: int, frame_id: str) -> Marker:
-    marker = Marker(ns='legend', id=number, type=kind, action=Marker.ADD)
-    marker.header.frame_id = frame_id
-    marker.pose.orientation.w = 1.0
-    marker.color = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
-    return marker
-
-
 def _bar(
     scale: ColourScale, corner: np.ndarray, up: np.ndarray, across: np.ndarray, frame_id: str
 ) -> Marker:
-    marker = _marker(Marker.TRIANGLE_LIST, 0, frame_id)
-    marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
+    marker = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id)
     square = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
     for step in range(STEPS):
         r, g, b, a = (scale.palette[step * TABLE // STEPS] / 255.0).tolist()
@@ -64,9 +56,9 @@ def _bar(
 
 
 def _label(number: int, text: str, place: np.ndarray, height_m: float, frame_id: str) -> Marker:
-    marker = _marker(Marker.TEXT_VIEW_FACING, number + 1, frame_id)
+    marker = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number + 1, frame_id)
     marker.text = text
-    marker.scale.z = height_m
+    marker.scale = Vector3(z=height_m)
     x, y, z = place.tolist()
     marker.pose.position = Point(x=x, y=y, z=z)
     return marker

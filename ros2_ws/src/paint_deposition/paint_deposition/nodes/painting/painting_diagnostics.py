@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
@@ -25,15 +25,16 @@ def poses_status(node: PaintingNode) -> Status:
     """The motion since the last reset: what came and what was wrong with it."""
     source, counts = node.input, node.film.counts
     rhythm_ns = source.intervals.typical_ns
+    counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
-        **{words: getattr(counts, name) for name, words in IN_WORDS.items()},
+        **counted,
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'poses without a frame': source.without_frame,
-        'poses in the tf queue': source.poses_in_tf_queue,
+        'poses in the tf queue': len(source.tf_queue),
         'states refused': source.refused_states,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
@@ -46,15 +47,9 @@ def poses_status(node: PaintingNode) -> Status:
             f"'{node.frame.frame_id}' and {source.refusal}",
             values,
         )
-    wrong = [
-        f'{getattr(counts, name)} {words}'
-        for name, words in IN_WORDS.items()
-        if getattr(counts, name)
-    ]
-    if source.refused_states:
-        wrong.append(f'{source.refused_states} states refused')
-    if source.without_frame:
-        wrong.append(f'{source.without_frame} poses without a frame')
+    counted['states refused'] = source.refused_states
+    counted['poses without a frame'] = source.without_frame
+    wrong = [f'{count} {words}' for words, count in counted.items() if count]
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     return Status(OK, 'painting' if counts.received else 'waiting for poses', values)
@@ -69,9 +64,9 @@ def topics_status(node: PaintingNode) -> Status:
     return Status(OK, 'every quality of service fits')
 
 
-def film_status(node: PaintingNode) -> Status:
+def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """Part and model."""
-    log = node.film.log
+    log, factor = node.film.log, node.real_time_factor.value
     values = {
         'mesh': node.values['mesh_file'],
         'triangles': len(node.surface.faces),
@@ -79,27 +74,25 @@ def film_status(node: PaintingNode) -> Status:
         'model': node.values['model_file'] or 'default',
         'effects': ' '.join(effect.id for effect in node.film.model.effects) or 'none',
         'poses remembered': log.poses,
-        'real-time factor': f'{node.real_time_factor.value:.2f}',
+        'real-time factor': f'{factor:.2f}',
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
+        **more_values,
     }
+    level, message = OK, 'preparing a changed model' if node.repainting else 'up to date'
     if node.model_problem:
-        return Status(WARN, node.model_problem, values)
-    if not log.complete:
-        return Status(
-            WARN,
-            f'over {log.limit_poses} poses (pose_memory): a new model paints from then on only',
-            values,
+        level, message = WARN, node.model_problem
+    elif not log.complete:
+        level = WARN
+        message = (
+            f'over {log.limit_poses} poses (pose_memory): a new model paints from then on only'
         )
-    if node.real_time_factor.value > BUSY:
-        return Status(
-            WARN,
-            f'painting takes {node.real_time_factor.value:.0%} of the time that the motion lasts: '
-            'poses may be lost; use a larger max_edge_length_m',
-            values,
+    elif factor > BUSY:
+        level = WARN
+        message = (
+            f'painting takes {factor:.0%} of the time that the motion lasts: poses may be lost; '
+            'use a larger max_edge_length_m'
         )
-    if node.repainting:
-        return Status(OK, 'preparing a changed model', values)
-    return Status(OK, 'up to date', values)
+    return Status(level, message, values)
 
 
 def _gun_in_words(flow: float | None) -> str:
@@ -108,10 +101,12 @@ def _gun_in_words(flow: float | None) -> str:
     return f'spraying, flow {flow:g}' if flow else 'off'
 
 
-def painting_tasks(node: PaintingNode) -> dict[str, Callable[[], Status]]:
-    """The tasks by name."""
+def painting_tasks(
+    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
+) -> dict[str, Callable[[], Status]]:
+    """The tasks by name; `film_values` are added to those of the film."""
     return {
         'poses': lambda: poses_status(node),
         'topics': lambda: topics_status(node),
-        'film': lambda: film_status(node),
+        'film': lambda: film_status(node, film_values()),
     }

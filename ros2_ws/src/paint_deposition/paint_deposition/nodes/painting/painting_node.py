@@ -14,12 +14,10 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.film.integrator import Precision
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
@@ -48,22 +46,21 @@ class PaintingNode(PaintNode, ABC):
         input: what comes from the cell.
         watch: publishers and subscribers whose quality of service does not fit.
         real_time_factor: how long painting takes beside the motion.
+        repainting: the changed model that is being prepared, if one is.
         model_problem: why the last model that was set is not used, '' if it is.
     """
-
-    PARAMETERS = PAINTING
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
-        self.input = AtomizerInput(self, self.frame, self, self.watch)
+        self.input = AtomizerInput(self)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
     def _prepare(self) -> None:
         self.real_time_factor = RealTimeFactor()
         self.model_problem = ''
-        self._repainting: Repainting | None = None
+        self.repainting: Repainting | None = None
         self._facing_settled = False
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
@@ -84,9 +81,6 @@ class PaintingNode(PaintNode, ABC):
     def _read_part(self) -> None:
         """Read what is needed to choose the points, before the part is taken."""
 
-    def _precision(self) -> Precision:
-        return 'double'
-
     def _take_surface(self, surface: Surface) -> None:
         """Take the part, at the start and when the gun shows which side is outward."""
         self.surface = surface
@@ -106,14 +100,11 @@ class PaintingNode(PaintNode, ABC):
         self.film.add_poses(batch)
         self.real_time_factor.note(time.monotonic() - began_s, batch.stamps_ns)
 
-    def add_trigger(self, change: TriggerChange) -> None:
-        self.film.add_trigger(change)
-
     def reset(self) -> None:
         """Back to bare metal, all counts to zero."""
         self.input.reset()
         self.film.reset()
-        if self._repainting is not None:
+        if self.repainting is not None:
             self._repaint()
 
     def up_to_date(self) -> None:
@@ -123,16 +114,11 @@ class PaintingNode(PaintNode, ABC):
 
     # --- the part and the model
 
-    @property
-    def repainting(self) -> bool:
-        """Whether a changed model is being prepared."""
-        return self._repainting is not None
-
     def _make_film(self, model: DepositionModel) -> LiveFilm:
         return LiveFilm(
             self.points,
             model,
-            precision=self._precision(),
+            precision=self.values.get('precision', 'double'),
             occluder=self.surface.occluder,
             max_pose_gap_s=self.values['max_pose_gap_s'],
             trigger_latency_s=self.values['trigger_latency_s'],
@@ -192,17 +178,17 @@ class PaintingNode(PaintNode, ABC):
                     try_effect(type(effect), effect.file)
             return self._make_film(model)
 
-        self._repainting = Repainting(self.film, make, from_start)
+        self.repainting = Repainting(self.film, make, from_start)
 
     def _tend(self) -> None:
         """Take over a film that is ready, and settle which side of the part is outward."""
-        if self._repainting is not None and self._repainting.done:
-            self._take_over(self._repainting)
+        if self.repainting is not None and self.repainting.done:
+            self._take_over(self.repainting)
         if not self._facing_settled:
             self._face_the_gun()
 
     def _take_over(self, repainting: Repainting) -> None:
-        self._repainting = None
+        self.repainting = None
         self.model_problem = ''
         try:
             film = repainting.take_over(self.film)
@@ -234,16 +220,16 @@ class PaintingNode(PaintNode, ABC):
             turned = self._make_film(self.film.model)
             turned.follow(self.film.log.events)
             self.film = turned
-            if self._repainting is not None:
+            if self.repainting is not None:
                 self._repaint()
         self._facing_settled = (
             seen.front + seen.back >= POSES_FACING or len(poses) >= POSES_CONSIDERED
         )
 
     def _give_up_repainting(self) -> None:
-        if self._repainting is not None:
-            self._repainting.give_up()
-            self._repainting = None
+        if self.repainting is not None:
+            self.repainting.give_up()
+            self.repainting = None
 
     def destroy_node(self) -> None:
         self._give_up_repainting()

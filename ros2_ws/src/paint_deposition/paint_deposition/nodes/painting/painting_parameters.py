@@ -23,82 +23,63 @@ def is_pose(value: list[float]) -> bool:
     return abs(math.hypot(*value[3:]) - 1.0) <= 0.01
 
 
-PAINTING = (
-    *fixed(
+PAINTING = dict(
+    **fixed(
         'the film so far lies on this mesh, in this frame; restart the node for another part',
-        *mesh_parameters(max_edge_length_m=0.01),
-        direction(
-            'down',
+        **mesh_parameters(max_edge_length_m=0.01),
+        down=direction(
             'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
-            'stands, -y for one drawn lying in x-y [-]',
+            'stands, -y for one drawn lying in x-y [-]'
         ),
     ),
-    NodeParameter(
-        'part_pose',
+    part_pose=NodeParameter(
         [],
         'Pose of the mesh in part_parent_frame, x y z qx qy qz qw; empty: not known [m, -]',
         constraints='seven numbers, the last four a unit quaternion, or none',
         allows=is_pose,
         element=float,
     ),
-    NodeParameter(
-        'part_parent_frame',
-        '',
-        'Frame that part_pose is given in; poses in it are transformed [name]',
+    part_parent_frame=NodeParameter(
+        '', 'Frame that part_pose is given in; poses in it are transformed [name]'
     ),
-    NodeParameter(
-        'max_pose_gap_s',
+    max_pose_gap_s=NodeParameter(
         0.25,
         'A longer interval between pose stamps is gun off; a change paints the motion so far '
         'again [s]',
-        low=0.001,
-        high=60.0,
+        (0.001, 60.0),
     ),
-    NodeParameter(
-        'trigger_latency_s',
+    trigger_latency_s=NodeParameter(
         0.1,
         'How much later than the poses of the same time a state may come and still switch the gun '
         'at its own stamp [s]',
-        low=0.0,
-        high=10.0,
+        (0.0, 10.0),
     ),
-    *fixed(
+    **fixed(
         'the subscriptions and the pose memory are made with it when the node starts; restart '
         'the node',
-        NodeParameter(
-            'pose_queue_depth',
+        pose_queue_depth=NodeParameter(
             5000,
             'Poses that may wait while the node is busy; too few lose paint [poses]',
-            low=1,
-            high=100_000,
+            (1, 100_000),
         ),
-        NodeParameter(
-            'pose_reliability',
+        pose_reliability=NodeParameter(
             'best_effort',
             'Reliability asked of the publishers of poses and states; best_effort hears all of '
             'them, reliable only those that offer it [name]',
             choices=('best_effort', 'reliable'),
         ),
-        NodeParameter(
-            'pose_memory',
+        pose_memory=NodeParameter(
             DEFAULT_LIMIT_POSES,
             'Poses kept, about 100 bytes each, to paint the motion again with another model; '
             'beyond, a new model paints from then on only [poses]',
-            low=10_000,
-            high=100_000_000,
+            (10_000, 100_000_000),
         ),
     ),
-    *model_parameters(' and paints the motion so far again'),
-    NodeParameter(
-        'repaint',
-        True,
-        'Whether a new model paints the motion so far again; false: from then on only [-]',
+    **model_parameters(' and paints the motion so far again'),
+    repaint=NodeParameter(
+        True, 'Whether a new model paints the motion so far again; false: from then on only [-]'
     ),
-    NodeParameter(
-        'publish_rate_hz',
-        2.0,
-        'How often what is shown goes out while the film changes [Hz]',
-        low=0.1,
-        high=30.0,
+    publish_rate_hz=NodeParameter(
+        2.0, 'How often what is shown goes out while the film changes [Hz]', (0.1, 30.0)
     ),
 )

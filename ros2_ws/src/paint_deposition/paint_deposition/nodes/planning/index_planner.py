@@ -10,22 +10,79 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
-from rclpy.time import Time
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.planning.planner_parameters import PLANNER
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
-from paint_deposition.planning.index_request import Request
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    direction,
+    fixed,
+    mesh_parameters,
+    thickness,
+)
+from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
+from paint_deposition.planning.plan import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 
 SPACING_M = 0.02
+
+PLANNER = dict(
+    **model_parameters(''),
+    width_m=NodeParameter(
+        0.0, 'Width to paint where a request gives none; 0: none [m]', (0.0, 100.0)
+    ),
+    length_m=NodeParameter(
+        0.0, 'Length of a pass, for the cycle time; 0: as long as the width [m]', (0.0, 100.0)
+    ),
+    standoff_m=NodeParameter(
+        0.0,
+        'Distance of the TCP from the part; 0: the part lies on the model plane [m]',
+        (0.0, 5.0),
+    ),
+    travel_rad=NodeParameter(
+        0.0,
+        "Direction of the first pass in the tool's x-y frame, from x to y [rad]",
+        (-2.0 * math.pi, 2.0 * math.pi),
+    ),
+    gun_turns=NodeParameter(
+        False,
+        'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
+        'orientation and lays the same profile both ways [-]',
+    ),
+    **fixed(
+        'passes are planned once, when the node starts; restart the node with the new value',
+        **mesh_parameters(max_edge_length_m=0.02),
+        direction=NodeParameter(
+            'horizontal',
+            'How planned passes run on the part [name]',
+            choices=('horizontal', 'vertical'),
+        ),
+        speed_m_per_s=NodeParameter(
+            0.3, 'Speed of planned passes; 0: from target_um [m/s]', (0.0, FASTEST_M_PER_S)
+        ),
+        target_um=thickness('Mean film of planned passes where speed_m_per_s is 0 [µm]'),
+        index_m=NodeParameter(
+            0.0, 'Distance between planned passes; 0: the most even [m]', (0.0, 10.0)
+        ),
+        smoothing_radius_m=NodeParameter(
+            DEFAULT_SMOOTHING_RADIUS_M,
+            'What is finer than this on the part is not followed [m]',
+            (0.005, 2.0),
+        ),
+        acceleration_m_per_s2=NodeParameter(
+            2.0, 'Acceleration of the robot [m/s^2]', (0.05, 50.0)
+        ),
+        outward=direction(
+            'Direction from the part to the gun, any length; empty: the mean normal [-]'
+        ),
+    ),
+)
 
 
 class IndexPlanner(PaintNode):
@@ -66,17 +123,18 @@ class IndexPlanner(PaintNode):
         return _fill(response, answer)
 
     def _asked_for(self, request: RecommendIndex.Request) -> Request:
+        # In requests and parameters 0 stands for none.
         return Request(
-            speed_m_per_s=_given(request.speed_m_per_s),
-            target_um=_given(request.target_um),
-            index_min_m=_given(request.index_min_m),
-            index_max_m=_given(request.index_max_m),
-            tolerance=_given(request.tolerance),
-            width_m=_given(request.width_m) or _given(self.values['width_m']),
-            length_m=_given(self.values['length_m']),
+            speed_m_per_s=request.speed_m_per_s or None,
+            target_um=request.target_um or None,
+            index_min_m=request.index_min_m or None,
+            index_max_m=request.index_max_m or None,
+            tolerance=request.tolerance or None,
+            width_m=request.width_m or self.values['width_m'] or None,
+            length_m=self.values['length_m'] or None,
             one_way=request.one_way,
             gun_turns=self.values['gun_turns'],
-            standoff_m=_given(self.values['standoff_m']),
+            standoff_m=self.values['standoff_m'] or None,
             travel_rad=self.values['travel_rad'],
         )
 
@@ -93,10 +151,10 @@ class IndexPlanner(PaintNode):
             self._model,
             PlanRequest(
                 direction=values['direction'],
-                speed_m_per_s=_given(values['speed_m_per_s']),
-                target_um=_given(values['target_um']),
-                index_m=_given(values['index_m']),
-                standoff_m=_given(values['standoff_m']),
+                speed_m_per_s=values['speed_m_per_s'] or None,
+                target_um=values['target_um'] or None,
+                index_m=values['index_m'] or None,
+                standoff_m=values['standoff_m'] or None,
                 smoothing_radius_m=values['smoothing_radius_m'],
                 acceleration_m_per_s2=values['acceleration_m_per_s2'],
                 travel_rad=values['travel_rad'],
@@ -124,11 +182,6 @@ class IndexPlanner(PaintNode):
             'requests': self._asked,
         }
         return Status(self._last.level, self._last.message, values)
-
-
-def _given(value: float) -> float | None:
-    """A number of a request or parameter, in which 0 stands for none."""
-    return None if value == 0.0 else value
 
 
 def _or_nan(value: float | None) -> float:
@@ -166,22 +219,12 @@ def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
     travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
     kept = np.append(True, np.diff(travelled) > 0.0)
     kept[-1] = True
-    message = Path()
-    message.header.frame_id = trajectory.frame_id
-    message.header.stamp = Time(nanoseconds=start_ns).to_msg()
-    first_ns = int(trajectory.stamps_ns[0])
+    stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]
+    message = Path(header=header(trajectory.frame_id, start_ns))
     for row in np.flatnonzero(kept):
-        pose = PoseStamped()
-        pose.header.frame_id = trajectory.frame_id
-        stamp_ns = start_ns + int(trajectory.stamps_ns[row]) - first_ns
-        pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        pose = PoseStamped(header=header(trajectory.frame_id, int(stamps_ns[row])))
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z = trajectory.positions_m[row].tolist()
         q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()
         message.poses.append(pose)
     return message
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(IndexPlanner)

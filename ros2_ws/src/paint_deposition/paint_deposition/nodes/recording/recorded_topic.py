@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
 
-from paint_deposition.errors import RecordingError
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
 if TYPE_CHECKING:  # older distributions have no such name
@@ -21,49 +19,30 @@ if TYPE_CHECKING:  # older distributions have no such name
 TakeMessage = Callable[[str, bytes, int, int], None]
 
 
-@dataclass
-class TopicCounts:
-    """Messages of a topic, and those that never arrived."""
-
-    messages: int = 0
-    missed: int = 0  # seen by the jumps of the publishers' sequence numbers
-    gaps: int = 0  # intervals between header stamps above the limit
-    longest_gap_ns: int = 0
-    newest_stamp_ns: int = 0
-    sequence: dict[bytes, int] = field(default_factory=dict)
-
-    def count_sequence(self, info: MessageInfo) -> None:
-        number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
-        if number is None or gid is None:
-            return
-        previous = self.sequence.get(gid['data'])
-        if previous is not None and number > previous:
-            self.missed += number - previous - 1
-        self.sequence[gid['data']] = number
-
-    def count_stamp(self, stamp_ns: int, max_gap_ns: int) -> None:
-        gap_ns = stamp_ns - self.newest_stamp_ns
-        if self.newest_stamp_ns and gap_ns > max_gap_ns:
-            self.gaps += 1
-            self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
-        self.newest_stamp_ns = stamp_ns
-
-
 class RecordedTopic:
     """Subscribes to the bytes of a topic.
 
     `max_gap_ns` is the longest interval between header stamps that is no gap; None for topics
     whose intervals say nothing.
+
+    Attributes:
+        messages: that came.
+        missed: that never arrived, by the jumps of the publishers' sequence numbers.
+        gaps, longest_gap_ns: intervals between header stamps above the limit.
+        newest_stamp_ns: header stamp of the last message.
     """
 
     def __init__(
         self, node: Node, name: str, type_name: str, take: TakeMessage, max_gap_ns: int | None
     ):
         self.name = name
-        self.counts = TopicCounts()
+        self.messages = self.missed = self.gaps = 0
+        self.longest_gap_ns = self.newest_stamp_ns = 0
+        self._sequence: dict[bytes, int] = {}
         self.profile: QoSProfile | None = None
         self._node = node
-        self._message_class = message_class(type_name)
+        package, kind, message = type_name.split('/')
+        self._message_class = getattr(importlib.import_module(f'{package}.{kind}'), message)
         self._take = take
         self._max_gap_ns = max_gap_ns
         self._subscription: Subscription | None = None
@@ -88,19 +67,24 @@ class RecordedTopic:
                 self._on_message(*taken)
 
     def _on_message(self, cdr: bytes, info: MessageInfo) -> None:
-        self.counts.messages += 1
-        self.counts.count_sequence(info)
+        self.messages += 1
+        self._count_missed(info)
         if self._max_gap_ns is not None:
-            self.counts.count_stamp(header_stamp_ns(cdr), self._max_gap_ns)
+            self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
         self._take(self.name, cdr, info['received_timestamp'], info['source_timestamp'])
 
+    def _count_missed(self, info: MessageInfo) -> None:
+        number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
+        if number is None or gid is None:
+            return
+        previous = self._sequence.get(gid['data'])
+        if previous is not None and number > previous:
+            self.missed += number - previous - 1
+        self._sequence[gid['data']] = number
 
-def message_class(type_name: str) -> type:
-    """The Python class of `pkg/msg/Type`."""
-    try:
-        package, kind, name = type_name.split('/')
-        return getattr(importlib.import_module(f'{package}.{kind}'), name)
-    except (ImportError, AttributeError, ValueError):
-        raise RecordingError(
-            f'{type_name} is not installed; source the workspace that defines it'
-        ) from None
+    def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
+        gap_ns = stamp_ns - self.newest_stamp_ns
+        if self.newest_stamp_ns and gap_ns > max_gap_ns:
+            self.gaps += 1
+            self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
+        self.newest_stamp_ns = stamp_ns

@@ -10,22 +10,19 @@ from typing import Any
 
 from paint_msgs.msg import PoseProgress
 from rclpy.qos import QoSProfile
-from rclpy.time import Time
 from rclpy.topic_endpoint_info import TopicEndpointInfo
-from std_srvs.srv import Trigger
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
-from paint_deposition.nodes.recording.recorder_parameters import RECORDER
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, header
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
@@ -47,6 +44,25 @@ POSE_QUEUE_DEPTH = 5000
 QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
 
+RECORDER = fixed(
+    "the run's file is open; call ~/stop and start another recorder",
+    topics=NodeParameter(
+        [],
+        'Topics to record; empty: motion, film, plan, diagnostics and parameter changes [topics]',
+        element=str,
+    ),
+    output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
+    name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
+    compression=NodeParameter(
+        'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
+    ),
+    max_pose_gap_s=NodeParameter(
+        0.25, 'Longest interval between pose stamps that is no gap [s]', (0.001, 60.0)
+    ),
+    mesh_file=NodeParameter('', 'Mesh whose digest to keep with the run; empty: none [path]'),
+    model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
+)
+
 
 class RunRecorder(PaintNode):
     """Records serialised messages, byte by byte as they were published.
@@ -67,42 +83,23 @@ class RunRecorder(PaintNode):
         self._error: RecordingError | None = None
         self._pose_topic = self.resolve_topic_name('atomizer/pose')
         self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
-        self.create_service(Trigger, '~/stop', self._stop)
+        self.offer('~/stop', self._stop)
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
         self._diagnostics = Diagnostics(self, {'recording': self._status})
-        self.get_logger().info(f'recording {len(self._wanted)} topics into {self._run.folder}')
+        self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 
     def _prepare(self) -> None:
         notes = provenance(self.values['mesh_file'], self.values['model_file'])
-        self._run = RunWriter(self._folder(), notes, compression=self.values['compression'])
-
-    @property
-    def folder(self) -> Path:
-        """The run's folder."""
-        return self._run.folder
-
-    @property
-    def message_count(self) -> int:
-        """Messages recorded so far."""
-        return self._run.message_count
-
-    def recorded(self, topic: str) -> int:
-        """Messages of one topic recorded so far."""
-        return self._run.counts.get(self.resolve_topic_name(topic), 0)
-
-    def close(self) -> None:
-        self._complete()
+        name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        folder = Path(self.values['output_directory']) / name
+        self.run = RunWriter(folder, notes, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
-        if not self._run.complete:
-            self._run.abandon()
+        if not self.run.complete:
+            self.run.abandon()
         super().destroy_node()
-
-    def _folder(self) -> Path:
-        directory = Path(self.values['output_directory'])
-        return directory / (self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S'))
 
     # --- finding the publishers
 
@@ -113,7 +110,8 @@ class RunRecorder(PaintNode):
                 try:
                     self._follow(name, publishers)
                 except RecordingError as error:
-                    self._refuse(name, error)
+                    self._refused.add(name)
+                    self.get_logger().error(f'{name} is not recorded: {error}')
 
     def _follow(self, name: str, publishers: list[TopicEndpointInfo]) -> None:
         types = sorted({publisher.topic_type for publisher in publishers})
@@ -127,30 +125,24 @@ class RunRecorder(PaintNode):
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
-            topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             offered = [qos.as_recorded(publisher.qos_profile) for publisher in publishers]
-            self._guarded(
-                self._run.add_topic,
-                RunTopic(name, types[0], definitions.installed(types[0]), offered),
-            )
+            run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
+            topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
+            self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
         if topic.profile is None or _offers_less(profile, topic.profile):
             topic.subscribe(profile)
 
-    def _refuse(self, name: str, error: RecordingError) -> None:
-        self._refused.add(name)
-        self.get_logger().error(f'{name} is not recorded: {error}')
-
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
-        self._guarded(self._run.write, name, cdr, received_ns, sent_ns)
-        if name == self._pose_topic and self._topics[name].counts.messages % POSES_A_REPORT == 0:
+        self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
+        if name == self._pose_topic and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 
     def _flush(self) -> None:
-        if not self._run.complete:
-            self._guarded(self._run.close_old_chunk)
+        if not self.run.complete:
+            self._guarded(self.run.close_old_chunk)
 
     def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
         """Write, unless writing has failed before; the first failure ends the recording."""
@@ -170,25 +162,23 @@ class RunRecorder(PaintNode):
         topic = self._topics.get(self._pose_topic)
         if topic is None:
             return
-        progress = PoseProgress(poses_received=topic.counts.messages)
-        progress.header.stamp = Time(nanoseconds=topic.counts.newest_stamp_ns).to_msg()
+        progress = PoseProgress(poses_received=topic.messages)
+        progress.header = header('', topic.newest_stamp_ns)
         self._progress.publish(progress)
 
     # --- ending
 
-    def _stop(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        self._complete()
-        response.success = self._run.complete
-        response.message = self.summary()
+    def _stop(self) -> tuple[bool, str]:
+        self.close()
         self.finish()
-        return response
+        return self.run.complete, self.summary()
 
-    def _complete(self) -> None:
-        if self._run.complete or self._error is not None:
+    def close(self) -> None:
+        if self.run.complete or self._error is not None:
             return
         for topic in self._topics.values():
             topic.drain()
-        self._guarded(self._run.finish)
+        self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
         never = [name for name in self._wanted if name not in self._topics]
         if never and self.values['topics']:
@@ -196,22 +186,23 @@ class RunRecorder(PaintNode):
 
     def summary(self) -> str:
         """What was recorded and what was lost, in a line."""
-        counts = [topic.counts for topic in self._topics.values()]
-        messages, missed = (sum(getattr(c, key) for c in counts) for key in ('messages', 'missed'))
-        state = 'complete' if self._run.complete else 'INCOMPLETE'
+        topics = self._topics.values()
+        messages = sum(topic.messages for topic in topics)
+        missed = sum(topic.missed for topic in topics)
+        state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
-        gaps = sum(count.gaps for count in counts)
-        return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self._run.folder}'
+        gaps = sum(topic.gaps for topic in topics)
+        return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
 
     def _status(self) -> Status:
         try:
-            size, free = self._run.bytes_written, shutil.disk_usage(self._run.folder).free
+            size, free = self.run.path.stat().st_size, shutil.disk_usage(self.run.folder).free
         except OSError as error:
-            gone = f'{self._run.path}: {error.strerror}; nothing more can be recorded there'
+            gone = f'{self.run.path}: {error.strerror}; nothing more can be recorded there'
             if self._error is None:
                 self._give_up(RecordingError(gone))
             return Status(ERROR, gone)
-        counts = {name: topic.counts for name, topic in self._topics.items()}
+        topics = self._topics.values()
         level, message = OK, 'recording'
         if self._error is not None:
             level, message = ERROR, str(self._error)
@@ -219,17 +210,15 @@ class RunRecorder(PaintNode):
             level, message = ERROR, f'not recorded: {" ".join(sorted(self._refused))}'
         elif free < LOW_DISK_BYTES:
             level, message = WARN, 'the disk is almost full'
-        elif any(count.missed for count in counts.values()):
+        elif any(topic.missed for topic in topics):
             level, message = WARN, 'messages were missed'
         values = {
-            'run': self._run.folder,
+            'run': self.run.folder,
             'bytes': size,
             'disk free bytes': free,
-            'longest pose gap s': max((c.longest_gap_ns for c in counts.values()), default=0)
-            * 1e-9,
+            'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,
+            **{t.name: f'{t.messages} messages, {t.missed} missed, {t.gaps} gaps' for t in topics},
         }
-        for name, count in counts.items():
-            values[name] = f'{count.messages} messages, {count.missed} missed, {count.gaps} gaps'
         return Status(level, message, values)
 
 
@@ -238,8 +227,3 @@ def _offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
     return (
         offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
     )
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(RunRecorder)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import math
 import threading
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
+from rclpy.publisher import Publisher
+from rclpy.qos import QoSProfile
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
-from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
@@ -21,16 +23,40 @@ from paint_deposition.files.recordings.bags import (
     read_trajectory,
 )
 from paint_deposition.nodes.replay.flow_control import FlowControl
-from paint_deposition.nodes.replay.player_parameters import PLAYER
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 
 CLOCK_PERIOD_S = 0.01
 STOP_NOTICED_S = 0.05
+
+PLAYER = fixed(
+    'the replay has begun with it; start another player',
+    bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
+    pose_topic=NodeParameter(
+        '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"
+    ),
+    state_topic=NodeParameter(
+        '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
+    ),
+    rate=NodeParameter(
+        1.0,
+        'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
+        (0.0, math.inf),
+    ),
+    loop=NodeParameter(False, 'Start again at the end [true/false]'),
+    start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
+    wait_for_subscribers=NodeParameter(
+        1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
+    ),
+    window=NodeParameter(
+        200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
+    ),
+    publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
+)
 
 
 class BagPlayer(PaintNode):
@@ -48,21 +74,18 @@ class BagPlayer(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
-        depth = max(qos.POSE_DEPTH, self.values['window'])
-        profile = qos.replayed(depth)
+        # Reliable, so that acknowledgement can be asked.
+        profile = QoSProfile(depth=max(qos.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
-        self._clock_publisher = (
-            self.create_publisher(Clock, '/clock', qos.CLOCK)
-            if self.values['publish_clock']
-            else None
-        )
+        self._clock_publisher: Publisher | None = None
         self._clock_order = threading.Lock()
         self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
-        if self._clock_publisher:
+        if self.values['publish_clock']:
+            self._clock_publisher = self.create_publisher(Clock, '/clock', qos.CLOCK)
             self.create_steady_timer(CLOCK_PERIOD_S, self._publish_clock)
-        self.create_service(Trigger, '~/pause', self._pause)
-        self.create_service(Trigger, '~/resume', self._resume)
+        self.offer('~/pause', self._pause)
+        self.offer('~/resume', self._resume)
         self._stopped = threading.Event()
         self._awaited = self.values['wait_for_subscribers']
         self._flow_control = FlowControl(
@@ -89,40 +112,34 @@ class BagPlayer(PaintNode):
         self._thread.join()
 
     def _prepare(self) -> None:
-        self._poses_in_bag, self._states_in_bag = self._choose_topics()
-
-    def _choose_topics(self) -> tuple[BagTopic, BagTopic | None]:
         values = self.values
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
         with open_bag(values['bag']) as bag:
-            poses = choose_pose_topic(bag, values['pose_topic'])
+            self._poses_in_bag = choose_pose_topic(bag, values['pose_topic'])
+            self._states_in_bag: BagTopic | None = None
+            unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
-                states = choose_state_topic(bag, values['state_topic'])
-                if states.type == BOOL_TYPE:
+                self._states_in_bag = choose_state_topic(bag, values['state_topic'])
+                if self._states_in_bag.type == BOOL_TYPE:
                     # Its log times only serve where the recorder's clock is the robot's.
-                    read_trajectory(values['bag'], poses.name, states.name)
-                return poses, states
-            unused = bag.topics_of(STATE_TYPE) + bag.topics_of(BOOL_TYPE)
-            if unused:
+                    read_trajectory(values['bag'], self._poses_in_bag.name, values['state_topic'])
+            elif unused:
                 self.get_logger().info(
                     f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
                 )
-            return poses, None
 
     # --- called by the executor
 
-    def _pause(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = self._time.running
-        response.message = 'paused' if response.success else 'already paused'
+    def _pause(self) -> tuple[bool, str]:
+        was_running = self._time.running
         self._time.pause()
-        return response
+        return was_running, 'paused' if was_running else 'already paused'
 
-    def _resume(self, _request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-        response.success = not self._time.running
-        response.message = 'resumed' if response.success else 'not paused'
+    def _resume(self) -> tuple[bool, str]:
+        was_running = self._time.running
         self._time.resume()
-        return response
+        return not was_running, 'not paused' if was_running else 'resumed'
 
     def _status(self) -> Status:
         doing = self._flow_control.doing if self._time.running else 'paused'
@@ -191,8 +208,3 @@ class BagPlayer(PaintNode):
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def main() -> int:
-    """Run the node; the return value is the process's exit code."""
-    return run_node(BagPlayer)

@@ -70,7 +70,8 @@ class FlowControl:
                 break
             if count < wanted and now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
-                self._notice(f'waiting for {wanted} subscribers on {self._topic}, {count} there')
+                topic = self._publisher.topic_name
+                self._notice(f'waiting for {wanted} subscribers on {topic}, {count} there')
             self._stopped.wait(GRAPH_PERIOD_S)
         self._look_around()
 
@@ -93,16 +94,14 @@ class FlowControl:
                 f'{names.get(gid, gid)} never got the last {count} poses'
             )
 
-    @property
-    def _topic(self) -> str:
-        return self._publisher.topic_name
-
     def _wait_until_ahead_is_less_than(self, limit: int) -> None:
         notice_s = time.monotonic()
-        self._look_around_now_and_then()
-        while self.poses_ahead >= limit and not self._stopped.is_set():
+        while not self._stopped.is_set():
             now_s = time.monotonic()
-            self._look_around_now_and_then()
+            if now_s - self._looked_s > GRAPH_PERIOD_S:
+                self._look_around()
+            if self.poses_ahead < limit:
+                break
             if now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
                 names = self._reporters()
@@ -121,10 +120,6 @@ class FlowControl:
         name = bytes(gid['data']).hex() if gid else None
         self._window.report(name, stamp_ns(progress.header), time.monotonic())
 
-    def _look_around_now_and_then(self) -> None:
-        if time.monotonic() - self._looked_s > GRAPH_PERIOD_S:
-            self._look_around()
-
     def _look_around(self) -> frozenset[str]:
         self._looked_s = time.monotonic()
         gids = frozenset(self._reporters())
@@ -136,7 +131,7 @@ class FlowControl:
         progress_topic = self._node.resolve_topic_name(PROGRESS_TOPIC)
         subscribers = {
             (info.node_namespace, info.node_name)
-            for info in self._node.get_subscriptions_info_by_topic(self._topic)
+            for info in self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
         }
         return {
             bytes(info.endpoint_gid).hex(): f'{info.node_namespace.rstrip("/")}/{info.node_name}'

@@ -61,7 +61,9 @@ class PoseWindow:
         """
         with self._lock:
             taken = self._number_of(stamp_ns)
-            for subscriber in self._named(name):
+            for known, subscriber in self._subscribers.items():
+                if name not in (None, known):
+                    continue
                 subscriber.reported_s = now_s
                 if taken > subscriber.taken:
                     subscriber.taken = taken
@@ -91,11 +93,6 @@ class PoseWindow:
             for subscriber in self._subscribers.values():
                 subscriber.lost = 0
             return lost
-
-    def _named(self, name: str | None) -> list[_Subscriber]:
-        if name is None:
-            return list(self._subscribers.values())
-        return [self._subscribers[name]] if name in self._subscribers else []
 
     def _number_of(self, stamp_ns: int) -> int:
         """How many poses were published up to the newest one of this stamp; 0: not among them."""

@@ -13,6 +13,9 @@ class ReplayClock:
     Args:
         rate: bag seconds for one second; 0: time jumps from message to message.
         running: False to start paused.
+
+    Attributes:
+        running: False while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -21,18 +24,13 @@ class ReplayClock:
         self._time_ns: int | None = None
         self._since_s: float | None = None  # when it was _time_ns; None while time stands still
         self._started = False
-        self._running = running
+        self.running = running
 
     @property
     def time_ns(self) -> int | None:
         """Time in the bag now [ns], None before it is known."""
         with self._changed:
             return self._now_ns()
-
-    @property
-    def running(self) -> bool:
-        """False while paused."""
-        return self._running
 
     def stand_at(self, time_ns: int) -> None:
         """Stand still at this time until `start`."""
@@ -55,12 +53,12 @@ class ReplayClock:
         """Stand still until `resume`."""
         with self._changed:
             self._stand_still()
-            self._running = False
+            self.running = False
 
     def resume(self) -> None:
         """Go on after `pause`."""
         with self._changed:
-            self._running = True
+            self.running = True
             self._run_on()
             self._changed.notify_all()
 
@@ -84,7 +82,7 @@ class ReplayClock:
 
     def _left_s(self, time_ns: int) -> float:
         if self._rate == 0.0:
-            return 0.0 if self._running else math.inf
+            return 0.0 if self.running else math.inf
         if self._since_s is None or self._time_ns is None:
             return math.inf
         passed_s = time.monotonic() - self._since_s
@@ -100,5 +98,5 @@ class ReplayClock:
         self._time_ns, self._since_s = self._now_ns(), None
 
     def _run_on(self) -> None:
-        if self._started and self._running and self._rate and self._since_s is None:
+        if self._started and self.running and self._rate and self._since_s is None:
             self._since_s = time.monotonic()

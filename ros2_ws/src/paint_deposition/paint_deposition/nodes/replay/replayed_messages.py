@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from itertools import groupby
 from typing import Any, NamedTuple
 
 from paint_msgs.msg import AtomizerState
 from rclpy.serialization import deserialize_message, serialize_message
-from rclpy.time import Time
 from std_msgs.msg import Bool
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
 from paint_deposition.files.recordings.bags import BOOL_TYPE, STATE_TYPE, stamp_ns
 from paint_deposition.motion.trigger import relative_flow
-from paint_deposition.nodes.runtime.messages import header_stamp_ns
+from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 
 class ReplayMessage(NamedTuple):
@@ -41,7 +41,7 @@ def replay_messages(bag: Bag, poses: BagTopic, states: BagTopic | None) -> Itera
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
     if states is None or states.type == BOOL_TYPE:
         return _state_of_bool
-    if bag.type_hash(states.name) == definitions.installed(STATE_TYPE).type_hash:
+    if bag.type_hash(states) == definitions.installed(STATE_TYPE).type_hash:
         return lambda message: message.cdr
     # Recorded with another version of the message: fields of the same name are taken over.
     return lambda message: serialize_message(_state_of(bag.decode(message)))
@@ -49,19 +49,22 @@ def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage]
 
 def _state_of_bool(message: RawMessage) -> bytes:
     spraying = deserialize_message(message.cdr, Bool).data
-    state = AtomizerState(spraying=spraying, flow=relative_flow(spraying))
-    state.header.stamp = Time(nanoseconds=message.log_time_ns).to_msg()
-    unknown = float('nan')
-    state.shaping_air_l_per_min = state.bell_speed_rpm = state.voltage_kv = unknown
-    return serialize_message(state)
+    return serialize_message(
+        AtomizerState(
+            header=header('', message.log_time_ns),
+            spraying=spraying,
+            flow=relative_flow(spraying),
+            shaping_air_l_per_min=math.nan,
+            bell_speed_rpm=math.nan,
+            voltage_kv=math.nan,
+        )
+    )
 
 
 def _state_of(recorded: Any) -> AtomizerState:
-    state = AtomizerState()
+    state = AtomizerState(header=header(recorded.header.frame_id, stamp_ns(recorded.header)))
     for name, kind in AtomizerState.get_fields_and_field_types().items():
         if kind == 'double':
-            setattr(state, name, float(getattr(recorded, name, float('nan'))))
+            setattr(state, name, float(getattr(recorded, name, math.nan)))
     state.spraying = bool(recorded.spraying)
-    state.header.stamp = Time(nanoseconds=stamp_ns(recorded.header)).to_msg()
-    state.header.frame_id = recorded.header.frame_id
     return state

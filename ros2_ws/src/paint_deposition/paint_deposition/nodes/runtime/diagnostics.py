@@ -42,14 +42,16 @@ class Diagnostics:
     def publish(self) -> None:
         message = DiagnosticArray()
         message.header.stamp = self._node.get_clock().now().to_msg()
-        message.status = [self._message(name, task()) for name, task in self._tasks.items()]
+        for name, task in self._tasks.items():
+            status = task()
+            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            message.status.append(
+                DiagnosticStatus(
+                    level=status.level,
+                    name=f'{self._node.get_name()}: {name}',
+                    message=status.message,
+                    hardware_id=self._node.get_fully_qualified_name(),
+                    values=values,
+                )
+            )
         self._publisher.publish(message)
-
-    def _message(self, name: str, status: Status) -> DiagnosticStatus:
-        return DiagnosticStatus(
-            level=status.level,
-            name=f'{self._node.get_name()}: {name}',
-            message=status.message,
-            hardware_id=self._node.get_fully_qualified_name(),
-            values=[KeyValue(key=key, value=str(value)) for key, value in status.values.items()],
-        )

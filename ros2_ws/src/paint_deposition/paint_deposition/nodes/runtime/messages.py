@@ -11,7 +11,8 @@ import struct
 import numpy as np
 from geometry_msgs.msg import Point, Vector3
 from rclpy.serialization import serialize_message
-from std_msgs.msg import ColorRGBA
+from rclpy.time import Time
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 # Every node that takes poses reports here how far it has come.
@@ -23,6 +24,19 @@ SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 
 SAMPLE_COLOURS = np.array(
     [[0.31, 0.41, 0.59, 0.26], [0.53, 0.58, 0.97, 0.93], [0.23, 0.84, 0.62, 0.64]], np.float32
 )
+
+
+def header(frame_id: str, stamp_ns: int) -> Header:
+    return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
+
+
+def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marker:
+    """A marker at its frame's origin; viewers multiply the vertices' colours by its white."""
+    marker = Marker(ns=namespace, id=number, type=kind, header=Header(frame_id=frame_id))
+    marker.pose.orientation.w = 1.0
+    marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
+    marker.color = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
+    return marker
 
 
 def header_stamp_ns(cdr: bytes) -> int:
@@ -74,12 +88,7 @@ def _around_the_arrays(frame_id: str, namespace: str) -> tuple[bytes, bytes]:
     The middleware's own serialiser says it: a small marker is serialised and searched for its
     arrays. Whatever stands behind them keeps its alignment, since a corner takes 40 bytes.
     """
-    marker = Marker(ns=namespace, id=0, type=Marker.TRIANGLE_LIST, action=Marker.ADD)
-    marker.header.frame_id = frame_id
-    marker.pose.orientation.w = 1.0
-    marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
-    # Viewers multiply the vertices' alpha by this one.
-    marker.color = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
+    marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in SAMPLE_POINTS.tolist()]
     marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in SAMPLE_COLOURS.tolist()]
     sample = serialize_message(marker)

@@ -16,23 +16,20 @@ from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTa
 
 def model_parameters(use: str) -> ParameterTable:
     """The rows `model_file` and `allow_user_effects`; `use` says what a new model does."""
-    return (
-        NodeParameter(
-            'model_file',
+    return {
+        'model_file': NodeParameter(
             '',
             'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
             f'reads it{use} [path]',
-            is_path=True,
         ),
-        NodeParameter(
-            'allow_user_effects',
+        'allow_user_effects': NodeParameter(
             False,
             'Whether a model may name effect files, whose Python code this node then runs '
             '[true/false]',
             fixed_because='whoever can set parameters could otherwise run code on this machine; '
             'restart the node with the new value',
         ),
-    )
+    }
 
 
 def read_chosen_model(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from types import MappingProxyType
 from typing import Any
 
 from rcl_interfaces.msg import SetParametersResult
@@ -12,13 +13,10 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.task import Future
 from rclpy.timer import Timer
+from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.parameters import (
-    ParameterTable,
-    declare_parameters,
-    refusal_of_fixed,
-)
+from paint_deposition.nodes.runtime.parameters import ParameterTable, declare_parameters
 
 
 class PaintNode(Node):
@@ -32,7 +30,7 @@ class PaintNode(Node):
         finished: completed when the process is to end, with its exit code or an exception.
     """
 
-    PARAMETERS: ParameterTable = ()
+    PARAMETERS: ParameterTable = MappingProxyType({})
     loading = False
 
     def __init__(self, name: str, **kwargs: Any):
@@ -76,6 +74,15 @@ class PaintNode(Node):
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
 
+    def offer(self, name: str, answer: Callable[[], tuple[bool, str]]) -> None:
+        """A service std_srvs/Trigger; `answer` says whether all went well, and what happened."""
+
+        def respond(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
+            response.success, response.message = answer()
+            return response
+
+        self.create_service(Trigger, name, respond)
+
     def finish(self, exit_code: int = 0) -> None:
         """Ask the process to end; the callback that runs is completed first."""
         if not self.finished.done():
@@ -92,9 +99,12 @@ class PaintNode(Node):
         self, parameter_list: list[Parameter[Any]]
     ) -> SetParametersResult:
         """Refuse to change what is fixed with the reason, which rclpy leaves out."""
-        reason = refusal_of_fixed(self, self.PARAMETERS, parameter_list)
-        if reason:
-            return SetParametersResult(successful=False, reason=reason)
+        for change in parameter_list:
+            row = self.PARAMETERS.get(change.name)
+            # While they are declared, parameters can still be set.
+            if row and row.fixed_because and self.describe_parameter(change.name).read_only:
+                reason = f'{change.name} cannot change while the node runs: {row.fixed_because}'
+                return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 
     def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:

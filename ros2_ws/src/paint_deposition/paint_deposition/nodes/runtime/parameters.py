@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import functools
 import math
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -30,8 +29,6 @@ TYPE_WORDS = {
     Parameter.Type.INTEGER: 'a whole number',
     Parameter.Type.DOUBLE: 'a number',
     Parameter.Type.STRING: 'text',
-    Parameter.Type.BOOL_ARRAY: 'a list of true or false',
-    Parameter.Type.INTEGER_ARRAY: 'a list of whole numbers',
     Parameter.Type.DOUBLE_ARRAY: 'a list of numbers',
     Parameter.Type.STRING_ARRAY: 'a list of texts',
 }
@@ -41,24 +38,22 @@ TYPE_WORDS = {
 class NodeParameter:
     """One row of a node's parameter table.
 
-    `default` fixes the type; a list must say its element type with `element` (str, int, float or
-    bool), for an empty list has none. `low` and `high` are inclusive; one of them may be left out.
-    `constraints` is the plain English of what `allows` (value -> bool) checks beyond the range.
-    `fixed_because` makes the parameter read-only and says why it cannot change at run time.
-    `is_path` marks a file or folder: a `~` in front is the home folder, as in a shell.
+    `default` fixes the type; a list must say its element type with `element` (str or float), for
+    an empty list has none. `description` ends with the unit; where that is `[path]`, a `~` in
+    front of the value is the home folder, as in a shell. `bounds` are inclusive, the upper one
+    may be infinite. `constraints` is the plain English of what `allows` (value -> bool) checks
+    beyond them. `fixed_because` makes the parameter read-only and says why it cannot change at
+    run time.
     """
 
-    name: str
     default: bool | int | float | str | list
     description: str
-    low: float | None = None
-    high: float | None = None
+    bounds: tuple[float, float] | None = None
     choices: tuple[str, ...] = ()
     constraints: str = ''
     allows: Callable[[Any], bool] | None = None
     element: type | None = None
     fixed_because: str = ''
-    is_path: bool = False
 
     @property
     def ros_type(self) -> Parameter.Type:
@@ -68,25 +63,21 @@ class NodeParameter:
         return Parameter.Type.from_parameter_value(self.default)
 
     def descriptor(self) -> ParameterDescriptor:
+        texts = ['one of ' + ', '.join(self.choices) if self.choices else self.constraints]
+        if self.fixed_because:
+            texts.append(f'cannot change while the node runs: {self.fixed_because}')
         descriptor = ParameterDescriptor(
-            name=self.name,
             type=self.ros_type.value,
             description=self.description,
-            additional_constraints=self._constraints_text(),
+            additional_constraints='; '.join(filter(None, texts)),
             read_only=bool(self.fixed_because),
         )
-        if self.low is None and self.high is None:
-            return descriptor
-        if self.ros_type == Parameter.Type.INTEGER:
-            least = -INT64_MAX if self.low is None else int(self.low)
-            most = INT64_MAX if self.high is None else int(self.high)
-            descriptor.integer_range = [IntegerRange(from_value=least, to_value=most, step=0)]
-        else:
-            low = -math.inf if self.low is None else float(self.low)
-            high = math.inf if self.high is None else float(self.high)
-            descriptor.floating_point_range = [
-                FloatingPointRange(from_value=low, to_value=high, step=0.0)
-            ]
+        if self.bounds and self.ros_type == Parameter.Type.INTEGER:
+            least, most = (int(min(bound, INT64_MAX)) for bound in self.bounds)
+            descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
+        elif self.bounds:
+            low, high = self.bounds
+            descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         return descriptor
 
     def coerced(self, value: Any) -> Any:
@@ -96,7 +87,7 @@ class NodeParameter:
         """
         if value is None and isinstance(self.default, list):
             return []
-        if self.is_path and isinstance(value, str):
+        if self.description.endswith('[path]') and isinstance(value, str):
             return os.path.expanduser(value)
         if self.ros_type == Parameter.Type.DOUBLE and type(value) is int:
             return float(value)
@@ -105,34 +96,27 @@ class NodeParameter:
         return value
 
     def refusal(self, value: Any) -> str | None:
-        """Why `value` is not acceptable, as one line, or None; type and range are rclpy's part."""
+        """Why `value` is not acceptable, or None; type and bounds are rclpy's part."""
         if isinstance(value, float) and not math.isfinite(value):
-            return f'{self.name} is {value}: give a finite number'
+            return f'is {value}: give a finite number'
         if self.choices and value not in self.choices:
-            return f'{self.name} is {value!r}: choose one of {", ".join(self.choices)}'
+            return f'is {value!r}: choose one of {", ".join(self.choices)}'
         if self.allows is not None and not self.allows(value):
-            return f'{self.name} is {value!r}: must be {self.constraints}'
+            return f'is {value!r}: must be {self.constraints}'
         return None
 
-    def _constraints_text(self) -> str:
-        texts = [self.constraints]
-        if self.choices:
-            texts = ['one of ' + ', '.join(self.choices)]
-        if self.fixed_because:
-            texts.append(f'cannot change while the node runs: {self.fixed_because}')
-        return '; '.join(text for text in texts if text)
+
+ParameterTable = Mapping[str, NodeParameter]
 
 
-ParameterTable = Sequence[NodeParameter]
+def thickness(description: str, default: float = 0.0) -> NodeParameter:
+    """A row for a film or a difference of films [um]."""
+    return NodeParameter(default, description, (0.0, 10_000.0))
 
-# A film or a difference of films [um].
-thickness = functools.partial(NodeParameter, default=0.0, low=0.0, high=10_000.0)
 
-
-def direction(name: str, description: str) -> NodeParameter:
+def direction(description: str) -> NodeParameter:
     """A row for a direction of any length; empty is none."""
     return NodeParameter(
-        name,
         [],
         description,
         constraints='three numbers that are not all zero, or none',
@@ -143,35 +127,26 @@ def direction(name: str, description: str) -> NodeParameter:
 
 def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
     """The rows of a part's mesh, with this default of `max_edge_length_m`."""
-    return (
-        NodeParameter('mesh_file', '', "The part's mesh: STL, PLY or OBJ [path]", is_path=True),
-        NodeParameter(
-            'mesh_scale',
-            1.0,
-            'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]',
-            low=1e-9,
-            high=1e3,
+    return {
+        'mesh_file': NodeParameter('', "The part's mesh: STL, PLY or OBJ [path]"),
+        'mesh_scale': NodeParameter(
+            1.0, 'Metres for one unit of the mesh file; 0.001 for a mesh in mm [m]', (1e-9, 1e3)
         ),
-        NodeParameter(
-            'max_edge_length_m',
-            max_edge_length_m,
-            'Triangles are split until no edge is longer [m]',
-            low=1e-4,
-            high=10.0,
+        'max_edge_length_m': NodeParameter(
+            max_edge_length_m, 'Triangles are split until no edge is longer [m]', (1e-4, 10.0)
         ),
-        NodeParameter(
-            'frame_id',
+        'frame_id': NodeParameter(
             'part',
             'Frame of the mesh and of what is published on it [name]',
             constraints='a name',
             allows=lambda value: bool(value.strip('/')),
         ),
-    )
+    }
 
 
-def fixed(because: str, *rows: NodeParameter) -> ParameterTable:
+def fixed(because: str, **rows: NodeParameter) -> ParameterTable:
     """The same rows, none of which can change while the node runs, with the reason."""
-    return tuple(replace(row, fixed_because=because) for row in rows)
+    return {name: replace(row, fixed_because=because) for name, row in rows.items()}
 
 
 def _is_direction(value: list[float]) -> bool:
@@ -184,89 +159,60 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     Raises PaintError with one line for a value of the wrong type, out of range or refused, and
     for an override that no row knows, naming the nearest one.
     """
-    rows = {row.name: row for row in table}
-    overrides = _overrides(node)
-    _refuse_unknown(node, rows, overrides)
-    node.add_pre_set_parameters_callback(lambda changes: _with_homes(rows, changes))
-    node.add_on_set_parameters_callback(lambda changes: _check_changes(rows, changes))
-    for row in table:
-        _declare(node, row, row.coerced(overrides.get(row.name, row.default)))
-    return {name: node.get_parameter(name).value for name in rows}
-
-
-def _overrides(node: Node) -> dict[str, Any]:
     # rclpy has no public view of the overrides that nobody declared, which is where typing
     # errors end up.
-    return {name: parameter.value for name, parameter in node._parameter_overrides.items()}
-
-
-def _refuse_unknown(node: Node, rows: dict[str, NodeParameter], overrides: dict[str, Any]) -> None:
+    overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
     for name in overrides:
-        if name in rows or name in RESERVED_NAMES or name.startswith(RESERVED_PREFIX):
-            continue
-        remedy = did_you_mean(name, rows)
-        raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
+        if name not in {*table, *RESERVED_NAMES} and not name.startswith(RESERVED_PREFIX):
+            remedy = did_you_mean(name, table)
+            raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
+    node.add_pre_set_parameters_callback(lambda changes: _with_homes(table, changes))
+    node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
+    for name, row in table.items():
+        _declare(node, name, row, row.coerced(overrides.get(name, row.default)))
+    return {name: node.get_parameter(name).value for name in table}
 
 
-def _declare(node: Node, row: NodeParameter, value: Any) -> None:
+def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
     empty_list = isinstance(value, list) and not value
     if not empty_list and Parameter.Type.from_parameter_value(value) != row.ros_type:
         expected = TYPE_WORDS[row.ros_type]
-        raise PaintError(f'{node.get_name()}: {row.name} is {value!r}: give {expected}')
+        raise PaintError(f'{node.get_name()}: {name} is {value!r}: give {expected}')
     try:
         if empty_list:
-            _declare_empty_list(node, row)
+            _declare_empty_list(node, name, row)
         else:
-            node.declare_parameter(row.name, value, row.descriptor(), ignore_override=True)
-    except ParameterException as error:
-        raise PaintError(f'{node.get_name()}: {_one_line(row, value, error)}') from None
+            node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
+    except ParameterException:
+        reason = row.refusal(value)
+        if reason is None and row.bounds:
+            low, high = row.bounds
+            upper = f' and at most {high}' if math.isfinite(high) else ''
+            reason = f'is {value}: must be at least {low}{upper}'
+        raise PaintError(f'{node.get_name()}: {name} {reason}') from None
 
 
-def _declare_empty_list(node: Node, row: NodeParameter) -> None:
+def _declare_empty_list(node: Node, name: str, row: NodeParameter) -> None:
     # rclpy takes an empty list for bytes unless the type is declared first and the value set then.
     writable = row.descriptor()
     writable.read_only = False
-    node.declare_parameter(row.name, row.ros_type, writable, ignore_override=True)
-    node.set_parameters([Parameter(row.name, row.ros_type, [])])
-    node.set_descriptor(row.name, row.descriptor())
+    node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
+    node.set_parameters([Parameter(name, row.ros_type, [])])
+    node.set_descriptor(name, row.descriptor())
 
 
-def _one_line(row: NodeParameter, value: Any, error: ParameterException) -> str:
-    reason = row.refusal(value)
-    if reason:
-        return reason
-    if row.low is None and row.high is None:
-        return f'{row.name} is {value!r}: {" ".join(str(error).split())}'
-    bounds = [f'at least {row.low}'] if row.low is not None else []
-    bounds += [f'at most {row.high}'] if row.high is not None else []
-    return f'{row.name} is {value}: must be {" and ".join(bounds)}'
-
-
-def refusal_of_fixed(node: Node, table: ParameterTable, changes: list[Parameter]) -> str | None:
-    """Why one of the changes is refused because its parameter is fixed, as one line, or None."""
-    reasons = {row.name: row.fixed_because for row in table if row.fixed_because}
-    for change in changes:
-        # While they are declared, parameters can still be set.
-        if change.name in reasons and node.describe_parameter(change.name).read_only:
-            return f'{change.name} cannot change while the node runs: {reasons[change.name]}'
-    return None
-
-
-def _with_homes(rows: dict[str, NodeParameter], changes: list[Parameter]) -> list[Parameter]:
+def _with_homes(table: ParameterTable, changes: list[Parameter]) -> list[Parameter]:
     return [
-        Parameter(change.name, change.type_, rows[change.name].coerced(change.value))
-        if change.name in rows and rows[change.name].is_path and change.value is not None
+        Parameter(change.name, change.type_, table[change.name].coerced(change.value))
+        if change.name in table and isinstance(change.value, str)
         else change
         for change in changes
     ]
 
 
-def _check_changes(
-    rows: dict[str, NodeParameter], changes: list[Parameter]
-) -> SetParametersResult:
+def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:
     for change in changes:
-        row = rows.get(change.name)
-        reason = row.refusal(change.value) if row else None
+        reason = table[change.name].refusal(change.value) if change.name in table else None
         if reason:
-            return SetParametersResult(successful=False, reason=reason)
+            return SetParametersResult(successful=False, reason=f'{change.name} {reason}')
     return SetParametersResult(successful=True)

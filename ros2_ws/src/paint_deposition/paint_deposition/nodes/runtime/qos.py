@@ -1,11 +1,11 @@
-"""The quality of service of every topic, by what it carries."""
+"""The quality of service of every topic, by what it carries; reliable where nothing is said."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from rclpy.duration import Duration
-from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -20,47 +20,24 @@ from rosbags.interfaces import (
 POSE_DEPTH = 500
 
 
-def _profile(
-    depth: int,
-    reliability: ReliabilityPolicy,
-    durability: DurabilityPolicy = DurabilityPolicy.VOLATILE,
-) -> QoSProfile:
-    return QoSProfile(
-        history=HistoryPolicy.KEEP_LAST,
-        depth=depth,
-        reliability=reliability,
-        durability=durability,
-    )
-
-
-def poses(depth: int = POSE_DEPTH) -> QoSProfile:
-    """Subscription to poses or gun states: connects to reliable and best-effort publishers."""
-    return _profile(depth, ReliabilityPolicy.BEST_EFFORT)
-
-
-def replayed(depth: int = POSE_DEPTH) -> QoSProfile:
-    """Publication of replayed poses and states: reliable, so that acknowledgement can be asked."""
-    return _profile(depth, ReliabilityPolicy.RELIABLE)
-
-
 # The newest message is kept for subscribers that come later: meshes, statistics, run status.
-LATCHED = _profile(1, ReliabilityPolicy.RELIABLE, DurabilityPolicy.TRANSIENT_LOCAL)
+LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Clouds, fields and other results that are drawn or recorded as they come.
-RESULTS = _profile(10, ReliabilityPolicy.RELIABLE)
+RESULTS = QoSProfile(depth=10)
 # Progress reports of the nodes that take poses; the newest one says all.
-PROGRESS = _profile(100, ReliabilityPolicy.RELIABLE)
-DIAGNOSTICS = _profile(10, ReliabilityPolicy.RELIABLE)
-CLOCK = _profile(1, ReliabilityPolicy.BEST_EFFORT)
+PROGRESS = QoSProfile(depth=100)
+DIAGNOSTICS = QoSProfile(depth=10)
+CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
 def accepting(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
     """Subscription that all these publishers match, as reliable and as latched as they allow."""
     all_reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
     all_latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
-    return _profile(
-        depth,
-        ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
-        DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
+    return QoSProfile(
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
     )
 
 
