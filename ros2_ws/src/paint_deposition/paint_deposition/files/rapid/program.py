@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.data import RapidData
-from paint_deposition.files.rapid.syntax import Instruction, Module, parse_module
+from paint_deposition.files.rapid.syntax import Instruction, Module, ModuleParser
 from paint_deposition.files.rapid.values import Reference
 
 # Instruction -> number of its targets; the last is where it ends.
@@ -91,7 +90,7 @@ def read_program(
         text = path.read_text(encoding='utf-8', errors='replace')
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-    module = parse_module(text, str(path))
+    module = ModuleParser(text, str(path)).module()
     return _Run(module, str(path), gun_signal).run(procedure)
 
 
@@ -100,9 +99,7 @@ class _Run:
         self._module = module
         self._source = source
         self._data = RapidData(module, source)
-        self._program = RapidProgram(module.name)
-        self._signal = self._gun_signal(gun_signal)
-        self._program.gun_signal = self._signal or ''
+        self._program = RapidProgram(module.name, self._gun_signal(gun_signal))
         self._gun_on = False
         self._brush: float | None = None
         self._triggers: dict[str, GunSwitch] = {}
@@ -126,9 +123,9 @@ class _Run:
             )
         return procedure.lower()
 
-    def _gun_signal(self, given: str | None) -> str | None:
-        everything = [i for body in self._module.procedures.values() for i in body]
-        signals = sorted({name for i in everything if (name := _signal_of(i))})
+    def _gun_signal(self, given: str | None) -> str:
+        bodies = self._module.procedures.values()
+        signals = sorted({_signal_of(i) for body in bodies for i in body} - {''})
         if given is None and len(signals) > 1:
             raise RecordingError(
                 f'{self._source} sets {" ".join(signals)}; say which of them opens the gun'
@@ -137,7 +134,7 @@ class _Run:
             raise RecordingError(
                 f'{self._source} never sets {given}; it sets: {" ".join(signals) or "none"}'
             )
-        return given.lower() if given else next(iter(signals), None)
+        return given.lower() if given else ''.join(signals)
 
     def _note(self, text: str) -> None:
         if text not in self._program.notes:
@@ -167,44 +164,43 @@ class _Run:
         elif i.name in self._module.procedures:
             self._follow(i.name)
         elif i.name == ':=' and not i.block:
-            target: Any = i.arguments[0].value
-            self._data.assign(target, self._data.value(i.arguments[1].value, i.line), i.line)
+            target, value = i.values
+            self._data.assign(target, self._data.value(value, i.line), i.line)
         elif i.name == 'setbrush':
             self._brush = self._number(i, 0)
         elif i.name in TRIGGERS and self._is_gun(i):
-            self._triggers[_name(i.arguments[0].value)] = self._switch(i)
+            self._triggers[_name(i.values[0])] = self._switch(i)
         elif self._is_gun(i):
             self._gun_on = self._level(i)
 
     def _is_gun(self, i: Instruction) -> bool:
-        return self._signal is not None and _signal_of(i) == self._signal
+        return _signal_of(i) == self._program.gun_signal != ''
 
     def _number(self, i: Instruction, index: int) -> float:
-        """An argument that has to be a number."""
-        if len(i.arguments) <= index:
+        """A value that has to be a number."""
+        if len(i.values) <= index:
             self._data.fail(i.line, f'{i.name} needs a number as argument {index + 1}')
-        return self._data.number(i.arguments[index].value, i.line, f'what {i.name} takes')
+        return self._data.number(i.values[index], i.line, f'what {i.name} takes')
 
     def _level(self, i: Instruction) -> bool:
         if i.name in ('set', 'reset'):
             return i.name == 'set'
-        return bool(self._data.value(i.arguments[-1].value, i.line))
+        return bool(self._data.value(i.values[-1], i.line))
 
     def _switch(self, i: Instruction) -> GunSwitch:
-        options = i.options()
-        if options.get('time'):
+        if i.options.get('time'):
             self._data.fail(i.line, f'{i.name} by time is not followed; give a distance')
-        return GunSwitch(self._number(i, 1) * 1e-3, bool(options.get('start')), self._level(i))
+        return GunSwitch(self._number(i, 1) * 1e-3, 'start' in i.options, self._level(i))
 
     # --- moves
 
     def _move(self, i: Instruction) -> None:
         count = MOVES[i.name]
         own_signal = i.name.endswith('do')
-        values = [a.value for a in (i.arguments[:-2] if own_signal else i.arguments)]
+        values = i.values[:-2] if own_signal else i.values
         if len(values) < count + 3:
             self._data.fail(i.line, f'{i.name} needs a target, a speed, a zone and a tool')
-        tool, work_object = _name(values[-1]), _name(i.options().get('wobj') or 'wobj0')
+        tool, work_object = _name(values[-1]), _name(i.options.get('wobj') or 'wobj0')
         if not self._data.tool_is_held(tool):
             self._data.fail(
                 i.line, f'tool {tool} stands still; only tools the robot holds are read'
@@ -244,7 +240,7 @@ class _Run:
         return frame[0] + frame[1].apply(position_m), frame[1] * rotation
 
     def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
-        options = i.options()
+        options = i.options
         if 'v' in options:
             return self._data.number(options['v'], i.line, 'the speed') * 1e-3
         if 't' in options and self._position_m is not None:
@@ -257,36 +253,28 @@ class _Run:
         return self._data.speed_m_per_s(value, i.line)
 
     def _gun(self, i: Instruction, between: list) -> tuple[bool, tuple[GunSwitch, ...]]:
+        """Whether the gun is on as a move begins, and its switches during the move."""
         if i.name.startswith('paint'):
             if self._brush is None:
                 self._note('no SetBrush: paint moves are taken as spraying')
             return self._brush != 0.0, ()
-        if not i.name.startswith('trigg'):
-            return self._gun_on, ()
-        names = [
-            *map(_name, between),
-            *(_name(i.options()[k]) for k in i.options() if _is_trigger(k)),
-        ]
+        names = map(_name, [*between, *i.options.values()])
         switches = [self._triggers[name] for name in names if name in self._triggers]
         at_start = [switch for switch in switches if switch.from_start and not switch.distance_m]
-        later = tuple(switch for switch in switches if switch not in at_start)
-        self._gun_on = at_start[-1].on if at_start else self._gun_on
-        return self._gun_on, later
+        if at_start:
+            self._gun_on = at_start[-1].on
+        return self._gun_on, tuple(switch for switch in switches if switch not in at_start)
 
 
 def _signal_of(i: Instruction) -> str:
     """The digital output that an instruction sets, '' if none."""
-    if i.name in ('setdo', 'set', 'reset') and i.arguments:
-        return _name(i.arguments[0].value)
+    if i.name in ('setdo', 'set', 'reset') and i.values:
+        return _name(i.values[0])
     if i.name in TRIGGERS:
-        return _name(i.options().get('dop') or '')
-    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.arguments) > 2:
-        return _name(i.arguments[-2].value)
+        return _name(i.options.get('dop') or '')
+    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.values) > 2:
+        return _name(i.values[-2])
     return ''
-
-
-def _is_trigger(option: str) -> bool:
-    return option in ('t2', 't3', 't4', 't5', 't6', 't7', 't8')
 
 
 def _name(value: object) -> str:
