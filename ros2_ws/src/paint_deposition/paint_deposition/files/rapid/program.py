@@ -71,14 +71,12 @@ class RapidProgram:
     notes: list[str] = field(default_factory=list)
 
 
-def read_program(
-    path: Path | str, procedure: str | None = None, gun_signal: str | None = None
-) -> RapidProgram:
+def read_program(path: Path | str, gun_signal: str | None = None) -> RapidProgram:
     """Read the moves of a RAPID module (.mod, .prg).
 
+    It begins with `main`, or the only procedure, and follows those called without arguments.
+
     Args:
-        procedure: where to begin; None: main, or the only procedure. Procedures that it calls
-            without arguments are followed.
         gun_signal: digital output that opens the gun; None: the only one that the module sets.
 
     Raises:
@@ -91,7 +89,7 @@ def read_program(
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror}') from None
     module = ModuleParser(text, str(path)).module()
-    return _Run(module, str(path), gun_signal).run(procedure)
+    return _Run(module, str(path), gun_signal).run()
 
 
 class _Run:
@@ -106,22 +104,16 @@ class _Run:
         self._position_m: np.ndarray | None = None
         self._calls: list[str] = []
 
-    def run(self, procedure: str | None) -> RapidProgram:
-        self._follow(self._entry(procedure))
+    def run(self) -> RapidProgram:
+        names = list(self._module.procedures)
+        first = names[0] if len(names) == 1 else 'main'
+        if first not in names:
+            found = ' '.join(names) or 'none'
+            raise RecordingError(f'{self._source} has no procedure main; its procedures: {found}')
+        self._follow(first)
         if not self._program.moves:
             raise RecordingError(f'{self._source} has no moves of the TCP; nothing to read')
         return self._program
-
-    def _entry(self, procedure: str | None) -> str:
-        names = list(self._module.procedures)
-        if procedure is None:
-            procedure = names[0] if len(names) == 1 else 'main'
-        if procedure.lower() not in names:
-            found = ' '.join(names) or 'none'
-            raise RecordingError(
-                f'{self._source} has no procedure {procedure}; its procedures: {found}'
-            )
-        return procedure.lower()
 
     def _gun_signal(self, given: str | None) -> str:
         bodies = self._module.procedures.values()
