@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import BaseModel, BeforeValidator, Field
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
@@ -25,18 +25,14 @@ Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra='forbid')
-
-
-class _File(_Strict):
+class _File(BaseModel, extra='forbid'):
     """A campaign as it is written."""
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
     model: Text | None = Field(None, description='the name of a model file')
 
 
-class _Entry(_Strict):
+class _Entry(BaseModel, extra='forbid'):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')

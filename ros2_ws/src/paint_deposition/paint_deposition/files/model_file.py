@@ -104,10 +104,8 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     for key in content:
         if key not in KEYS:
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
-    planar = _made(PlanarPattern, 'planar', _of_type(dict, 'planar', content.get('planar')))
-    projection = _made(
-        ProjectionSection, 'projection', _of_type(dict, 'projection', content.get('projection'))
-    )
+    planar = _made(PlanarPattern, 'planar', _given(dict, 'planar', content))
+    projection = _made(ProjectionSection, 'projection', _given(dict, 'projection', content))
     effects: list[Effect] = []
     for where, entry in _mappings('effects', content).items():
         effect = _effect(where, entry, load)
@@ -121,8 +119,8 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     return ModelFile(
         DepositionModel(planar=planar, projection=eq_2, effects=tuple(effects)),
-        _of_type(str, 'name', content.get('name')),
-        _of_type(dict, 'uncertainty', content.get('uncertainty')),
+        _given(str, 'name', content),
+        _given(dict, 'uncertainty', content),
         list(_mappings('history', content).values()),
     )
 
@@ -147,13 +145,14 @@ def _made(cls: type[Made], where: str, values: dict[Any, Any]) -> Made:
 
 def _mappings(key: str, content: dict[str, Any]) -> dict[str, dict[str, Any]]:
     """The entries of a list, by the words for where they stand."""
-    entries = enumerate(_of_type(list, key, content.get(key)), start=1)
+    entries = enumerate(_given(list, key, content), start=1)
     places = {f'{key}, entry {number}': entry for number, entry in entries}
-    return {where: _of_type(dict, where, entry) for where, entry in places.items()}
+    return {where: _given(dict, where, places) for where in places}
 
 
-def _of_type(kind: type, key: str, value: Any) -> Any:
-    """The value, empty where the file says nothing."""
+def _given(kind: type, key: str, content: dict[str, Any]) -> Any:
+    """The value of a key, empty where the file says nothing."""
+    value = content.get(key)
     if value is None:
         return kind()
     if not isinstance(value, kind):

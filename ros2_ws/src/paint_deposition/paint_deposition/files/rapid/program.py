@@ -30,6 +30,10 @@ class GunSwitch:
     from_start: bool
     on: bool
 
+    def __str__(self) -> str:
+        place = 'after its start' if self.from_start else 'before its end'
+        return f'{"on" if self.on else "off"} {self.distance_m:g} m {place}'
+
 
 @dataclass(frozen=True)
 class RapidMove:
@@ -143,11 +147,10 @@ class _Run:
         self._calls.pop()
 
     def _execute(self, i: Instruction) -> None:
+        self._data.line = i.line
         matters = i.name in MOVES or i.name in self._module.procedures or self._is_gun(i)
         if i.block and matters:
-            self._data.fail(
-                i.line, f'{i.name} inside {i.block.upper()} is not followed; unroll it'
-            )
+            self._data.fail(f'{i.name} inside {i.block.upper()} is not followed; unroll it')
         if i.name in MOVES:
             self._move(i)
         elif i.name in JOINT_MOVES:
@@ -157,7 +160,7 @@ class _Run:
             self._follow(i.name)
         elif i.name == ':=' and not i.block:
             target, value = i.values
-            self._data.assign(target, self._data.value(value, i.line), i.line)
+            self._data.assign(target, self._data.value(value))
         elif i.name == 'setbrush':
             self._brush = self._number(i, 0)
         elif i.name in TRIGGERS and self._is_gun(i):
@@ -171,17 +174,17 @@ class _Run:
     def _number(self, i: Instruction, index: int) -> float:
         """A value that has to be a number."""
         if len(i.values) <= index:
-            self._data.fail(i.line, f'{i.name} needs a number as argument {index + 1}')
-        return self._data.number(i.values[index], i.line, f'what {i.name} takes')
+            self._data.fail(f'{i.name} needs a number as argument {index + 1}')
+        return self._data.number(i.values[index], f'what {i.name} takes')
 
     def _level(self, i: Instruction) -> bool:
         if i.name in ('set', 'reset'):
             return i.name == 'set'
-        return bool(self._data.value(i.values[-1], i.line))
+        return bool(self._data.value(i.values[-1]))
 
     def _switch(self, i: Instruction) -> GunSwitch:
         if i.options.get('time'):
-            self._data.fail(i.line, f'{i.name} by time is not followed; give a distance')
+            self._data.fail(f'{i.name} by time is not followed; give a distance')
         return GunSwitch(self._number(i, 1) * 1e-3, 'start' in i.options, self._level(i))
 
     # --- moves
@@ -191,13 +194,11 @@ class _Run:
         own_signal = i.name.endswith('do')
         values = i.values[:-2] if own_signal else i.values
         if len(values) < count + 3:
-            self._data.fail(i.line, f'{i.name} needs a target, a speed, a zone and a tool')
+            self._data.fail(f'{i.name} needs a target, a speed, a zone and a tool')
         tool, work_object = _name(values[-1]), _name(i.options.get('wobj') or 'wobj0')
         if not self._data.tool_is_held(tool):
-            self._data.fail(
-                i.line, f'tool {tool} stands still; only tools the robot holds are read'
-            )
-        poses = [self._in_world(value, work_object, i.line) for value in values[:count]]
+            self._data.fail(f'tool {tool} stands still; only tools the robot holds are read')
+        poses = [self._in_world(value, work_object) for value in values[:count]]
         position_m, rotation = poses[-1]
         spraying, switches = self._gun(i, values[count + 1 : -2])
         self._program.moves.append(
@@ -208,7 +209,7 @@ class _Run:
                 quaternion_xyzw=rotation.as_quat(),
                 via_m=poses[0][0] if count == 2 else None,
                 speed_m_per_s=self._speed(i, values[count], position_m),
-                zone_m=self._data.zone_m(values[-2], i.line),
+                zone_m=self._data.zone_m(values[-2]),
                 tool=tool,
                 work_object=work_object,
                 spraying=spraying,
@@ -221,11 +222,9 @@ class _Run:
         if own_signal and self._is_gun(i):
             self._gun_on = self._level(i)
 
-    def _in_world(
-        self, target: object, work_object: str, line: int
-    ) -> tuple[np.ndarray, Rotation]:
-        position_m, rotation = self._data.target(target, line)
-        frame = self._data.work_object(work_object, line)
+    def _in_world(self, target: object, work_object: str) -> tuple[np.ndarray, Rotation]:
+        position_m, rotation = self._data.target(target)
+        frame = self._data.work_object(work_object)
         if frame is None:
             self._note(f'work object {work_object} is not in the module: poses are in its frame')
             return position_m, rotation
@@ -234,15 +233,15 @@ class _Run:
     def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
         options = i.options
         if 'v' in options:
-            return self._data.number(options['v'], i.line, 'the speed') * 1e-3
+            return self._data.number(options['v'], 'the speed') * 1e-3
         if 't' in options and self._position_m is not None:
-            duration_s = self._data.number(options['t'], i.line, 'the duration')
+            duration_s = self._data.number(options['t'], 'the duration')
             if not duration_s > 0.0:
-                self._data.fail(i.line, f'a duration of {duration_s:g} s; give one above 0')
+                self._data.fail(f'a duration of {duration_s:g} s; give one above 0')
             return float(np.linalg.norm(position_m - self._position_m)) / duration_s
         if _name(value) == 'vmax':
             self._note("vmax is the robot's own; 5 m/s assumed")
-        return self._data.speed_m_per_s(value, i.line)
+        return self._data.speed_m_per_s(value)
 
     def _gun(self, i: Instruction, between: list) -> tuple[bool, tuple[GunSwitch, ...]]:
         """Whether the gun is on as a move begins, and its switches during the move."""

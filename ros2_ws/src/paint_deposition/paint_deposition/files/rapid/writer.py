@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 
 from paint_deposition.errors import PlanError
@@ -39,7 +39,10 @@ def module_text(moves: Sequence[PlannedMove]) -> str:
 
     Raises PlanError for speeds that no robot could run.
     """
-    speeds = {speed: f'vPass{k}' for k, speed in enumerate(_speeds(moves), start=1)}
+    speeds = {v: f'vPass{k}' for k, v in enumerate(sorted(set(map(_speed, moves))), start=1)}
+    for speed in speeds:
+        if not 0.0 < speed < 10.0:
+            raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
     data = [f'  CONST robtarget p{k}:={_target(move)};' for k, move in enumerate(moves, start=1)]
     data += [
         f'  CONST speeddata {name}:=[{speed * 1e3:.3f},500,5000,1000];'
@@ -51,21 +54,13 @@ def module_text(moves: Sequence[PlannedMove]) -> str:
         if move.spraying != before.spraying:
             instruction, trigger = 'TriggL', 'gunOn,' if move.spraying else 'gunOff,'
         zone = 'fine' if number == len(moves) else 'z10'
-        speed = speeds[_speed(move)]
-        run.append(f'    {instruction} p{number},{speed},{trigger}{zone},{FRAMES};')
+        speed_name = speeds[_speed(move)]
+        run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
     return MODULE.format(data='\n'.join(data), moves='\n'.join(run))
 
 
 def _speed(move: PlannedMove) -> float:
     return round(float(move.speed_m_per_s), 6)
-
-
-def _speeds(moves: Iterable[PlannedMove]) -> list[float]:
-    speeds = sorted({_speed(move) for move in moves})
-    for speed in speeds:
-        if not 0.0 < speed < 10.0:
-            raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
-    return speeds
 
 
 def _target(move: PlannedMove) -> str:
