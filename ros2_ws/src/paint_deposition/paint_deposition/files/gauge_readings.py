@@ -28,7 +28,9 @@ class Table:
     lines: list[int]
 
     def texts(self, name: str) -> list[str]:
-        """A column, without blanks around the values."""
+        """A column, without blanks around the values; empty texts where there is none."""
+        if name not in self.header:
+            return [''] * len(self.rows)
         at = self.header.index(name)
         return [row[at].strip() for row in self.rows]
 
@@ -45,9 +47,8 @@ class Table:
             try:
                 values[index] = float(text)
             except ValueError:
-                raise self.refusal(
-                    index, f"{name} is '{text}'; expected a number with a point"
-                ) from None
+                reason = f"{name} is '{text}'; expected a number with a point"
+                raise self.refusal(index, reason) from None
             if not np.isfinite(values[index]):
                 raise self.refusal(index, f'{name} is {text}; expected a finite number')
         return values
@@ -74,15 +75,12 @@ def read_readings(path: str | Path) -> Readings:
     for row in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
         span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
         raise table.refusal(row, f'thickness_um is {thickness[row]:g}; expected {span}')
-    given = {'point': _points(table, positions)}
-    if 'group' in table.header:
-        given['group'] = np.array(table.texts('group'))
-    if 'sigma_um' in table.header:
-        given['sigma_um'] = table.numbers('sigma_um', may_be_empty=True)
-        for row in np.flatnonzero(given['sigma_um'] <= 0.0):
-            raise table.refusal(row, f'sigma_um is {given["sigma_um"][row]:g}; expected above 0')
+    sigma_um = table.numbers('sigma_um', may_be_empty=True)
+    for row in np.flatnonzero(sigma_um <= 0.0):
+        raise table.refusal(row, f'sigma_um is {sigma_um[row]:g}; expected above 0')
+    points, groups = _points(table, positions), np.array(table.texts('group'))
     normals = _normals(table)
-    readings = Readings.of(positions, thickness, normals=normals, source=str(path), **given)
+    readings = Readings(positions, thickness, points, groups, sigma_um, normals, str(path))
     require_repeats_close(readings)
     return readings
 

@@ -175,7 +175,8 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         notes.append(f'{count} triangles wound against their neighbours were turned round')
         faces, edges = turned, Edges.of(turned)
     closed = not len(edges.single) and not len(edges.clashing)
-    if closed and _volume_m3(vertices_m, faces) < 0.0:
+    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+    if closed and np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times the volume
         notes.append('the closed body was inside out and was turned round')
         faces = faces[:, ::-1]
     return np.ascontiguousarray(faces)
@@ -196,8 +197,3 @@ def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges)
     turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
     turned ^= (turned_share > 0.5)[sheet]
     return np.where(turned[:, None], faces[:, ::-1], faces)
-
-
-def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-    return float(np.einsum('ij,ij->', a, np.cross(b, c)) / 6.0)

@@ -231,11 +231,10 @@ class _Run:
         return frame[0] + frame[1].apply(position_m), frame[1] * rotation
 
     def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
-        options = i.options
-        if 'v' in options:
-            return self._data.number(options['v'], 'the speed') * 1e-3
-        if 't' in options and self._position_m is not None:
-            duration_s = self._data.number(options['t'], 'the duration')
+        if 'v' in i.options:
+            return self._data.number(i.options['v'], 'the speed') * 1e-3
+        if 't' in i.options and self._position_m is not None:
+            duration_s = self._data.number(i.options['t'], 'the duration')
             if not duration_s > 0.0:
                 self._data.fail(f'a duration of {duration_s:g} s; give one above 0')
             return float(np.linalg.norm(position_m - self._position_m)) / duration_s

@@ -15,6 +15,7 @@ BLOCK_END = {'if': 'endif', 'for': 'endfor', 'while': 'endwhile', 'test': 'endte
 HEADER_END = {
     'else': 'else', 'elseif': 'then', 'case': ':', 'default': ':', 'for': 'do', 'while': 'do',
 }  # fmt: skip
+SKIPPED_TO = {'func': 'endfunc', 'trap': 'endtrap', 'record': 'endrecord', 'alias': ';'}
 HANDLERS = ('error', 'undo', 'backward')
 
 
@@ -68,10 +69,8 @@ class ModuleParser(ValueParser):
             self._declaration(module.data)
         elif self._takes('proc'):
             self._procedure(module)
-        elif word in ('func', 'trap', 'record'):
-            self._skip_past(f'end{word}')
-        elif word == 'alias':
-            self._skip_past(';')
+        elif word in SKIPPED_TO:
+            self._skip_past(SKIPPED_TO[word])
         else:
             self._fail(f'{self._now.text or "the end"!r} is no declaration')
 
