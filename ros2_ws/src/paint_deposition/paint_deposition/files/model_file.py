@@ -104,8 +104,8 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     for key in content:
         if key not in KEYS:
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
-    planar = _made(PlanarPattern, 'planar', _given(dict, 'planar', content))
-    projection = _made(ProjectionSection, 'projection', _given(dict, 'projection', content))
+    planar = _section(PlanarPattern, 'planar', content)
+    projection = _section(ProjectionSection, 'projection', content)
     effects: list[Effect] = []
     for where, entry in _mappings('effects', content).items():
         effect = _effect(where, entry, load)
@@ -125,6 +125,10 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     )
 
 
+def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:
+    return checked(cls, key, _given(dict, key, content), ModelError)
+
+
 def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect]]) -> Effect:
     chosen = [key for key in ('id', 'file') if key in entry]
     if len(chosen) != 1:
@@ -133,14 +137,8 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
     if not isinstance(source, str):
         raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
     cls = effect_class(source) if chosen == ['id'] else load(source)
-    return _made(cls, source, {key: entry[key] for key in entry if key not in chosen})
-
-
-def _made(cls: type[Made], where: str, values: dict[Any, Any]) -> Made:
-    for key in values:
-        if not isinstance(key, str):
-            raise ModelError(f'{where}: unknown key {key!r}; expected names of parameters')
-    return checked(cls, where, values, ModelError)
+    values = {key: entry[key] for key in entry if key not in chosen}
+    return checked(cls, source, values, ModelError)
 
 
 def _mappings(key: str, content: dict[str, Any]) -> dict[str, dict[str, Any]]:

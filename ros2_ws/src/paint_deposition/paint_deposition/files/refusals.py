@@ -45,7 +45,7 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
         return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
     field = model.model_fields.get(str(first['loc'][0]))
     if field is None:
-        return f'{where}: {first["msg"]}{more}'
+        return f'{where}: unknown key {key}; expected names of parameters{more}'
     if first['type'] == 'missing':
         return f'{where} has no {key!r}; give {_expected(field)}{more}'
     return f'{_wrong(where, key, first["input"], field)}{more}'

@@ -149,11 +149,9 @@ class RapidData:
 
     def _look_up(self, reference: Reference) -> object:
         if reference.name not in self._values:
-            kind = self._types.get(reference.name)
-            what = f'{kind} {reference.name} has no value yet' if kind else (
-                f'{reference.name} is not declared in this module'
-            )  # fmt: skip
-            self.fail(what)
+            if kind := self._types.get(reference.name):
+                self.fail(f'{kind} {reference.name} has no value yet')
+            self.fail(f'{reference.name} is not declared in this module')
         value: Any = self._values[reference.name]
         for index in self._path(reference):
             value = _part(value, index)
