@@ -18,7 +18,7 @@ from small_campaign import small_campaign
 def test_residuals_surround_their_readings_and_the_rest_is_grey(tmp_path):
     study = Study.of(small_campaign(tmp_path / 'campaign'))
     comparison = compare(study, DepositionModel())
-    paths = write_residual_meshes(tmp_path, study, comparison)
+    paths = write_residual_meshes(tmp_path, comparison)
     assert [path.name for path in paths] == ['residual_panel.ply', 'residual_door.ply']
     for number, (path, experiment) in enumerate(
         zip(paths, study.campaign.experiments, strict=True)

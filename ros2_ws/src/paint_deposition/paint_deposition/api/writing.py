@@ -119,6 +119,6 @@ def _write_residuals(folder: Path, comparisons: tuple[Comparison, ...]) -> list[
     last = comparisons[-1]
     table, picture = folder / 'residuals.csv', folder / 'comparison.png'
     write_residuals(table, last)
-    meshes = write_residual_meshes(folder, last.study, last)
+    meshes = write_residual_meshes(folder, last)
     write_comparison_picture(picture, last.study, [(c.model, c) for c in comparisons])
     return [table, *meshes, picture]

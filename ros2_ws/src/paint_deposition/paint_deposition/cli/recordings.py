@@ -17,7 +17,7 @@ from paint_deposition.cli.options import (
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_files import refuse_gun_signal
-from paint_deposition.files.rapid.motion import is_rapid, program_as_dict, program_as_text
+from paint_deposition.files.rapid.motion import is_rapid, program_as_text
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
 from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files, recover
@@ -38,7 +38,7 @@ def inspect_command(
     """
     if is_rapid(recording):
         program = read_program(recording, gun_signal=gun_signal)
-        click.echo(json_text(program_as_dict(program)) if as_json else program_as_text(program))
+        click.echo(json_text(asdict(program)) if as_json else program_as_text(program))
         return
     refuse_gun_signal(recording, gun_signal)
     summary = summarise(recording, max_pose_gap_s)

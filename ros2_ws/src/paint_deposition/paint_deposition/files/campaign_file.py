@@ -2,16 +2,16 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, BeforeValidator, Field
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.files.refusals import refusal
+from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.part.facing import toward_the_gun
@@ -23,21 +23,16 @@ MAX_EDGE_LENGTH_M = 0.02
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-Made = TypeVar('Made', bound=BaseModel)
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra='forbid')
-
-
-class _File(_Strict):
+class _File(BaseModel, extra='forbid'):
     """A campaign as it is written."""
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
     model: Text | None = Field(None, description='the name of a model file')
 
 
-class _Entry(_Strict):
+class _Entry(BaseModel, extra='forbid'):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
@@ -71,10 +66,10 @@ def read_campaign(
     content = read_yaml(path, 'campaign', ReadingsError)
     if not isinstance(content, dict):
         raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
-    file = _checked(_File, path, 'campaign', content)
+    file = checked(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
     for number, written in enumerate(file.experiments, start=1):
-        entry = _checked(_Entry, path, f'experiment {number}', written)
+        entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
         name = entry.name or f'experiment_{number}'
         if name in [e.name for e in experiments]:
             raise ReadingsError(f"{path}: two experiments are called '{name}'; rename one")
@@ -87,21 +82,11 @@ def read_campaign(
     return Campaign(tuple(experiments), start, str(path))
 
 
-def _checked(model: type[Made], path: Path, where: str, content: Any) -> Made:
-    try:
-        return model.model_validate(content)
-    except ValidationError as error:
-        raise ReadingsError(f'{path}: {refusal(model, where, error)}') from None
-
-
 def _read_experiment(
     folder: Path, name: str, entry: _Entry, progress: Callable[[str], None]
 ) -> Experiment:
-    files = {
-        'mesh': str(folder / entry.mesh),
-        'trajectory': str(folder / entry.trajectory),
-        'measurements': str(folder / entry.measurements),
-    }
+    kinds = ('mesh', 'trajectory', 'measurements')
+    files = {kind: str(folder / getattr(entry, kind)) for kind in kinds}
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down)
     trajectory = read_trajectory(files['trajectory'], entry.pose_topic, entry.state_topic)

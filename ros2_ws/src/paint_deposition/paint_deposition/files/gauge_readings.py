@@ -1,7 +1,7 @@
 """Tables of gauge readings, CSV: read, checked, and written with predictions."""
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
@@ -28,7 +28,9 @@ class Table:
     lines: list[int]
 
     def texts(self, name: str) -> list[str]:
-        """A column, without blanks around the values."""
+        """A column, without blanks around the values; empty texts where there is none."""
+        if name not in self.header:
+            return [''] * len(self.rows)
         at = self.header.index(name)
         return [row[at].strip() for row in self.rows]
 
@@ -45,9 +47,8 @@ class Table:
             try:
                 values[index] = float(text)
             except ValueError:
-                raise self.refusal(
-                    index, f"{name} is '{text}'; expected a number with a point"
-                ) from None
+                reason = f"{name} is '{text}'; expected a number with a point"
+                raise self.refusal(index, reason) from None
             if not np.isfinite(values[index]):
                 raise self.refusal(index, f'{name} is {text}; expected a finite number')
         return values
@@ -71,34 +72,23 @@ def read_readings(path: str | Path) -> Readings:
     table = read_table(Path(path))
     positions = np.column_stack([table.numbers(name) for name in ('x_m', 'y_m', 'z_m')])
     thickness = table.numbers('thickness_um')
-    for row, value in enumerate(thickness):
-        if not THINNEST_UM <= value <= THICKEST_UM:
-            raise table.refusal(
-                row,
-                f'thickness_um is {value:g}; expected {THINNEST_UM:g} to {THICKEST_UM:g} '
-                'micrometres',
-            )
-    given = {'point': _points(table, positions)}
-    if 'group' in table.header:
-        given['group'] = np.array(table.texts('group'))
-    if 'sigma_um' in table.header:
-        given['sigma_um'] = table.numbers('sigma_um', may_be_empty=True)
-        for row in np.flatnonzero(given['sigma_um'] <= 0.0):
-            raise table.refusal(row, f'sigma_um is {given["sigma_um"][row]:g}; expected above 0')
+    for row in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
+        span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
+        raise table.refusal(row, f'thickness_um is {thickness[row]:g}; expected {span}')
+    sigma_um = table.numbers('sigma_um', may_be_empty=True)
+    for row in np.flatnonzero(sigma_um <= 0.0):
+        raise table.refusal(row, f'sigma_um is {sigma_um[row]:g}; expected above 0')
+    points, groups = _points(table, positions), np.array(table.texts('group'))
     normals = _normals(table)
-    if normals is not None:
-        given['normals'] = normals
-    readings = Readings.of(positions, thickness, source=str(path), **given)
+    readings = Readings(positions, thickness, points, groups, sigma_um, normals, str(path))
     require_repeats_close(readings)
     return readings
 
 
 def _points(table: Table, positions_m: np.ndarray) -> np.ndarray:
     if 'point' in table.header:
-        labels = table.texts('point')
-        return np.array(
-            [label or f'line {line}' for label, line in zip(labels, table.lines, strict=True)]
-        )
+        labels = zip(table.texts('point'), table.lines, strict=True)
+        return np.array([label or f'line {line}' for label, line in labels])
     _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
     return np.array([f'line {table.lines[row]}' for row in first[place.ravel()]])
 
@@ -148,12 +138,9 @@ def _check_header(path: Path, header: list[str]) -> None:
         if name and header.count(name) > 1:
             raise ReadingsError(f"{path}: two columns are called '{name}'; keep one")
     for name in REQUIRED:
-        if name in header:
-            continue
-        known = ', '.join(header) or 'none'
-        raise ReadingsError(
-            f"{path}: no column '{name}' (columns: {known}); {_hint(name, header)}"
-        )
+        if name not in header:
+            known = f'(columns: {", ".join(header) or "none"})'
+            raise ReadingsError(f"{path}: no column '{name}' {known}; {_hint(name, header)}")
 
 
 def _hint(name: str, header: list[str]) -> str:
@@ -174,16 +161,12 @@ def write_predictions(
 ) -> None:
     """Write the readings' own columns with ``predicted_um`` (N,) added, whole or not at all."""
     table = read_table(Path(readings_path))
-    kept = [at for at, name in enumerate(table.header) if name != 'predicted_um']
-    lines = [[*(table.header[at] for at in kept), 'predicted_um']]
-    lines += [
-        [*(row[at] for at in kept), f'{value:.4f}']
-        for row, value in zip(table.rows, predicted_um, strict=True)
-    ]
-    write_table(path, lines)
+    columns = [c for c in zip(table.header, *table.rows, strict=True) if c[0] != 'predicted_um']
+    columns.append(('predicted_um', *(f'{value:.4f}' for value in predicted_um)))
+    write_table(path, zip(*columns, strict=True))
 
 
-def write_table(path: str | Path, lines: Sequence[Sequence[object]]) -> None:
+def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:
     """Write lines of values as CSV, whole or not at all."""
     text = StringIO(newline='')
     csv.writer(text, lineterminator='\n').writerows(lines)

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from pydantic_core import to_json
+from pydantic_core import to_json, to_jsonable_python
 
 from paint_deposition.files.atomic import write_text
 
@@ -21,10 +21,19 @@ def json_text(content: Mapping[str, Any]) -> str:
     Raises:
         ValueError: a value that JSON cannot hold.
     """
-    return to_json(content, indent=2, inf_nan_mode='null', fallback=_plain).decode()
+    return to_json(content, indent=2, inf_nan_mode='null', fallback=_without_numpy).decode()
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Numbers and containers of Python for those of NumPy.
+
+    Raises:
+        ValueError: a value that is neither.
+    """
+    return to_jsonable_python(value, fallback=_without_numpy)
+
+
+def _without_numpy(value: Any) -> Any:
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise ValueError(f'{type(value).__name__} cannot be written as JSON')

@@ -4,8 +4,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 
 from paint_deposition.errors import MeshError
 from paint_deposition.files.atomic import replacing
@@ -108,9 +106,8 @@ def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
         vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
     except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
-        raise MeshError(
-            f'{path}: not readable as a mesh ({_first_line(error)}); export it again'
-        ) from error
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0][:120]
+        raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -141,11 +138,6 @@ def _as_utf8(path: Path, kind: str) -> bytes:
                 f'{len(content)} bytes, a complete binary one; export it again'
             )
     return content.decode('utf-8', errors='replace').encode()
-
-
-def _first_line(error: Exception) -> str:
-    lines = str(error).strip().splitlines()
-    return lines[0][:120] if lines else type(error).__name__
 
 
 def _check_extent(path: Path, corners_m: np.ndarray) -> None:
@@ -183,7 +175,8 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         notes.append(f'{count} triangles wound against their neighbours were turned round')
         faces, edges = turned, Edges.of(turned)
     closed = not len(edges.single) and not len(edges.clashing)
-    if closed and _volume_m3(vertices_m, faces) < 0.0:
+    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+    if closed and np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times the volume
         notes.append('the closed body was inside out and was turned round')
         faces = faces[:, ::-1]
     return np.ascontiguousarray(faces)
@@ -192,20 +185,15 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
 def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
     """Wind each connected surface alike, as most of its area was."""
     from trimesh import Trimesh
+    from trimesh.graph import connected_component_labels
     from trimesh.repair import fix_winding
 
     mesh = Trimesh(vertices_m, faces, process=False, validate=False)
     fix_winding(mesh)
     turned = (np.asarray(mesh.faces) != faces).any(axis=1)
-    pairs = np.concatenate([edges.paired, edges.clashing]).T // 3
-    links = coo_matrix((np.ones(pairs.shape[1]), pairs), shape=(len(faces), len(faces)))
-    _, sheet = connected_components(links, directed=False)
+    pairs = np.concatenate([edges.paired, edges.clashing]) // 3
+    sheet = connected_component_labels(pairs, len(faces))
     areas = face_areas_m2(vertices_m, faces)
     turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
     turned ^= (turned_share > 0.5)[sheet]
     return np.where(turned[:, None], faces[:, ::-1], faces)
-
-
-def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-    return float(np.einsum('ij,ij->', a, np.cross(b, c)) / 6.0)

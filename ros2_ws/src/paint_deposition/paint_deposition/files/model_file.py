@@ -3,9 +3,9 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import Field
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
@@ -15,7 +15,7 @@ from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_text import model_text
-from paint_deposition.files.refusals import boolean_number, refusal
+from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
@@ -24,7 +24,6 @@ WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: '
 KEYS = ('name', 'planar', 'projection', 'effects', 'uncertainty', 'history')
 
 LoadEffect = Callable[[Path], type[Effect]]
-Made = TypeVar('Made', bound=BaseModel)
 
 
 class ProjectionSection(Projection):
@@ -107,43 +106,30 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
     planar = _section(PlanarPattern, 'planar', content)
     projection = _section(ProjectionSection, 'projection', content)
-    effects = _effects(content.get('effects'), load)
-    if projection.occlusion:
-        if any(effect.id == Occlusion.id for effect in effects):
-            raise ModelError('occlusion is given in projection and in effects; keep the effect')
-        effects = (*effects, Occlusion(strength=1.0))
-    eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
-    return ModelFile(
-        DepositionModel(planar=planar, projection=eq_2, effects=effects),
-        _of_type('name', content.get('name'), str, ''),
-        _of_type('uncertainty', content.get('uncertainty'), dict, {}),
-        _history(content.get('history')),
-    )
-
-
-def _history(entries: Any) -> list[dict[str, Any]]:
-    return [
-        _of_type(f'history, entry {number}', entry, dict, {})
-        for number, entry in enumerate(_of_type('history', entries, list, []), start=1)
-    ]
-
-
-def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:
-    return _made(cls, key, _of_type(key, content.get(key), dict, {}))
-
-
-def _effects(entries: Any, load: Callable[[str], type[Effect]]) -> tuple[Effect, ...]:
     effects: list[Effect] = []
-    for number, entry in enumerate(_of_type('effects', entries, list, []), start=1):
-        effect = _effect(f'effects, entry {number}', entry, load)
+    for where, entry in _mappings('effects', content).items():
+        effect = _effect(where, entry, load)
         if effect.id in [other.id for other in effects]:
             raise ModelError(f'effects: {effect.id!r} is there twice; keep one')
         effects.append(effect)
-    return tuple(effects)
+    if projection.occlusion:
+        if any(effect.id == Occlusion.id for effect in effects):
+            raise ModelError('occlusion is given in projection and in effects; keep the effect')
+        effects.append(Occlusion(strength=1.0))
+    eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
+    return ModelFile(
+        DepositionModel(planar=planar, projection=eq_2, effects=tuple(effects)),
+        _given(str, 'name', content),
+        _given(dict, 'uncertainty', content),
+        list(_mappings('history', content).values()),
+    )
 
 
-def _effect(where: str, entry: Any, load: Callable[[str], type[Effect]]) -> Effect:
-    entry = _of_type(where, entry, dict, {})
+def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:
+    return checked(cls, key, _given(dict, key, content), ModelError)
+
+
+def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect]]) -> Effect:
     chosen = [key for key in ('id', 'file') if key in entry]
     if len(chosen) != 1:
         raise ModelError(f'{where}: has {" and ".join(chosen) or "no id"}; give one of id, file')
@@ -151,26 +137,22 @@ def _effect(where: str, entry: Any, load: Callable[[str], type[Effect]]) -> Effe
     if not isinstance(source, str):
         raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
     cls = effect_class(source) if chosen == ['id'] else load(source)
-    return _made(cls, source, {key: entry[key] for key in entry if key not in chosen})
+    values = {key: entry[key] for key in entry if key not in chosen}
+    return checked(cls, source, values, ModelError)
 
 
-def _made(cls: type[Made], where: str, values: dict[Any, Any]) -> Made:
-    for key in values:
-        if not isinstance(key, str):
-            raise ModelError(f'{where}: unknown key {key!r}; expected names of parameters')
-    problem = boolean_number(cls, where, values)
-    if problem:
-        raise ModelError(problem)
-    try:
-        return cls(**values)
-    except ValidationError as error:
-        raise ModelError(refusal(cls, where, error)) from None
+def _mappings(key: str, content: dict[str, Any]) -> dict[str, dict[str, Any]]:
+    """The entries of a list, by the words for where they stand."""
+    entries = enumerate(_given(list, key, content), start=1)
+    places = {f'{key}, entry {number}': entry for number, entry in entries}
+    return {where: _given(dict, where, places) for where in places}
 
 
-def _of_type(key: str, value: Any, kind: type, default: Any) -> Any:
-    """The value, or the default where the file says nothing."""
+def _given(kind: type, key: str, content: dict[str, Any]) -> Any:
+    """The value of a key, empty where the file says nothing."""
+    value = content.get(key)
     if value is None:
-        return default
+        return kind()
     if not isinstance(value, kind):
         raise ModelError(f'{key} is {value!r}; expected {WORDS[kind]}')
     return value

@@ -30,11 +30,11 @@ def git_version() -> str:
         return ''
     try:
         done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=10, check=False
+            command, cwd=folder, capture_output=True, text=True, timeout=10, check=True
         )
-    except (OSError, subprocess.TimeoutExpired):
+    except (OSError, subprocess.SubprocessError):
         return ''
-    return done.stdout.strip() if done.returncode == 0 else ''
+    return done.stdout.strip()
 
 
 def _content(path: str, parameter: str) -> bytes:

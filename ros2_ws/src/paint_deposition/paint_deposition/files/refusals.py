@@ -1,22 +1,41 @@
 """Why a checked value was refused, in one line: the key, its value, the range, the remedy."""
 
-from typing import Any
+from dataclasses import asdict
+from typing import Any, TypeVar
 
-from annotated_types import Ge, Gt, Le, Lt
+from annotated_types import Ge, Gt, Le
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from paint_deposition.errors import did_you_mean
+from paint_deposition.errors import PaintError, did_you_mean
+
+Made = TypeVar('Made', bound=BaseModel)
 
 
-def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
-    """One line for the first error of a validation.
+def checked(model: type[Made], where: str, values: Any, refusal: type[PaintError]) -> Made:
+    """The values as a model.
 
     Args:
-        model: what was to be made.
+        model: what to make.
         where: how the user calls it.
-        error: as pydantic raised it.
+        values: as written.
+        refusal: error to raise.
+
+    Raises:
+        PaintError: of the class given, with one line for the first value that is wrong.
     """
+    try:
+        made = model.model_validate(values)
+    except ValidationError as error:
+        raise refusal(_reason(model, where, error)) from None
+    for key, value in values.items():
+        field = model.model_fields[key]
+        if field.annotation is float and isinstance(value, bool):  # true would pass as 1
+            raise refusal(_wrong(where, key, value, field))
+    return made
+
+
+def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     first, others = error.errors()[0], error.error_count() - 1
     more = f' (and {others} more)' if others else ''
     if not first['loc']:
@@ -26,19 +45,14 @@ def refusal(model: type[BaseModel], where: str, error: ValidationError) -> str:
         return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
     field = model.model_fields.get(str(first['loc'][0]))
     if field is None:
-        return f'{where}: {first["msg"]}{more}'
+        return f'{where}: unknown key {key}; expected names of parameters{more}'
     if first['type'] == 'missing':
         return f'{where} has no {key!r}; give {_expected(field)}{more}'
-    return f'{where}: {key} is {first["input"]!r}; expected {_expected(field)}{more}'
+    return f'{_wrong(where, key, first["input"], field)}{more}'
 
 
-def boolean_number(model: type[BaseModel], where: str, values: dict[str, Any]) -> str | None:
-    """One line where true stands for a number, which would pass as 1; else None."""
-    for key, value in values.items():
-        field = model.model_fields.get(key)
-        if field is not None and field.annotation is float and isinstance(value, bool):
-            return f'{where}: {key} is {value!r}; expected {_expected(field)}'
-    return None
+def _wrong(where: str, key: str, value: object, field: FieldInfo) -> str:
+    return f'{where}: {key} is {value!r}; expected {_expected(field)}'
 
 
 def _expected(field: FieldInfo) -> str:
@@ -46,18 +60,11 @@ def _expected(field: FieldInfo) -> str:
         return f'true or false: {field.description}'
     if field.annotation is not float:
         return str(field.description)
-    limits = {
-        kind: getattr(bound, name)
-        for bound in field.metadata
-        for kind, name in ((Ge, 'ge'), (Gt, 'gt'), (Le, 'le'), (Lt, 'lt'))
-        if isinstance(bound, kind)
-    }
-    words = [f'above {limits[Gt]:g}' if Gt in limits else '']
-    if Ge in limits and Le in limits:
-        words.append(f'{limits[Ge]:g} to {limits[Le]:g}')
-    elif Le in limits:
-        words.append(f'up to {limits[Le]:g}')
-    elif Ge in limits:
-        words.append(f'at least {limits[Ge]:g}')
-    number = ' and '.join(filter(None, words))
-    return f'a number {number}: {field.description}'
+    limits: dict[str, float] = {}
+    for bound in field.metadata:
+        if isinstance(bound, Ge | Gt | Le):
+            limits |= asdict(bound)
+    if 'ge' in limits:
+        return f'a number {limits["ge"]:g} to {limits["le"]:g}: {field.description}'
+    most = f' and up to {limits["le"]:g}' if 'le' in limits else ''
+    return f'a number above {limits["gt"]:g}{most}: {field.description}'

@@ -19,23 +19,14 @@ def write_calibration(
         calibration: what to write.
         start: the model it started from, whose name and history are carried on.
     """
-    folder = Path(folder)
-    folder.mkdir(parents=True, exist_ok=True)
+    model_file, figures = Path(folder) / 'model.yaml', Path(folder) / 'calibration.json'
     study = calibration.study
-    write_fitted(
-        folder / 'model.yaml',
-        study,
-        [Step.of(study, '', calibration.fit)],
-        start,
-        '\n'.join(_headline(calibration)),
-    )
-    write_json(folder / 'calibration.json', calibration.to_dict())
-    return [folder / 'model.yaml', folder / 'calibration.json']
-
-
-def _headline(calibration: Calibration) -> list[str]:
-    names = ', '.join(experiment.name for experiment in calibration.study.campaign.experiments)
-    return [
-        f'Calibrated on {len(calibration.study)} points ({names}).',
+    names = ', '.join(experiment.name for experiment in study.campaign.experiments)
+    header = [
+        f'Calibrated on {len(study)} points ({names}).',
         *(f'Mind: {warning}.' for warning in calibration.warnings),
     ]
+    step = Step.of(study, '', calibration.fit)
+    write_fitted(model_file, study, [step], start, '\n'.join(header))
+    write_json(figures, calibration.to_dict())
+    return [model_file, figures]

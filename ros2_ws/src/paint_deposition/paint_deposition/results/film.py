@@ -1,6 +1,7 @@
 """A finished film on disk, for node and command: painted mesh, table and figures."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -46,33 +47,28 @@ def write_film(
     """
     folder = Path(folder).expanduser().absolute()
     paths = [folder / f'{stem}.ply', folder / f'{stem}.csv', folder / statistics_file]
-    if not overwrite:
-        refuse_overwriting(paths)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise PaintError(
+                f'{path} is there already; choose another name, or move the old file away'
+            )
+    with writable(folder):
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
-        write_film_csv(paths[1], surface.vertices_m, film_um)
+        with replacing(paths[1]) as temporary:
+            rows = np.column_stack([surface.vertices_m, film_um])
+            np.savetxt(temporary, rows, '%.9g', delimiter=',', header=CSV_HEADER, comments='')
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
+    return paths
+
+
+@contextmanager
+def writable(folder: Path) -> Iterator[None]:
+    """Give PaintError for what keeps files from being written to a folder."""
+    try:
+        yield
     except OSError as error:
         raise PaintError(
             f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'
         ) from None
-    return paths
-
-
-def refuse_overwriting(paths: list[Path]) -> None:
-    """Raise PaintError if one of the files exists."""
-    there = [path for path in paths if path.exists()]
-    if there:
-        raise PaintError(
-            f'{there[0]} is there already; choose another name, or move the old file away'
-        )
-
-
-def write_film_csv(path: str | Path, positions_m: np.ndarray, film_um: np.ndarray) -> None:
-    """Write (V, 3) positions [m] and (V,) film [um] as a table, whole or not at all."""
-    rows = np.column_stack([positions_m, film_um])
-    with replacing(path) as temporary:
-        np.savetxt(temporary, rows, '%.9g', delimiter=',', header=CSV_HEADER, comments='')

@@ -40,14 +40,10 @@ def write_fitted(
         header_comment: lines to put at the top.
     """
     start = start or ModelFile(steps[0].model)
-    write_model(
-        path,
-        _rounded(steps[-1].fit),
-        header_comment,
-        history_as_list(study, steps, start.history),
-        _uncertainty(steps[-1].fit, start.uncertainty),
-        start.name,
-    )
+    fit = steps[-1].fit
+    history = history_as_list(study, steps, start.history)
+    uncertainty = _uncertainty(fit, start.uncertainty)
+    write_model(path, _rounded(fit), header_comment, history, uncertainty, start.name)
 
 
 def history_as_list(
@@ -86,16 +82,15 @@ def history_as_list(
 def _rounded(fit: Fit) -> DepositionModel:
     """The fitted model with what was fitted at few digits, within its bounds."""
     pattern = {name: _few_digits(getattr(fit.model.planar, name)) for name in PATTERN_NAMES}
-    effects = []
-    for effect in fit.model.effects:
+    model = fit.model.model_copy(update={'planar': fit.model.planar.model_copy(update=pattern)})
+    for effect in model.effects:
         values = {
             name: _few_digits(getattr(effect, name), info['low'], info['high'])
             for name, info in effect.parameters().items()
             if (effect.id, name) in fit.parameters.varied
         }
-        effects.append(effect.model_copy(update=values))
-    planar = fit.model.planar.model_copy(update=pattern)
-    return fit.model.model_copy(update={'planar': planar, 'effects': tuple(effects)})
+        model = model.with_effect(effect.model_copy(update=values))
+    return model
 
 
 def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:

@@ -2,7 +2,7 @@
 
 import shutil
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +14,10 @@ from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.pass_motion import planned_moves
+from paint_deposition.planning.pass_motion import PlannedMove, planned_moves
 from paint_deposition.planning.plan import Plan
-from paint_deposition.results.film import write_film
+from paint_deposition.results.film import writable, write_film
 
-BAG_FOLDER = 'trajectory'
 COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying',
 )  # fmt: skip
@@ -45,50 +44,35 @@ def write_plan(
         PaintError: the folder cannot be written, or holds another folder of the bag's name.
     """
     folder = Path(folder)
-    try:
+    moves = planned_moves(plan.passes, plan.style)
+    with writable(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        written = [
-            _write_bag(folder, plan.trajectory),
-            write_passes_csv(folder / 'passes.csv', plan),
-            _write_module(folder / 'passes.mod', plan),
-        ]
+        _write_bag(folder / 'trajectory', plan.trajectory)
+        write_table(folder / 'passes.csv', _table(moves))
+        write_text(folder / 'passes.mod', module_text(moves))
         write_json(folder / 'plan.json', {**plan.to_dict(), **(details or {})})
-    except OSError as error:
-        raise PaintError(
-            f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'
-        ) from None
     film = write_film(folder, surface, plan.film_um, plan.statistics, overwrite=True)
-    film = [folder / file.name for file in film]
-    return [folder / 'plan.json', *written, *film]
+    names = ['plan.json', 'trajectory', 'passes.csv', 'passes.mod', *(file.name for file in film)]
+    return [folder / name for name in names]
 
 
-def write_passes_csv(path: str | Path, plan: Plan) -> Path:
-    """Write the TCP's moves as a table: where each ends, how fast, and whether the gun is on."""
+def _table(moves: Sequence[PlannedMove]) -> Iterator[Sequence[object]]:
+    """A line a move of the TCP: where it ends, how fast, and whether the gun is on."""
+    yield COLUMNS
     number, was_spraying = 0, False
-    lines: list[Sequence[object]] = [COLUMNS]
-    for move in planned_moves(plan.passes, plan.style):
+    for move in moves:
         number += move.spraying and not was_spraying
         was_spraying = move.spraying
-        lines.append(
-            [
-                max(number, 1),
-                *(f'{value:.6f}' for value in move.position_m),
-                *(f'{value:.8f}' for value in move.quaternion_xyzw),
-                f'{move.speed_m_per_s:.6g}',
-                int(move.spraying),
-            ]
-        )
-    write_table(path, lines)
-    return Path(path)
+        yield [
+            max(number, 1),
+            *(f'{value:.6f}' for value in move.position_m),
+            *(f'{value:.8f}' for value in move.quaternion_xyzw),
+            f'{move.speed_m_per_s:.6g}',
+            int(move.spraying),
+        ]
 
 
-def _write_module(path: Path, plan: Plan) -> Path:
-    write_text(path, module_text(planned_moves(plan.passes, plan.style)))
-    return path
-
-
-def _write_bag(folder: Path, trajectory: Trajectory) -> Path:
-    target = folder / BAG_FOLDER
+def _write_bag(target: Path, trajectory: Trajectory) -> None:
     if target.exists():
         strangers = [
             path for path in target.rglob('*')
@@ -97,9 +81,8 @@ def _write_bag(folder: Path, trajectory: Trajectory) -> Path:
         if not target.is_dir() or strangers:
             raise PaintError(f'{target} is there and no planned bag; move it away')
     # A bag's files are named for their folder, so the folder is made under its own name.
-    with tempfile.TemporaryDirectory(dir=folder, prefix='.plan-') as aside:
-        fresh = write_pose_bag(Path(aside) / BAG_FOLDER, trajectory)
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
+        fresh = write_pose_bag(Path(aside) / target.name, trajectory)
         if target.exists():
             shutil.rmtree(target)
         fresh.rename(target)
-    return target

@@ -9,28 +9,25 @@ from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.film.colour_scales import residual_scale
-from paint_deposition.fitting.study import Study
 
 
-def write_residual_meshes(folder: str | Path, study: Study, comparison: Comparison) -> list[Path]:
+def write_residual_meshes(folder: str | Path, comparison: Comparison) -> list[Path]:
     """Write ``residual_<experiment>.ply``: vertex colours and property ``residual_um``.
 
     Residual = measured minus predicted, interpolated between readings; grey and NaN where no
     reading is near. All experiments share one scale of colours.
     """
+    campaign = comparison.study.campaign
     fields = []
-    for number, experiment in enumerate(study.campaign.experiments):
-        points = experiment.measured_points
-        residual_um = comparison.points.residual_um[study.campaign.experiment_of == number]
-        fields.append(
-            spread_over_surface(
-                experiment.surface, points.positions_m, points.normals, residual_um
-            )
-        )
+    for number, experiment in enumerate(campaign.experiments):
+        at = experiment.measured_points
+        residual_um = comparison.points.residual_um[campaign.experiment_of == number]
+        surface = experiment.surface
+        fields.append(spread_over_surface(surface, at.positions_m, at.normals, residual_um))
     everything = np.concatenate(fields)
     scale = residual_scale(everything[np.isfinite(everything)])
     paths: list[Path] = []
-    for experiment, field in zip(study.campaign.experiments, fields, strict=True):
+    for experiment, field in zip(campaign.experiments, fields, strict=True):
         path = Path(folder) / f'residual_{file_name(experiment.name)}.ply'
         if path in paths:
             path = path.with_stem(f'{path.stem}_{len(paths) + 1}')

@@ -6,7 +6,7 @@ import copy
 import operator
 import re
 from collections.abc import Callable
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeGuard
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -35,102 +35,102 @@ class RapidData:
 
     def __init__(self, module: Module, source: str) -> None:
         self._source = source
+        self.line = 0
         self._types = {name: datum.type for name, datum in module.data.items()}
         self._values: dict[str, object] = {}
         for name, datum in module.data.items():
             if datum.value is not None:
-                self._values[name] = self.value(datum.value, datum.line)
+                self.line = datum.line
+                self._values[name] = self.value(datum.value)
 
-    def fail(self, line: int, reason: str) -> NoReturn:
-        raise RecordingError(f'{self._source} line {line}: {reason}')
+    def fail(self, reason: str) -> NoReturn:
+        raise RecordingError(f'{self._source} line {self.line}: {reason}')
 
-    def value(self, expression: object, line: int) -> Any:
+    def value(self, expression: object) -> Any:
         """What an expression stands for."""
         if isinstance(expression, list):
-            return [self.value(item, line) for item in expression]
+            return [self.value(item) for item in expression]
         if isinstance(expression, Call):
-            return self._call(expression, line)
+            return self._call(expression)
         if isinstance(expression, Reference):
-            return self._look_up(expression, line)
+            return self._look_up(expression)
         return expression
 
-    def number(self, expression: object, line: int, name: str) -> float:
+    def number(self, expression: object, name: str) -> float:
         """The number that an expression stands for; `name` tells it in the refusal."""
-        value = self.value(expression, line)
+        value = self.value(expression)
         if not _is_number(value):
-            self.fail(line, f'{name} is {value!r}; a number expected')
+            self.fail(f'{name} is {value!r}; a number expected')
         return value
 
-    def assign(self, target: Reference, value: object, line: int) -> None:
-        if not (target.indexes or target.components):
-            self._values[target.name] = value
-            return
-        place: Any = self._values.get(target.name)
-        *path, last = self._path(target, line)
-        for index in path:
-            place = place[index] if _has(place, index) else None
-        if not _has(place, last):
-            self.fail(line, f'{target.name} has no such part to assign to')
+    def assign(self, target: Reference, value: object) -> None:
+        *path, last = [target.name, *self._path(target)]
+        place: Any = self._values
+        for key in path:
+            place = _part(place, key)
+        if path and _part(place, last) is None:
+            self.fail(f'{target.name} has no such part to assign to')
         place[last] = value
 
     # --- motion data
 
-    def target(self, expression: object, line: int) -> tuple[np.ndarray, Rotation]:
+    def target(self, expression: object) -> tuple[np.ndarray, Rotation]:
         """Position [m] and orientation of a robtarget, in its work object."""
-        value = self.value(expression, line)
-        if not (isinstance(value, list) and len(value) == 4):
-            self.fail(line, 'a robtarget expected')
-        return self.frame(value[:2], line)
+        value = self.value(expression)
+        if not _is_record(value, 4):
+            self.fail('a robtarget expected')
+        return self.frame(value[:2])
 
-    def frame(self, value: object, line: int) -> tuple[np.ndarray, Rotation]:
+    def frame(self, value: object) -> tuple[np.ndarray, Rotation]:
         """Position [m] and orientation of [[x, y, z] in mm, [q1, q2, q3, q4] scalar first]."""
-        position, quaternion = value if isinstance(value, list) and len(value) == 2 else ([], [])
+        position, quaternion = value if _is_record(value, 2) else ([], [])
         if not (_are_numbers(position, 3) and _are_numbers(quaternion, 4)):
-            self.fail(line, f'{value} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]')
+            self.fail(f'{value} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]')
         w, x, y, z = quaternion
         norm = float(np.linalg.norm([w, x, y, z]))
         if abs(norm - 1.0) > QUATERNION_TOLERANCE:
-            self.fail(line, f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
+            self.fail(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
         return np.array(position) * 1e-3, Rotation.from_quat([x, y, z, w])
 
-    def speed_m_per_s(self, expression: object, line: int) -> float:
+    def speed_m_per_s(self, expression: object) -> float:
         """Speed of the TCP of a speeddata."""
-        if self._predefined(expression) == 'vmax':
+        name = self._predefined(expression)
+        if name == 'vmax':
             return VMAX_M_PER_S
-        if speed := re.fullmatch(r'v(\d+)', self._predefined(expression)):
+        if speed := re.fullmatch(r'v(\d+)', name):
             return float(speed[1]) * 1e-3
-        value = self.value(expression, line)
-        if not (isinstance(value, list) and len(value) == 4 and _is_number(value[0])):
-            self.fail(line, 'a speeddata expected')
+        value = self.value(expression)
+        if not (_is_record(value, 4) and _is_number(value[0])):
+            self.fail('a speeddata expected')
         return value[0] * 1e-3
 
-    def zone_m(self, expression: object, line: int) -> float:
+    def zone_m(self, expression: object) -> float:
         """Radius of a zonedata in which the corner is cut; 0 for a stop point."""
-        if self._predefined(expression) == 'fine':
+        name = self._predefined(expression)
+        if name == 'fine':
             return 0.0
-        if zone := re.fullmatch(r'z(\d+)', self._predefined(expression)):
+        if zone := re.fullmatch(r'z(\d+)', name):
             return max(float(zone[1]), 0.3) * 1e-3  # z0 is 0.3 mm
-        value = self.value(expression, line)
-        if not (isinstance(value, list) and len(value) == 7):
-            self.fail(line, 'a zonedata expected')
-        return 0.0 if value[0] else self.number(value[1], line, 'the radius of the zone') * 1e-3
+        value = self.value(expression)
+        if not _is_record(value, 7):
+            self.fail('a zonedata expected')
+        return 0.0 if value[0] else self.number(value[1], 'the radius of the zone') * 1e-3
 
-    def work_object(self, name: str, line: int) -> tuple[np.ndarray, Rotation] | None:
+    def work_object(self, name: str) -> tuple[np.ndarray, Rotation] | None:
         """Object frame in the world [m]; None when the module does not define it."""
         if name not in self._values:
             return (np.zeros(3), Rotation.identity()) if name == 'wobj0' else None
         value: Any = self._values[name]
-        if not (isinstance(value, list) and len(value) == 5):
-            self.fail(line, f'{name} is no wobjdata')
+        if not _is_record(value, 5):
+            self.fail(f'{name} is no wobjdata')
         if value[0]:
-            self.fail(line, f'the robot holds the work object {name}; give a fixed one')
-        position, rotation = self.frame(value[3], line)
-        object_position, object_rotation = self.frame(value[4], line)
+            self.fail(f'the robot holds the work object {name}; give a fixed one')
+        position, rotation = self.frame(value[3])
+        object_position, object_rotation = self.frame(value[4])
         return position + rotation.apply(object_position), rotation * object_rotation
 
     def tool_is_held(self, name: str) -> bool:
-        value = self._values.get(name)
-        return not isinstance(value, list) or value[0] is not False
+        return _part(self._values.get(name), 0) is not False
 
     # --- names and functions
 
@@ -139,57 +139,57 @@ class RapidData:
         name = expression.name if isinstance(expression, Reference) else ''
         return '' if name in self._values else name
 
-    def _path(self, reference: Reference, line: int) -> list[int]:
-        path = [int(self.number(index, line, 'an index')) - 1 for index in reference.indexes]
+    def _path(self, reference: Reference) -> list[int]:
+        path = [int(self.number(index, 'an index')) - 1 for index in reference.indexes]
         for component in reference.components:
             if component not in COMPONENTS:
-                self.fail(line, f'component {component} of {reference.name} is not known')
+                self.fail(f'component {component} of {reference.name} is not known')
             path.append(COMPONENTS[component])
         return path
 
-    def _look_up(self, reference: Reference, line: int) -> object:
+    def _look_up(self, reference: Reference) -> object:
         if reference.name not in self._values:
-            kind = self._types.get(reference.name)
-            what = f'{kind} {reference.name} has no value yet' if kind else (
-                f'{reference.name} is not declared in this module'
-            )  # fmt: skip
-            self.fail(line, what)
+            if kind := self._types.get(reference.name):
+                self.fail(f'{kind} {reference.name} has no value yet')
+            self.fail(f'{reference.name} is not declared in this module')
         value: Any = self._values[reference.name]
-        for index in self._path(reference, line):
-            if not _has(value, index):
-                self.fail(line, f'{reference.name} has no such part')
-            value = value[index]
+        for index in self._path(reference):
+            value = _part(value, index)
+            if value is None:
+                self.fail(f'{reference.name} has no such part')
         return copy.deepcopy(value)
 
-    def _call(self, call: Call, line: int) -> object:
-        arguments = [self.value(argument, line) for argument in call.arguments]
+    def _call(self, call: Call) -> object:
+        arguments = self.value(call.arguments)
         if call.function in ARITHMETIC and all(map(_is_number, arguments)):
             if call.function == '/' and arguments[1] == 0.0:
-                self.fail(line, 'division by zero')
+                self.fail('division by zero')
             return ARITHMETIC[call.function](*arguments)
         if call.function not in ('offs', 'reltool') or len(arguments) != 4 or call.options:
-            self.fail(line, f'{call.function} is not evaluated here; write its value instead')
-        return self._displaced(call.function, arguments[0], arguments[1:], line)
-
-    def _displaced(self, function: str, target: Any, displacement: list, line: int) -> list:
-        _, rotation = self.target(target, line)
-        step_mm = [
-            self.number(value, line, f'a displacement of {function}') for value in displacement
-        ]
-        if function == 'reltool':
-            step_mm = rotation.apply(step_mm).tolist()
-        moved = copy.deepcopy(target)
-        moved[0] = [value + step for value, step in zip(moved[0], step_mm, strict=True)]
-        return moved
+            self.fail(f'{call.function} is not evaluated here; write its value instead')
+        target, *displacement = arguments
+        _, rotation = self.target(target)
+        name = f'a displacement of {call.function}'
+        step_mm = np.array([self.number(value, name) for value in displacement])
+        if call.function == 'reltool':
+            step_mm = rotation.apply(step_mm)
+        return [(np.array(target[0]) + step_mm).tolist(), *target[1:]]
 
 
 def _is_number(value: object) -> bool:
     return isinstance(value, float) and np.isfinite(value)
 
 
+def _is_record(value: object, length: int) -> TypeGuard[list]:
+    return isinstance(value, list) and len(value) == length
+
+
 def _are_numbers(value: object, count: int) -> bool:
-    return isinstance(value, list) and len(value) == count and all(map(_is_number, value))
+    return _is_record(value, count) and all(map(_is_number, value))
 
 
-def _has(value: object, index: int) -> bool:
-    return isinstance(value, list) and 0 <= index < len(value)
+def _part(value: Any, index: Any) -> Any:
+    """A part of an array or record, a datum of all; None if there is no such thing."""
+    if isinstance(value, dict):
+        return value.get(index)
+    return value[index] if isinstance(value, list) and index in range(len(value)) else None

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -62,23 +60,17 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
         positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
         times_s += (times_s[-1] + share * duration_s).tolist()
+    flow = {}
     if program.gun_signal or any(on for _, on in changes):
-        flow = {_ns(time_s): float(on) for time_s, on in changes}
-    else:
-        flow = {}
+        flow = {round(time_s * 1e9): float(on) for time_s, on in changes}
     return Trajectory(
-        np.array([_ns(time_s) for time_s in times_s]),
+        np.array([round(time_s * 1e9) for time_s in times_s]),
         np.array(positions),
         np.array(quaternions),
         trigger_stamps_ns=np.array(sorted(flow), dtype=np.int64),
         trigger_flow=np.array([flow[stamp] for stamp in sorted(flow)]),
         notes=(*program.notes, *_assumptions(program, bool(flow))),
     )
-
-
-def program_as_dict(program: RapidProgram) -> dict[str, Any]:
-    """All that was read, for JSON."""
-    return asdict(program)
 
 
 def program_as_text(program: RapidProgram) -> str:
@@ -96,16 +88,7 @@ def program_as_text(program: RapidProgram) -> str:
     for m in moves:
         x, y, z = m.position_m
         orientation = ' '.join(f'{value:+.4f}' for value in m.quaternion_xyzw)
-        gun = ', '.join(
-            [
-                'on' if m.spraying else 'off',
-                *(
-                    f'{"on" if s.on else "off"} {s.distance_m:g} m '
-                    f'{"after its start" if s.from_start else "before its end"}'
-                    for s in m.switches
-                ),
-            ]
-        )
+        gun = ', '.join(['on' if m.spraying else 'off', *map(str, m.switches)])
         lines.append(
             f'{m.line:6d}  {m.instruction:8} {x:8.4f} {y:8.4f} {z:8.4f}  {orientation}  '
             f'{m.speed_m_per_s:6.3f}  {m.zone_m:6.4f}  {gun}'
@@ -124,10 +107,6 @@ def _assumptions(program: RapidProgram, gun_known: bool) -> list[str]:
     return notes
 
 
-def _ns(time_s: float) -> int:
-    return round(time_s * 1e9)
-
-
 def _switches(move: RapidMove, length_m: float) -> list[tuple[float, bool]]:
     """Share of the move at which the gun is switched, and whether on, in order."""
     switches = []
@@ -138,38 +117,28 @@ def _switches(move: RapidMove, length_m: float) -> list[tuple[float, bool]]:
     return sorted(switches, key=lambda switch: switch[0])
 
 
-def _arc(
-    begin_m: np.ndarray, via_m: np.ndarray, end_m: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
-    """Centre, two radii square to each other from the beginning on, and the angle swept [rad].
+def _track(begin_m: np.ndarray, move: RapidMove) -> tuple[float, Callable]:
+    """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m].
 
-    The angle is 0 where begin, middle and end lie on a line.
+    A circular move is straight where begin, middle and end lie on a line.
     """
-    to_via, to_end = via_m - begin_m, end_m - begin_m
+    to_end = move.position_m - begin_m
+    to_via = np.zeros(3) if move.via_m is None else move.via_m - begin_m
     normal = np.cross(to_via, to_end)
     square = normal @ normal
     if square <= 1e-12 * (to_via @ to_via) * (to_end @ to_end):
-        return begin_m, np.zeros(3), np.zeros(3), 0.0
+        return float(np.linalg.norm(to_end)), lambda share: begin_m + np.outer(share, to_end)
     to_centre = np.cross(normal, to_via) * (to_end @ to_end)
     to_centre = (to_centre + np.cross(to_end, normal) * (to_via @ to_via)) / (2.0 * square)
-    along = np.cross(normal, -to_centre) / math.sqrt(square)
+    centre, radius = begin_m + to_centre, -to_centre
+    along = np.cross(normal, radius) / math.sqrt(square)
     end = to_end - to_centre
-    angle_rad = math.atan2(end @ along, end @ -to_centre) % (2.0 * math.pi)
-    return begin_m + to_centre, -to_centre, along, angle_rad
-
-
-def _track(begin_m: np.ndarray, move: RapidMove) -> tuple[float, Callable]:
-    """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m]."""
-    if move.via_m is not None:
-        centre, radius, along, angle_rad = _arc(begin_m, move.via_m, move.position_m)
-        if angle_rad:
-            return (
-                float(np.linalg.norm(radius)) * angle_rad,
-                lambda share: (
-                    centre
-                    + np.outer(np.cos(share * angle_rad), radius)
-                    + np.outer(np.sin(share * angle_rad), along)
-                ),
-            )
-    straight = move.position_m - begin_m
-    return float(np.linalg.norm(straight)), lambda share: begin_m + np.outer(share, straight)
+    angle_rad = math.atan2(end @ along, end @ radius) % (2.0 * math.pi)
+    return (
+        float(np.linalg.norm(radius)) * angle_rad,
+        lambda share: (
+            centre
+            + np.outer(np.cos(share * angle_rad), radius)
+            + np.outer(np.sin(share * angle_rad), along)
+        ),
+    )

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.data import RapidData
-from paint_deposition.files.rapid.syntax import Instruction, Module, parse_module
+from paint_deposition.files.rapid.syntax import Instruction, Module, ModuleParser
 from paint_deposition.files.rapid.values import Reference
 
 # Instruction -> number of its targets; the last is where it ends.
@@ -30,6 +29,10 @@ class GunSwitch:
     distance_m: float
     from_start: bool
     on: bool
+
+    def __str__(self) -> str:
+        place = 'after its start' if self.from_start else 'before its end'
+        return f'{"on" if self.on else "off"} {self.distance_m:g} m {place}'
 
 
 @dataclass(frozen=True)
@@ -72,14 +75,12 @@ class RapidProgram:
     notes: list[str] = field(default_factory=list)
 
 
-def read_program(
-    path: Path | str, procedure: str | None = None, gun_signal: str | None = None
-) -> RapidProgram:
+def read_program(path: Path | str, gun_signal: str | None = None) -> RapidProgram:
     """Read the moves of a RAPID module (.mod, .prg).
 
+    It begins with `main`, or the only procedure, and follows those called without arguments.
+
     Args:
-        procedure: where to begin; None: main, or the only procedure. Procedures that it calls
-            without arguments are followed.
         gun_signal: digital output that opens the gun; None: the only one that the module sets.
 
     Raises:
@@ -91,8 +92,8 @@ def read_program(
         text = path.read_text(encoding='utf-8', errors='replace')
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-    module = parse_module(text, str(path))
-    return _Run(module, str(path), gun_signal).run(procedure)
+    module = ModuleParser(text, str(path)).module()
+    return _Run(module, str(path), gun_signal).run()
 
 
 class _Run:
@@ -100,35 +101,27 @@ class _Run:
         self._module = module
         self._source = source
         self._data = RapidData(module, source)
-        self._program = RapidProgram(module.name)
-        self._signal = self._gun_signal(gun_signal)
-        self._program.gun_signal = self._signal or ''
+        self._program = RapidProgram(module.name, self._gun_signal(gun_signal))
         self._gun_on = False
         self._brush: float | None = None
         self._triggers: dict[str, GunSwitch] = {}
         self._position_m: np.ndarray | None = None
         self._calls: list[str] = []
 
-    def run(self, procedure: str | None) -> RapidProgram:
-        self._follow(self._entry(procedure))
+    def run(self) -> RapidProgram:
+        names = list(self._module.procedures)
+        first = names[0] if len(names) == 1 else 'main'
+        if first not in names:
+            found = ' '.join(names) or 'none'
+            raise RecordingError(f'{self._source} has no procedure main; its procedures: {found}')
+        self._follow(first)
         if not self._program.moves:
             raise RecordingError(f'{self._source} has no moves of the TCP; nothing to read')
         return self._program
 
-    def _entry(self, procedure: str | None) -> str:
-        names = list(self._module.procedures)
-        if procedure is None:
-            procedure = names[0] if len(names) == 1 else 'main'
-        if procedure.lower() not in names:
-            found = ' '.join(names) or 'none'
-            raise RecordingError(
-                f'{self._source} has no procedure {procedure}; its procedures: {found}'
-            )
-        return procedure.lower()
-
-    def _gun_signal(self, given: str | None) -> str | None:
-        everything = [i for body in self._module.procedures.values() for i in body]
-        signals = sorted({name for i in everything if (name := _signal_of(i))})
+    def _gun_signal(self, given: str | None) -> str:
+        bodies = self._module.procedures.values()
+        signals = sorted({_signal_of(i) for body in bodies for i in body} - {''})
         if given is None and len(signals) > 1:
             raise RecordingError(
                 f'{self._source} sets {" ".join(signals)}; say which of them opens the gun'
@@ -137,7 +130,7 @@ class _Run:
             raise RecordingError(
                 f'{self._source} never sets {given}; it sets: {" ".join(signals) or "none"}'
             )
-        return given.lower() if given else next(iter(signals), None)
+        return given.lower() if given else ''.join(signals)
 
     def _note(self, text: str) -> None:
         if text not in self._program.notes:
@@ -154,11 +147,10 @@ class _Run:
         self._calls.pop()
 
     def _execute(self, i: Instruction) -> None:
+        self._data.line = i.line
         matters = i.name in MOVES or i.name in self._module.procedures or self._is_gun(i)
         if i.block and matters:
-            self._data.fail(
-                i.line, f'{i.name} inside {i.block.upper()} is not followed; unroll it'
-            )
+            self._data.fail(f'{i.name} inside {i.block.upper()} is not followed; unroll it')
         if i.name in MOVES:
             self._move(i)
         elif i.name in JOINT_MOVES:
@@ -167,49 +159,46 @@ class _Run:
         elif i.name in self._module.procedures:
             self._follow(i.name)
         elif i.name == ':=' and not i.block:
-            target: Any = i.arguments[0].value
-            self._data.assign(target, self._data.value(i.arguments[1].value, i.line), i.line)
+            target, value = i.values
+            self._data.assign(target, self._data.value(value))
         elif i.name == 'setbrush':
             self._brush = self._number(i, 0)
         elif i.name in TRIGGERS and self._is_gun(i):
-            self._triggers[_name(i.arguments[0].value)] = self._switch(i)
+            self._triggers[_name(i.values[0])] = self._switch(i)
         elif self._is_gun(i):
             self._gun_on = self._level(i)
 
     def _is_gun(self, i: Instruction) -> bool:
-        return self._signal is not None and _signal_of(i) == self._signal
+        return _signal_of(i) == self._program.gun_signal != ''
 
     def _number(self, i: Instruction, index: int) -> float:
-        """An argument that has to be a number."""
-        if len(i.arguments) <= index:
-            self._data.fail(i.line, f'{i.name} needs a number as argument {index + 1}')
-        return self._data.number(i.arguments[index].value, i.line, f'what {i.name} takes')
+        """A value that has to be a number."""
+        if len(i.values) <= index:
+            self._data.fail(f'{i.name} needs a number as argument {index + 1}')
+        return self._data.number(i.values[index], f'what {i.name} takes')
 
     def _level(self, i: Instruction) -> bool:
         if i.name in ('set', 'reset'):
             return i.name == 'set'
-        return bool(self._data.value(i.arguments[-1].value, i.line))
+        return bool(self._data.value(i.values[-1]))
 
     def _switch(self, i: Instruction) -> GunSwitch:
-        options = i.options()
-        if options.get('time'):
-            self._data.fail(i.line, f'{i.name} by time is not followed; give a distance')
-        return GunSwitch(self._number(i, 1) * 1e-3, bool(options.get('start')), self._level(i))
+        if i.options.get('time'):
+            self._data.fail(f'{i.name} by time is not followed; give a distance')
+        return GunSwitch(self._number(i, 1) * 1e-3, 'start' in i.options, self._level(i))
 
     # --- moves
 
     def _move(self, i: Instruction) -> None:
         count = MOVES[i.name]
         own_signal = i.name.endswith('do')
-        values = [a.value for a in (i.arguments[:-2] if own_signal else i.arguments)]
+        values = i.values[:-2] if own_signal else i.values
         if len(values) < count + 3:
-            self._data.fail(i.line, f'{i.name} needs a target, a speed, a zone and a tool')
-        tool, work_object = _name(values[-1]), _name(i.options().get('wobj') or 'wobj0')
+            self._data.fail(f'{i.name} needs a target, a speed, a zone and a tool')
+        tool, work_object = _name(values[-1]), _name(i.options.get('wobj') or 'wobj0')
         if not self._data.tool_is_held(tool):
-            self._data.fail(
-                i.line, f'tool {tool} stands still; only tools the robot holds are read'
-            )
-        poses = [self._in_world(value, work_object, i.line) for value in values[:count]]
+            self._data.fail(f'tool {tool} stands still; only tools the robot holds are read')
+        poses = [self._in_world(value, work_object) for value in values[:count]]
         position_m, rotation = poses[-1]
         spraying, switches = self._gun(i, values[count + 1 : -2])
         self._program.moves.append(
@@ -220,7 +209,7 @@ class _Run:
                 quaternion_xyzw=rotation.as_quat(),
                 via_m=poses[0][0] if count == 2 else None,
                 speed_m_per_s=self._speed(i, values[count], position_m),
-                zone_m=self._data.zone_m(values[-2], i.line),
+                zone_m=self._data.zone_m(values[-2]),
                 tool=tool,
                 work_object=work_object,
                 spraying=spraying,
@@ -233,60 +222,49 @@ class _Run:
         if own_signal and self._is_gun(i):
             self._gun_on = self._level(i)
 
-    def _in_world(
-        self, target: object, work_object: str, line: int
-    ) -> tuple[np.ndarray, Rotation]:
-        position_m, rotation = self._data.target(target, line)
-        frame = self._data.work_object(work_object, line)
+    def _in_world(self, target: object, work_object: str) -> tuple[np.ndarray, Rotation]:
+        position_m, rotation = self._data.target(target)
+        frame = self._data.work_object(work_object)
         if frame is None:
             self._note(f'work object {work_object} is not in the module: poses are in its frame')
             return position_m, rotation
         return frame[0] + frame[1].apply(position_m), frame[1] * rotation
 
     def _speed(self, i: Instruction, value: object, position_m: np.ndarray) -> float:
-        options = i.options()
-        if 'v' in options:
-            return self._data.number(options['v'], i.line, 'the speed') * 1e-3
-        if 't' in options and self._position_m is not None:
-            duration_s = self._data.number(options['t'], i.line, 'the duration')
+        if 'v' in i.options:
+            return self._data.number(i.options['v'], 'the speed') * 1e-3
+        if 't' in i.options and self._position_m is not None:
+            duration_s = self._data.number(i.options['t'], 'the duration')
             if not duration_s > 0.0:
-                self._data.fail(i.line, f'a duration of {duration_s:g} s; give one above 0')
+                self._data.fail(f'a duration of {duration_s:g} s; give one above 0')
             return float(np.linalg.norm(position_m - self._position_m)) / duration_s
         if _name(value) == 'vmax':
             self._note("vmax is the robot's own; 5 m/s assumed")
-        return self._data.speed_m_per_s(value, i.line)
+        return self._data.speed_m_per_s(value)
 
     def _gun(self, i: Instruction, between: list) -> tuple[bool, tuple[GunSwitch, ...]]:
+        """Whether the gun is on as a move begins, and its switches during the move."""
         if i.name.startswith('paint'):
             if self._brush is None:
                 self._note('no SetBrush: paint moves are taken as spraying')
             return self._brush != 0.0, ()
-        if not i.name.startswith('trigg'):
-            return self._gun_on, ()
-        names = [
-            *map(_name, between),
-            *(_name(i.options()[k]) for k in i.options() if _is_trigger(k)),
-        ]
+        names = map(_name, [*between, *i.options.values()])
         switches = [self._triggers[name] for name in names if name in self._triggers]
         at_start = [switch for switch in switches if switch.from_start and not switch.distance_m]
-        later = tuple(switch for switch in switches if switch not in at_start)
-        self._gun_on = at_start[-1].on if at_start else self._gun_on
-        return self._gun_on, later
+        if at_start:
+            self._gun_on = at_start[-1].on
+        return self._gun_on, tuple(switch for switch in switches if switch not in at_start)
 
 
 def _signal_of(i: Instruction) -> str:
     """The digital output that an instruction sets, '' if none."""
-    if i.name in ('setdo', 'set', 'reset') and i.arguments:
-        return _name(i.arguments[0].value)
+    if i.name in ('setdo', 'set', 'reset') and i.values:
+        return _name(i.values[0])
     if i.name in TRIGGERS:
-        return _name(i.options().get('dop') or '')
-    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.arguments) > 2:
-        return _name(i.arguments[-2].value)
+        return _name(i.options.get('dop') or '')
+    if i.name in ('moveldo', 'movejdo', 'movecdo') and len(i.values) > 2:
+        return _name(i.values[-2])
     return ''
-
-
-def _is_trigger(option: str) -> bool:
-    return option in ('t2', 't3', 't4', 't5', 't6', 't7', 't8')
 
 
 def _name(value: object) -> str:

@@ -8,29 +8,26 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from paint_deposition.files.rapid.values import Argument, ValueParser
+from paint_deposition.files.rapid.values import ValueParser
 
 STORAGE = ('const', 'pers', 'var')
 BLOCK_END = {'if': 'endif', 'for': 'endfor', 'while': 'endwhile', 'test': 'endtest'}
-HEADER_END = {'if': 'then', 'elseif': 'then', 'for': 'do', 'while': 'do'}
+HEADER_END = {
+    'else': 'else', 'elseif': 'then', 'case': ':', 'default': ':', 'for': 'do', 'while': 'do',
+}  # fmt: skip
+SKIPPED_TO = {'func': 'endfunc', 'trap': 'endtrap', 'record': 'endrecord', 'alias': ';'}
 HANDLERS = ('error', 'undo', 'backward')
 
 
 @dataclass(frozen=True)
 class Instruction:
-    """`name argument, ...;`, or an assignment, whose name is ':=' and whose target is a value."""
+    """`name value, ...;` with options, or an assignment `:=` of the second value to the first."""
 
     name: str
-    arguments: tuple[Argument, ...]
+    values: list
+    options: dict
     line: int
     block: str = ''
-
-    def options(self) -> dict:
-        """The options of all arguments together."""
-        merged: dict = {}
-        for argument in self.arguments:
-            merged |= argument.options
-        return merged
 
 
 @dataclass(frozen=True)
@@ -49,18 +46,13 @@ class Module:
     procedures: dict[str, list[Instruction]] = field(default_factory=dict)
 
 
-def parse_module(text: str, source: str = 'module') -> Module:
-    """Parse a module; `source` names it in errors.
+class ModuleParser(ValueParser):
+    """Reads a module; refuses, with the line, where RAPID ends and something else begins."""
 
-    Raises RecordingError with the line where RAPID ends and something else begins.
-    """
-    return _Parser(text, source).module()
-
-
-class _Parser(ValueParser):
     # --- declarations and procedures
 
     def module(self) -> Module:
+        """The whole module."""
         self._expect('module')
         module = Module(self._name())
         if self._takes('('):
@@ -70,22 +62,19 @@ class _Parser(ValueParser):
         return module
 
     def _member(self, module: Module) -> None:
-        while self._word() in ('local', 'task'):
-            self._next()
-        word = self._word()
-        if word in STORAGE:
+        while self._takes('local', 'task'):
+            pass
+        word = self._now.word
+        if self._takes(*STORAGE):
             self._declaration(module.data)
-        elif word == 'proc':
+        elif self._takes('proc'):
             self._procedure(module)
-        elif word in ('func', 'trap', 'record'):
-            self._skip_past(f'end{word}')
-        elif word == 'alias':
-            self._skip_past(';')
+        elif word in SKIPPED_TO:
+            self._skip_past(SKIPPED_TO[word])
         else:
             self._fail(f'{self._now.text or "the end"!r} is no declaration')
 
     def _declaration(self, data: dict[str, Declaration]) -> None:
-        self._next()
         line, kind = self._now.line, self._name()
         while True:
             name = self._name()
@@ -98,65 +87,48 @@ class _Parser(ValueParser):
         self._expect(';')
 
     def _procedure(self, module: Module) -> None:
-        self._next()
         name = self._name()
         self._expect('(')
         self._skip_past(')')
         body: list[Instruction] = []
+        module.procedures[name] = body
         blocks: list[str] = []
         while not self._takes('endproc'):
-            word = self._word()
-            if word in HANDLERS and not blocks:
+            if self._takes(*STORAGE):
+                self._declaration(module.data)
+            elif self._now.word in HANDLERS and not blocks:
                 self._skip_past('endproc')
                 break
-            if word in STORAGE:
-                self._declaration(module.data)
             else:
-                body += self._statement(blocks)
-        module.procedures[name] = body
+                self._statement(blocks, body)
 
     # --- statements
 
-    def _statement(self, blocks: list[str]) -> list[Instruction]:
-        word = self._word()
-        if blocks and word == BLOCK_END[blocks[-1]]:
-            self._next()
+    def _statement(self, blocks: list[str], body: list[Instruction]) -> None:
+        word = self._now.word
+        if blocks and self._takes(BLOCK_END[blocks[-1]]):
             blocks.pop()
             self._takes(';')
-        elif word in ('else', 'elseif', 'case', 'default'):
-            self._skip_past({'else': 'else', 'elseif': 'then'}.get(word, ':'))
-        elif word == 'if':
-            return self._if(blocks)
-        elif word in BLOCK_END:
-            blocks.append(word)
-            self._next()
-            if word == 'test':
-                self._expression()
+        elif word in HEADER_END:
+            if word in BLOCK_END:
+                blocks.append(word)
+            self._skip_past(HEADER_END[word])
+        elif self._takes('if', 'test'):
+            self._expression()
+            if word == 'if' and not self._takes('then'):
+                body.append(self._instruction('if'))  # the compact form
             else:
-                self._skip_past(HEADER_END[word])
+                blocks.append(word)
         elif self._now.kind == 'name' and self._tokens[self._at + 1].text == ':':
             self._at += 2  # a label
         else:
-            return [self._instruction(blocks[-1] if blocks else '')]
-        return []
-
-    def _if(self, blocks: list[str]) -> list[Instruction]:
-        """A block, or the compact form: a condition and one instruction without THEN."""
-        self._next()
-        self._expression()
-        if self._takes('then'):
-            blocks.append('if')
-            return []
-        return [self._instruction('if')]
+            body.append(self._instruction(blocks[-1] if blocks else ''))
 
     def _instruction(self, block: str) -> Instruction:
         line = self._now.line
-        if self._takes('%'):
-            self._fail('late binding is not read')
-        target = self._reference()
+        target = self._reference(self._name())
         if self._takes(':='):
-            value = Argument(self._expression())
+            value = self._expression()
             self._expect(';')
-            return Instruction(':=', (Argument(target), value), line, block)
-        arguments = self._arguments(';')
-        return Instruction(target.name, arguments, line, block)
+            return Instruction(':=', [target, value], {}, line, block)
+        return Instruction(target.name, *self._arguments(';'), line, block)

@@ -4,28 +4,38 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import NamedTuple, NoReturn
 
 from paint_deposition.errors import RecordingError
 
+# Backups begin with a block of controller information between %%%.
 TOKEN = re.compile(
     r"""
-    (?P<space>\s+|!.*|%%%)
+    (?P<space>\A\s*%%%(?s:.*?)%%%|\s+|!.*|%%%)
   | (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
   | (?P<string>"(?:[^"\n]|"")*")
   | (?P<name>[A-Za-z_]\w*)
   | (?P<symbol>:=|<=|>=|<>|[][(){},;:\\+\-*/=<>.?])
+  | (?P<strange>.)
     """,
     re.VERBOSE,
 )
-COMPARISONS = ('=', '<', '>', '<=', '>=', '<>', 'and', 'or', 'xor', 'div', 'mod')
+# Operators, and how strongly they bind the values beside them.
+BINDING = {
+    '=': 0, '<': 0, '>': 0, '<=': 0, '>=': 0, '<>': 0, 'and': 0, 'or': 0, 'xor': 0, 'div': 0,
+    'mod': 0, '+': 1, '-': 1, '*': 2, '/': 2,
+}  # fmt: skip
 
 
 class Token(NamedTuple):
     kind: str
     text: str
     line: int
+
+    @property
+    def word(self) -> str:
+        """The text as RAPID compares it, without case; texts of strings keep their quotes."""
+        return self.text.lower()
 
 
 class Reference(NamedTuple):
@@ -40,32 +50,18 @@ class Call(NamedTuple):
     """A function of values, or an operator: `offs`, '+', '-', '*', '/'."""
 
     function: str
-    arguments: tuple
-    options: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Argument:
-    """A positional argument, and the options behind it: values by name, True for a mere switch."""
-
-    value: object
-    options: dict = field(default_factory=dict)
+    arguments: list
+    options: dict
 
 
 def tokens(text: str, source: str) -> Iterator[Token]:
-    line, position = 1, 0
-    # Backups begin with a block of controller information.
-    header = re.match(r'\s*%%%.*?%%%', text, re.DOTALL)
-    if header:
-        position, line = header.end(), 1 + header[0].count('\n')
-    while position < len(text):
-        match = TOKEN.match(text, position)
-        if match is None:
-            raise RecordingError(f'{source} line {line}: {text[position]!r} is not RAPID')
+    line = 1
+    for match in TOKEN.finditer(text):
+        if match.lastgroup == 'strange':
+            raise RecordingError(f'{source} line {line}: {match[0]!r} is not RAPID')
         if match.lastgroup != 'space':
             yield Token(str(match.lastgroup), match[0], line)
         line += match[0].count('\n')
-        position = match.end()
     yield Token('end', '', line)
 
 
@@ -88,117 +84,86 @@ class ValueParser:
         self._at += token.kind != 'end'
         return token
 
-    def _word(self) -> str:
-        """The name that comes next in lower case, '' if something else comes."""
-        return self._now.text.lower() if self._now.kind == 'name' else ''
-
-    def _takes(self, text: str) -> bool:
-        if self._now.kind != 'string' and self._now.text.lower() == text:
+    def _takes(self, *words: str) -> bool:
+        taken = self._now.word in words
+        if taken:
             self._next()
-            return True
-        return False
+        return taken
 
-    def _expect(self, text: str) -> None:
-        if not self._takes(text):
-            self._fail(f'{text!r} expected, found {self._now.text or "the end"!r}')
+    def _expect(self, word: str) -> None:
+        if not self._takes(word):
+            self._fail_without(repr(word))
 
-    def _name(self) -> str:
+    def _name(self, what: str = 'a name') -> str:
         if self._now.kind != 'name':
-            self._fail(f'a name expected, found {self._now.text or "the end"!r}')
-        return self._next().text.lower()
+            self._fail_without(what)
+        return self._next().word
 
-    def _skip_past(self, *texts: str) -> None:
-        while self._now.kind != 'end':
-            if self._next().text.lower() in texts:
-                return
-        self._fail(f'{texts[-1]} expected before the end')
+    def _skip_past(self, word: str) -> None:
+        while not self._takes(word):
+            if self._next().kind == 'end':
+                self._fail(f'{word} expected before the end')
 
-    def _fail(self, reason: str) -> None:
+    def _fail_without(self, what: str) -> NoReturn:
+        self._fail(f'{what} expected, found {self._now.text or "the end"!r}')
+
+    def _fail(self, reason: str) -> NoReturn:
         raise RecordingError(f'{self._source} line {self._now.line}: {reason}')
 
     # --- values
 
-    def _expression(self) -> object:
-        value = self._product()
-        while self._now.text in ('+', '-'):
-            value = Call(self._next().text, (value, self._product()))
-        while self._now.text.lower() in COMPARISONS and self._now.kind != 'string':
-            value = Call(self._next().text.lower(), (value, self._product()))
+    def _expression(self, least_binding: int = 0) -> object:
+        value = self._operand()
+        while BINDING.get(self._now.word, -1) >= least_binding:
+            operator = self._next().word
+            value = Call(operator, [value, self._expression(BINDING[operator] + 1)], {})
         return value
 
-    def _product(self) -> object:
-        value = self._unary()
-        while self._now.text in ('*', '/'):
-            value = Call(self._next().text, (value, self._unary()))
-        return value
-
-    def _unary(self) -> object:
+    def _operand(self) -> object:
         if self._takes('-'):
-            value = self._unary()
-            return -value if isinstance(value, float) else Call('-', (0.0, value))
+            value = self._operand()
+            return -value if isinstance(value, float) else Call('-', [0.0, value], {})
         if self._takes('+'):
-            return self._unary()
+            return self._operand()
         if self._takes('not'):
-            return Call('not', (self._unary(),))
-        return self._primary()
-
-    def _primary(self) -> object:
-        token = self._now
-        if token.kind == 'number':
-            return float(self._next().text)
-        if token.kind == 'string':
-            return self._next().text[1:-1].replace('""', '"')
+            return Call('not', [self._operand()], {})
         if self._takes('['):
-            return self._listed(']')
+            return self._arguments(']')[0]
         if self._takes('('):
             value = self._expression()
             self._expect(')')
             return value
-        if token.kind != 'name':
-            self._fail(f'a value expected, found {token.text or "the end"!r}')
-        if self._word() in ('true', 'false'):
-            return self._next().text.lower() == 'true'
-        if self._tokens[self._at + 1].text == '(':
-            name = self._name()
-            self._next()
-            arguments = self._arguments(')')
-            options = tuple(option for argument in arguments for option in argument.options)
-            return Call(name, tuple(argument.value for argument in arguments), options)
-        return self._reference()
+        if self._now.kind == 'number':
+            return float(self._next().text)
+        if self._now.kind == 'string':
+            return self._next().text[1:-1].replace('""', '"')
+        name = self._name('a value')
+        if name in ('true', 'false'):
+            return name == 'true'
+        if self._takes('('):
+            return Call(name, *self._arguments(')'))
+        return self._reference(name)
 
-    def _listed(self, end: str) -> list:
+    def _arguments(self, end: str) -> tuple[list, dict]:
+        """Values up to `end`, which is taken too, and options: True for a mere switch."""
         values: list = []
+        options: dict = {}
         if self._takes(end):
-            return values
+            return values, options
         while True:
-            values.append(self._expression())
+            # Options come behind their argument, or before the first one.
+            if self._now.text != '\\':
+                values.append(self._expression())
+            while end in (')', ';') and self._takes('\\'):
+                name = self._name()
+                options[name] = self._expression() if self._takes(':=') else True
             if not self._takes(','):
                 self._expect(end)
-                return values
+                return values, options
 
-    def _arguments(self, end: str) -> tuple[Argument, ...]:
-        """Arguments up to `end`, which is taken too."""
-        arguments: list[Argument] = []
-        while self._now.text != end:
-            # Options come behind their argument, or before the first one.
-            value = None if self._now.text == '\\' else self._expression()
-            arguments.append(Argument(value, self._options()))
-            if not self._takes(','):
-                break
-        self._expect(end)
-        return tuple(arguments)
-
-    def _options(self) -> dict:
-        options = {}
-        while self._takes('\\'):
-            name = self._name()
-            options[name] = self._expression() if self._takes(':=') else True
-        return options
-
-    def _reference(self) -> Reference:
-        name, indexes, components = self._name(), (), []
-        if self._takes('{'):
-            indexes = tuple(self._listed('}'))
+    def _reference(self, name: str) -> Reference:
+        indexes = self._arguments('}')[0] if self._takes('{') else []
+        components = []
         while self._takes('.'):
             components.append(self._name())
-        return Reference(name, indexes, tuple(components))
+        return Reference(name, tuple(indexes), tuple(components))
