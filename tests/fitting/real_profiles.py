@@ -162,16 +162,8 @@ def figures(folder: Path) -> dict[str, dict[str, float]]:
 
 def draw(folder: Path, picture: Path) -> None:
     """The three comparisons side by side."""
-    from paint_deposition.report.pictures.chart import (
-        COMPONENTS,
-        MEASURED,
-        MODEL,
-        MUTED,
-        legend,
-        new_figure,
-        quiet,
-        save_png,
-    )
+    from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_png
+    from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
 
     figure = new_figure(13.0, 4.0)
     left, middle, right = figure.subplots(1, 3)
@@ -181,10 +173,10 @@ def draw(folder: Path, picture: Path) -> None:
     x = np.linspace(-160.0, 160.0, 400)
     for part, colour in zip(one.three.collapse.components_um(x), COMPONENTS, strict=True):
         left.plot(x, part, color=colour, linewidth=1.0, linestyle='--')
-    left.plot(x, one.three.collapse.thickness_um(x), color=MODEL, linewidth=1.8, label='eq. (3)')
+    left.plot(x, one.three.collapse.thickness_um(x), color=ACCENT, linewidth=1.8, label='eq. (3)')
     single = one.height_in * np.exp(-0.5 * (x / one.sigma_ft) ** 2)
     left.plot(x, single, color=MUTED, linewidth=1.4, label='one Gaussian')
-    left.plot(one.station_ft, one.depth_in, 'o', color=MEASURED, markersize=4, label='measured')
+    left.plot(one.station_ft, one.depth_in, 'o', color=INK, markersize=4, label='measured')
     left.set_ylim(0.0, 1.2)
     legend(left, loc='upper right')
 
@@ -193,10 +185,10 @@ def draw(folder: Path, picture: Path) -> None:
     radius = np.linspace(0.0, 0.3, 300)
     middle.plot(
         1e3 * radius, static.pattern.flux_um_per_s(radius, 0.0),
-        color=MODEL, linewidth=1.8, label='eq. (1)',
+        color=ACCENT, linewidth=1.8, label='eq. (1)',
     )  # fmt: skip
     middle.plot(
-        1e3 * static.radius_m, static.thickness, 'o', color=MEASURED, markersize=4,
+        1e3 * static.radius_m, static.thickness, 'o', color=INK, markersize=4,
         label='measured',
     )  # fmt: skip
     middle.set_ylim(bottom=0.0)
@@ -207,11 +199,9 @@ def draw(folder: Path, picture: Path) -> None:
     normal = coating.thickness_um[coating.angle_deg == 90.0].mean()
     angle = np.linspace(20.0, 90.0, 100)
     right.plot(
-        angle, normal * np.sin(np.radians(angle)), color=MODEL, linewidth=1.8, label='cosine law'
+        angle, normal * np.sin(np.radians(angle)), color=ACCENT, linewidth=1.8, label='cosine law'
     )
-    for standoff, colour in zip(
-        np.unique(coating.standoff_mm), (*COMPONENTS, MEASURED), strict=True
-    ):
+    for standoff, colour in zip(np.unique(coating.standoff_mm), (*COMPONENTS, INK), strict=True):
         there = coating.standoff_mm == standoff
         right.plot(
             coating.angle_deg[there], coating.thickness_um[there], 'o', color=colour,

@@ -49,7 +49,9 @@ def test_a_slanting_part_is_seen_along_its_normal():
 def draw(tmp_path, film_um, path, **options):
     surface = door()
     statistics = film_statistics(film_um, surface.vertex_areas_m2, 10.0, **options)
-    file = write_door_picture(tmp_path / 'film.png', surface, film_um, path, statistics, 'Door')
+    file = write_door_picture(
+        tmp_path / 'film.png', surface, film_um, path, statistics, 'Door', ''
+    )
     assert [f.name for f in tmp_path.iterdir()] == ['film.png']
     return (255 * imread(file)[:, :, :3]).round().astype(int)
 
@@ -75,7 +77,7 @@ def test_labels_on_contours_are_level():
     surface = door()
     figure = new_figure(9.0, 6.0)
     axes = figure.subplots()
-    draw_film(axes, surface, 30.0 - 20.0 * surface.vertices_m[:, 0])
+    draw_film(axes, surface, 30.0 - 20.0 * surface.vertices_m[:, 0], SprayPath.empty(), 1.0)
     figure.canvas.draw()
     labels = [text for text in axes.texts if text.get_text().isdigit()]
     assert len(labels) > 1

@@ -17,9 +17,11 @@ from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.refit import refit
 from paint_deposition.diagnosis.run import ALPHA
 from paint_deposition.diagnosis.verdict import EffectClass, Interval
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from small_campaign import small_campaign
 
@@ -32,12 +34,12 @@ CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
 @pytest.fixture(scope='module')
 def diagnosis(tmp_path_factory):
     campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    return refit(campaign, DepositionModel(), AirDrift)
+    return replace(refit(campaign, DepositionModel(), AirDrift), library=EFFECTS)
 
 
 @pytest.fixture(scope='module')
-def models(diagnosis):
-    return [(step.model, compare(diagnosis.study, step.model)) for step in diagnosis.history]
+def comparisons(diagnosis):
+    return tuple(compare(diagnosis.study, step.model) for step in diagnosis.history)
 
 
 @pytest.fixture(scope='module')
@@ -49,10 +51,17 @@ def proposals(diagnosis):
 
 
 @pytest.fixture(scope='module')
-def report(tmp_path_factory, diagnosis, models, proposals):
+def report(tmp_path_factory, diagnosis, comparisons, proposals):
     path = tmp_path_factory.mktemp('report') / 'report.html'
-    write_report(path, diagnosis.study, models, diagnosis, *proposals)
+    tell(path, diagnosis, comparisons, proposals)
     return path
+
+
+def tell(path, diagnosis, comparisons, proposals=((), ()), older=()):
+    """Write the report of a diagnosis whose comparisons and proposals are known already."""
+    diagnosis = replace(diagnosis)
+    vars(diagnosis).update(comparisons=comparisons, proposals=proposals)
+    write_report(path, ReportData.of(diagnosis, older))
 
 
 class Page(HTMLParser):
@@ -122,13 +131,14 @@ def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
     assert f'{1e3 * shift:.3g}'.replace('-', '−') in text
 
 
-def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, models):
+def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, comparisons):
     first, *others = diagnosis.study.campaign.experiments
     name = '</script><b>panel'
     renamed = replace(first, name=name)
     campaign = replace(diagnosis.study.campaign, experiments=(renamed, *others))
     study = replace(diagnosis.study, campaign=campaign)
-    write_report(tmp_path / 'report.html', study, models)
+    renamed = tuple(replace(comparison, study=study) for comparison in comparisons)
+    write_report(tmp_path / 'report.html', ReportData(renamed))
     page = page_of(tmp_path / 'report.html')
     assert page.clashes == []
     assert name in page.text
@@ -160,10 +170,9 @@ def other_verdicts(diagnosis):
 
 
 @pytest.mark.parametrize('which', range(6))
-def test_every_verdict_has_its_report(tmp_path, diagnosis, models, which):
+def test_every_verdict_has_its_report(tmp_path, diagnosis, comparisons, which):
     words, other = list(other_verdicts(diagnosis))[which]
-    chosen = models if len(other.history) > 1 else models[:1]
-    write_report(tmp_path / 'report.html', other.study, chosen, other)
+    tell(tmp_path / 'report.html', other, comparisons[: len(other.history)])
     page = page_of(tmp_path / 'report.html')
     assert words in page.text
     assert page.open == page.clashes == []
@@ -180,13 +189,11 @@ def test_every_verdict_has_its_report(tmp_path, diagnosis, models, which):
     ],
 )
 def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
-    tmp_path, diagnosis, models, verdict, probability, title
+    tmp_path, diagnosis, comparisons, verdict, probability, title
 ):
     asked = replace(diagnosis.classes[0], probability=probability)
-    write_report(
-        tmp_path / 'report.html', diagnosis.study, models,
-        replace(diagnosis, verdict=verdict, classes=(asked,), p_value=0.001),
-    )  # fmt: skip
+    told = replace(diagnosis, verdict=verdict, classes=(asked,), p_value=0.001)
+    tell(tmp_path / 'report.html', told, comparisons)
     text = page_of(tmp_path / 'report.html').text
     assert 'run the diagnosis to find the cause' in text
     assert title in text
@@ -194,15 +201,17 @@ def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
     assert 'no effect was added' not in text
 
 
-def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnosis, models):
+def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnosis, comparisons):
     older = [
         {'added': 'pattern', 'rmse_um': 7.77, 'holdout_rmse_um': 8.88, 'noise_floor_um': 0.66,
          'campaign': 'panel.yaml'},
         {'added': 'tcp_tilt', 'rmse_um': 6.66, 'campaign': 'panel.yaml'},
     ]  # fmt: skip
     campaign = replace(diagnosis.study.campaign, name='door.yaml')
-    done = replace(diagnosis, study=replace(diagnosis.study, campaign=campaign))
-    write_report(tmp_path / 'report.html', done.study, models, done, older=older)
+    study = replace(diagnosis.study, campaign=campaign)
+    done = replace(diagnosis, study=study)
+    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
+    tell(tmp_path / 'report.html', done, beside, older=older)
     errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in done.history]
     floor = f'{done.noise_floor_um:.2f}'
     assert (
@@ -215,8 +224,7 @@ def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnos
 def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_path):
     campaign = small_campaign(tmp_path, truth=None, amplitude=None)
     done = refit(campaign, DepositionModel(), AirDrift)
-    models = [(step.model, compare(done.study, step.model)) for step in done.history]
-    write_report(tmp_path / 'report.html', done.study, models, done)
+    write_report(tmp_path / 'report.html', ReportData.of(done))
     assert [effect.id for effect in done.model.effects] == ['air_drift']
     text = page_of(tmp_path / 'report.html').text
     assert 'Added as asked' in text
@@ -225,8 +233,8 @@ def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_
     assert 'no effect was added' not in text
 
 
-def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, models):
-    write_report(tmp_path / 'report.html', diagnosis.study, models[:1])
+def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, comparisons):
+    write_report(tmp_path / 'report.html', ReportData.of(comparisons[0]))
     page = page_of(tmp_path / 'report.html')
     assert 'Comparison' in page.text
     assert 'Run the diagnosis' in page.text
@@ -288,7 +296,7 @@ def colourful_share(picture: Path) -> float:
 
 
 def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
-    tmp_path, diagnosis, models
+    tmp_path, diagnosis, comparisons
 ):
     wake = load_effect_file(SAMPLES / 'my_effect.py')
     found = EffectClass(
@@ -297,8 +305,9 @@ def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
     other = replace(
         diagnosis, verdict='undecided', accepted=(), classes=(found,), not_testable=(),
         detectable={'wake_loss': {'loss_per_m_per_s': 0.05}}, history=diagnosis.history[:1],
+        library={wake.id: wake},
     )  # fmt: skip
-    write_report(tmp_path / 'report.html', other.study, models[:1], other, library={wake.id: wake})
+    tell(tmp_path / 'report.html', other, comparisons[:1])
     text = page_of(tmp_path / 'report.html').text
     assert text.count(wake.__doc__) == 2
     assert f'How it shows: {wake.signature}.' in text

@@ -19,9 +19,9 @@ def test_the_unit_in_a_parameters_name_is_not_said_twice():
     wake = load_effect_file(SAMPLES / 'my_effect.py')
     unit = wake.parameters()['loss_per_m_per_s']['unit']
     assert parameter_words('loss_per_m_per_s', unit) == 'loss'
-    assert in_unit(2e-9, unit) == ('2 × 10⁻⁹', 'per m/s')
+    assert in_unit(unit, 2e-9) == ('per m/s', '2 × 10⁻⁹')
     unit = FlowDrift.parameters()['drift_per_pass']['unit']
-    assert (parameter_words('drift_per_pass', unit), in_unit(0.02, unit)[1]) == (
+    assert (parameter_words('drift_per_pass', unit), in_unit(unit, 0.02)[0]) == (
         'drift', 'per pass',
     )  # fmt: skip
     assert parameter_words('shift_down_m', 'm') == 'shift down'

@@ -126,11 +126,16 @@ def simulate(
         film_um, surface.vertex_areas_m2, painted.emitted_cm3,
         target_um=target_um, target_tolerance_um=tolerance_um,
     )  # fmt: skip
-    film = Film(surface, trajectory, path, counts, model, film_um, statistics)
-    if readings is None:
-        return film
-    progress('predicting the readings', 0.0)
-    return replace(film, readings=readings, predicted_um=_predicted_um(film, readings))
+    predicted_um = None
+    if readings is not None:
+        progress('predicting the readings', 0.0)
+        # Each reading by itself, in double precision.
+        each = replace(readings, point=np.arange(len(readings)).astype(str))
+        campaign = Campaign((Experiment.of('part', surface, path, each),))
+        predicted_um = Forward(campaign).predict_um(model)
+    return Film(
+        surface, trajectory, path, counts, model, film_um, statistics, readings, predicted_um
+    )
 
 
 def _require_motion(
@@ -150,10 +155,3 @@ def _require_motion(
         f'{source}: no two of its {counts.received} poses make a motion'
         f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
     )
-
-
-def _predicted_um(film: Film, readings: Readings) -> np.ndarray:
-    """(N,) what the gauge should show at each reading [um], in double precision."""
-    each = replace(readings, point=np.arange(len(readings)).astype(str))
-    experiment = Experiment.of('part', film.surface, film.path, each)
-    return Forward(Campaign((experiment,))).predict_um(film.model)

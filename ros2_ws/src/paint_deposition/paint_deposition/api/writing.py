@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
@@ -17,6 +17,7 @@ from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.pictures.calibration import write_calibration_pictures
 from paint_deposition.report.pictures.film import write_door_picture
@@ -72,26 +73,17 @@ def _(result: Calibration, folder: str | Path, start: ModelFile | None = None) -
 
 @write.register
 def _(result: Comparison, folder: str | Path) -> list[Path]:
-    folder = Path(folder)
-    write_json(folder / 'comparison.json', result.to_dict())
-    files = _write_residuals(folder, (result,))
-    write_report(folder / 'report.html', result.study, [(result.model, result)])
-    return [folder / 'comparison.json', *files, folder / 'report.html']
+    return _write_report(Path(folder), 'comparison.json', result, result)
 
 
 @write.register
 def _(result: Diagnosis, folder: str | Path, start: ModelFile | None = None) -> list[Path]:
     folder, start = Path(folder), start or ModelFile(result.history[0].model)
-    models = folder / 'model_before.yaml', folder / 'model.yaml'
-    write_json(folder / 'diagnosis.json', result.to_dict())
+    models = [folder / 'model_before.yaml', folder / 'model.yaml']
     write_fitted(models[0], result.study, result.history[:1], start)
     write_fitted(models[1], result.study, result.history, start)
-    files = _write_residuals(folder, result.comparisons)
-    write_report(
-        folder / 'report.html', result.study, [(c.model, c) for c in result.comparisons], result,
-        *result.proposals, start.history, result.library,
-    )  # fmt: skip
-    return [folder / 'diagnosis.json', *models, *files, folder / 'report.html']
+    last = result.comparisons[-1]
+    return models + _write_report(folder, 'diagnosis.json', result, last, start.history)
 
 
 @write.register
@@ -114,11 +106,19 @@ def _(result: Plan, folder: str | Path, made_from: Mapping[str, Any] | None = No
     return [*files, picture]
 
 
-def _write_residuals(folder: Path, comparisons: tuple[Comparison, ...]) -> list[Path]:
-    """The last model's residuals as a table and as meshes, and all models in a picture."""
-    last = comparisons[-1]
-    table, picture = folder / 'residuals.csv', folder / 'comparison.png'
-    write_residuals(table, last)
+def _write_report(
+    folder: Path,
+    figures: str,
+    result: Comparison | Diagnosis,
+    last: Comparison,
+    older: Sequence[Mapping[str, Any]] = (),
+) -> list[Path]:
+    """Figures, the last model's residuals as a table and as meshes, picture and report."""
+    data = ReportData.of(result, older)
+    files = [folder / name for name in (figures, 'residuals.csv', 'comparison.png', 'report.html')]
+    write_json(files[0], result.to_dict())
+    write_residuals(files[1], last)
     meshes = write_residual_meshes(folder, last)
-    write_comparison_picture(picture, last.study, [(c.model, c) for c in comparisons])
-    return [table, *meshes, picture]
+    write_comparison_picture(files[2], data)
+    write_report(files[3], data)
+    return [*files, *meshes]

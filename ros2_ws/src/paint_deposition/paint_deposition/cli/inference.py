@@ -2,31 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+import paint_deposition as pd
 from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
     model_option,
     output_option,
-    read_noted,
-    read_start,
-    say_all,
+    read_inputs,
+    say_results,
     seed_option,
+    write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.cli.results_folder import results_in
 
 if TYPE_CHECKING:
-    from paint_deposition.comparison.comparison import Comparison
-    from paint_deposition.diagnosis.verdict import Diagnosis
     from paint_deposition.files.model_file import ModelFile
 
-OUTPUT = output_option('the results', required=True)
+OUTPUT = output_option('the results')
 MODEL = model_option("Model to start from; default: the campaign's, else that of a 50 mm bell.")
 SEED = seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
@@ -49,39 +48,30 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
     report.html.
     """
-    from paint_deposition.api.inference import compare
-    from paint_deposition.api.writing import write
-    from paint_deposition.files.json_files import json_text
-
     with Progress('compare') as tell:
-        data = read_noted(campaign, tell)
-        start = read_start(data, model_file)
-        comparison = compare(data, start.model if start else None, progress=tell)
+        data, start = read_inputs(campaign, model_file, tell)
+        comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
-        with results_in(output) as folder:
-            write(comparison, folder)
-    if as_json:
-        click.echo(json_text(comparison.to_dict()))
-    else:
-        _say_comparison(comparison, output)
+        files = write_results(comparison, output)
+    say_results(files, as_json, _comparison_lines(comparison, output))
 
 
-def _say_comparison(comparison: Comparison, output: Path) -> None:
+def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
-        click.echo(
+        yield (
             f'{indent}{misfit.label}: {len(found)} readings, bias {found.bias_um:+.2f} µm, '
             f'RMSE {found.rmse_um:.2f} µm, chi2 per reading {found.chi_square_per_reading:.2f}'
         )
     noise = comparison.study.noise
-    click.echo(f'gauge noise {noise.typical_um:.2f} µm ({noise.source})')
-    say_all(
-        'misfit', (f'{region.experiment}: {region.description}' for region in comparison.regions)
-    )
+    yield f'gauge noise {noise.typical_um:.2f} µm ({noise.source})'
+    for region in comparison.regions:
+        yield f'misfit: {region.experiment}: {region.description}'
     if not comparison.regions:
-        click.echo('no region of significant misfit')
-    say_all('note', comparison.study.notes)
-    click.echo(f'report: {output / "report.html"}')
+        yield 'no region of significant misfit'
+    for note in comparison.study.notes:
+        yield f'note: {note}'
+    yield f'report: {output / "report.html"}'
 
 
 @click.command('diagnose')
@@ -104,18 +94,16 @@ def diagnose_command(
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
     residuals.csv, the residual as coloured meshes, comparison.png and report.html.
     """
-    from paint_deposition.api.inference import diagnose
     from paint_deposition.effects.user_effects import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
     with Progress('diagnose') as tell:
-        data = read_noted(campaign, tell)
-        start = read_start(data, model_file)
-        diagnosis = diagnose(
+        data, start = read_inputs(campaign, model_file, tell)
+        diagnosis = pd.diagnose(
             data, start.model if start else None, own_effects=own, seed=seed, progress=tell
         )
-        _write(diagnosis, output, start, tell)
-    _say(diagnosis, output, as_json)
+        files = _write(diagnosis, output, start, tell)
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
 @click.command('refit')
@@ -136,7 +124,6 @@ def refit_command(
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
     on from there, give that model.yaml as --model.
     """
-    from paint_deposition.api.inference import refit
     from paint_deposition.effects.catalogue import effect_class
     from paint_deposition.effects.user_effects import load_effect_file
 
@@ -145,57 +132,51 @@ def refit_command(
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     with Progress('refit') as tell:
-        data = read_noted(campaign, tell)
-        start = read_start(data, model_file)
-        diagnosis = refit(data, added, start.model if start else None, seed=seed, progress=tell)
-        _write(diagnosis, output, start, tell)
-    _say(diagnosis, output, as_json)
+        data, start = read_inputs(campaign, model_file, tell)
+        diagnosis = pd.refit(data, added, start.model if start else None, seed=seed, progress=tell)
+        files = _write(diagnosis, output, start, tell)
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
-def _write(diagnosis: Diagnosis, output: Path, start: ModelFile | None, tell: Progress) -> None:
-    from paint_deposition.api.writing import write
-
+def _write(
+    diagnosis: pd.Diagnosis, output: Path, start: ModelFile | None, tell: Progress
+) -> list[Path]:
     tell('comparing before and after')
     _ = diagnosis.comparisons
     tell('looking for what to measure and spray next')
     _ = diagnosis.proposals
     tell('writing the report')
-    with results_in(output) as folder:
-        write(diagnosis, folder, start=start)
+    return write_results(diagnosis, output, start=start)
 
 
-def _say(diagnosis: Diagnosis, output: Path, as_json: bool) -> None:
+def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.diagnosis.verdict import percent
-    from paint_deposition.files.json_files import json_text
 
-    content = diagnosis.to_dict()
-    if as_json:
-        click.echo(json_text(content))
-        return
-    click.echo(f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}')
+    yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
-        click.echo(f'p-value of nothing missing: {diagnosis.p_value:.4f}')
+        yield f'p-value of nothing missing: {diagnosis.p_value:.4f}'
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
-        click.echo(f'  {label}{effects.best}: {percent(effects.probability)}{others}')
+        yield f'  {label}{effects.best}: {percent(effects.probability)}{others}'
         for name, value in effects.parameters.items():
-            click.echo(f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})')
-    errors = content['rmse_um']
-    click.echo(
-        f'RMSE {errors["before"]:.2f} -> {errors["after"]:.2f} µm on the fitted points, '
-        f'{errors["holdout_before"]:.2f} -> {errors["holdout_after"]:.2f} µm on points left out; '
-        f'gauge noise {errors["noise_floor"]:.2f} µm'
+            yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
+    before, after = diagnosis.history[0], diagnosis.history[-1]
+    yield (
+        f'RMSE {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the fitted points, '
+        f'{before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on points left out; '
+        f'gauge noise {diagnosis.noise_floor_um:.2f} µm'
     )
-    say_all(
-        'misfit before', (f'{r["experiment"]}: {r["description"]}' for r in content['regions'])
-    )
+    for region in diagnosis.comparisons[0].regions:
+        yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
-        click.echo(
+        yield (
             f'next: {spray.what}: {" and ".join(spray.separates)} then differ by '
             f'{spray.separation:.1f} standard deviations, now {spray.now:.1f}'
         )
     if diagnosis.not_testable:
-        click.echo(f'not testable with these readings: {", ".join(diagnosis.not_testable)}')
-    say_all('note', diagnosis.notes)
-    click.echo(f'model: {output / "model.yaml"}\nreport: {output / "report.html"}')
+        yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
+    for note in diagnosis.notes:
+        yield f'note: {note}'
+    yield f'model: {output / "model.yaml"}'
+    yield f'report: {output / "report.html"}'

@@ -15,23 +15,18 @@ from paint_deposition.errors import PaintError, did_you_mean
 # times as long as the work takes. To be set before NumPy is loaded.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-PACKAGE = 'paint_deposition.cli'
-# Command, module, attribute, and what the list of commands says; modules are only loaded when
-# their command is used, so that help comes at once.
+# Command, the module with its function, COMMAND_command, and what the list of commands says.
+# Modules are only loaded when their command is used, so that help comes at once.
 COMMANDS = {
-    'simulate': ('simulate', 'simulate_command', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('planning', 'calibrate_command', "Fit the bell's pattern to gauge readings."),
-    'recommend': ('planning', 'recommend_command', 'Recommend the index between passes.'),
-    'plan': (
-        'planning',
-        'plan_command',
-        'Lay passes over a part; write bag, CSV and RAPID module.',
-    ),
-    'compare': ('inference', 'compare_command', 'Set the model beside gauge readings.'),
-    'diagnose': ('inference', 'diagnose_command', 'Find which effect the model lacks; add it.'),
-    'refit': ('inference', 'refit_command', 'Add an effect of your choice and fit anew.'),
-    'inspect': ('recordings', 'inspect_command', 'Show what a bag or a RAPID module holds.'),
-    'recover': ('recordings', 'recover_command', 'Make a whole bag of an unfinished run.'),
+    'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
+    'calibrate': ('planning', "Fit the bell's pattern to gauge readings."),
+    'recommend': ('planning', 'Recommend the index between passes.'),
+    'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
+    'compare': ('inference', 'Set the model beside gauge readings.'),
+    'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
+    'refit': ('inference', 'Add an effect of your choice and fit anew.'),
+    'inspect': ('recordings', 'Show what a bag or a RAPID module holds.'),
+    'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 
 
@@ -41,24 +36,16 @@ class Commands(click.Group):
     def list_commands(self, context: click.Context) -> list[str]:
         return list(COMMANDS)
 
-    def get_command(self, context: click.Context, name: str) -> click.Command | None:
-        if name not in COMMANDS:
-            return None
-        module, attribute, _ = COMMANDS[name]
-        return getattr(importlib.import_module(f'{PACKAGE}.{module}'), attribute)
-
-    def resolve_command(
-        self, context: click.Context, arguments: list[str]
-    ) -> tuple[str | None, click.Command | None, list[str]]:
-        name = arguments[0]
+    def get_command(self, context: click.Context, name: str) -> click.Command:
         if name not in COMMANDS:
             remedy = did_you_mean(name, COMMANDS)
             raise click.UsageError(f'no command is called {name!r}; {remedy}')
-        return super().resolve_command(context, arguments)
+        module = importlib.import_module(f'paint_deposition.cli.{COMMANDS[name][0]}')
+        return getattr(module, f'{name}_command')
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section('Commands'):
-            formatter.write_dl([(name, summary) for name, (*_, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
 
 
 def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
+import paint_deposition as pd
+from paint_deposition.cli.results_folder import results_in
+
 if TYPE_CHECKING:
-    from paint_deposition.effects.deposition_model import DepositionModel
+    import numpy as np
+
     from paint_deposition.files.model_file import ModelFile
-    from paint_deposition.readings.campaign import Campaign
 
 
 class Finite:
@@ -47,14 +50,20 @@ def model_option(text: str) -> Callable:
     return click.option('--model', 'model_file', type=FILE, help=text)
 
 
-def output_option(what: str, **more: Any) -> Callable:
-    """The folder for a command's results."""
+MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
+
+
+def output_option(what: str, default: str | None = None) -> Callable:
+    """The folder for a command's results, to be named where there is no default."""
     text = (
         f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
         'into it are removed; other files in it are kept, unless a result has their name. Nothing '
         'is changed before all results are complete.'
     )
-    return click.option('-o', '--output', type=FOLDER, help=text, **more)
+    required = default is None
+    return click.option(
+        '-o', '--output', type=FOLDER, required=required, default=default, help=text
+    )
 
 
 def seed_option(of: str) -> Callable:
@@ -63,29 +72,31 @@ def seed_option(of: str) -> Callable:
 
 
 def direction_option(name: str, text: str) -> Callable:
-    """A direction in space, three finite numbers that are not all zero, or None."""
-    return click.option(name, nargs=3, type=NUMBER, metavar='X Y Z', callback=_not_zero, help=text)
+    """A direction in space, (3,) finite numbers that are not all zero, or None."""
+    return click.option(name, nargs=3, type=NUMBER, metavar='X Y Z', callback=_vector, help=text)
 
 
-def _not_zero(
-    ctx: click.Context, param: click.Parameter, vector: tuple[float, float, float] | None
-) -> tuple[float, float, float] | None:
-    if vector is not None and not any(vector):
+def _vector(
+    ctx: click.Context, param: click.Parameter, given: tuple[float, float, float] | None
+) -> np.ndarray | None:
+    import numpy as np
+
+    if given is not None and not any(given):
         raise click.BadParameter('0 0 0 is none; give a direction, 0 0 -1 say', ctx, param)
-    return vector
+    return None if given is None else np.array(given)
 
 
 GUN_SIGNAL = click.option(
     '--gun-signal', help='Digital output that opens the gun, for a RAPID module that sets several.'
 )
-
-
-def mesh_scale_option() -> Callable:
-    """Metres per unit of the mesh file."""
-    return click.option(
-        '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-        help='Metres per unit of the mesh file; 0.001 for millimetres.',
-    )  # fmt: skip
+MESH_SCALE = click.option(
+    '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
+    help='Metres per unit of the mesh file; 0.001 for millimetres.',
+)  # fmt: skip
+MAX_POSE_GAP = click.option(
+    '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
+    help='A longer time between poses is a gap: gun off.',
+)  # fmt: skip
 
 
 def max_edge_length_option(default_m: float) -> Callable:
@@ -96,50 +107,53 @@ def max_edge_length_option(default_m: float) -> Callable:
     )  # fmt: skip
 
 
-def max_pose_gap_option() -> Callable:
-    """What counts as a gap between poses."""
-    return click.option(
-        '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
-        help='A longer time between poses is a gap: gun off.',
-    )  # fmt: skip
+def read_inputs(
+    campaign: Path, model_file: Path | None, tell: Callable[[str], None]
+) -> tuple[pd.Campaign, ModelFile | None]:
+    """Read a campaign and the model to start from: the one given, or else the campaign's, if any.
 
-
-def read_noted(path: Path, tell: Callable[[str], None]) -> Campaign:
-    """Read a campaign; `tell` gets each line of progress, stderr each note on an experiment."""
-    from paint_deposition.files.campaign_file import read_campaign
+    `tell` gets each line of progress, stderr each note on an experiment.
+    """
+    from paint_deposition.files.model_file import read_model_file
 
     def show(line: str) -> None:
         if line.startswith('reading '):
             tell(line)
         else:
-            click.echo(f'note: {line}', err=True)
+            say_all('note', [line])
 
-    return read_campaign(path, show)
-
-
-def read_start(campaign: Campaign, model_file: Path | None) -> ModelFile | None:
-    """The model named with --model, else the campaign's, if it names one."""
-    from paint_deposition.files.model_file import read_model_file
-
-    chosen = model_file or campaign.model_file
-    return read_model_file(chosen) if chosen else None
+    data = pd.read_campaign(campaign, show)
+    chosen = model_file or data.model_file
+    return data, read_model_file(chosen) if chosen else None
 
 
-def read_given_model(model_file: Path | None) -> DepositionModel:
+def read_given_model(model_file: Path | None) -> pd.DepositionModel:
     """The model named with --model, else that of a 50 mm bell."""
-    from paint_deposition.effects.deposition_model import DepositionModel
-    from paint_deposition.files.model_file import read_model
-
-    return read_model(model_file) if model_file else DepositionModel()
+    return pd.read_model(model_file) if model_file else pd.DepositionModel()
 
 
-def say_all(label: str, lines: Iterable[str], err: bool = False) -> None:
-    """Print each line behind its label: notes, warnings."""
+def say_all(label: str, lines: Iterable[str]) -> None:
+    """Print each line behind its label on stderr: notes, warnings."""
     for line in lines:
-        click.echo(f'{label}: {line}', err=err)
+        click.echo(f'{label}: {line}', err=True)
 
 
-def say_files(files: Iterable[Path], output: Path) -> None:
-    """Print the files of a folder of results by their final names."""
-    for file in files:
-        click.echo(f'  {output / file.name}')
+def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
+    """Write a result to its folder, all or nothing, and return the files."""
+    with results_in(output) as folder:
+        return [output / file.name for file in pd.write(result, folder, **more)]
+
+
+def say_results(files: list[Path], as_json: bool, lines: Iterable[str]) -> None:
+    """Print the file of figures as it was written, or else what it comes to in these lines."""
+    if as_json:
+        figures = next(file for file in files if file.suffix == '.json')
+        click.echo(figures.read_text(encoding='utf-8'), nl=False)
+    else:
+        for line in lines:
+            click.echo(line)
+
+
+def file_lines(files: Iterable[Path]) -> Iterator[str]:
+    """The files of a folder of results."""
+    return (f'  {file}' for file in files)

@@ -3,60 +3,72 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from functools import reduce
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
+import paint_deposition as pd
 from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    MESH_SCALE,
+    MODEL,
     NOT_NEGATIVE,
     NUMBER,
     POSITIVE,
     direction_option,
+    file_lines,
     max_edge_length_option,
-    mesh_scale_option,
     model_option,
     output_option,
     read_given_model,
-    read_noted,
-    read_start,
+    read_inputs,
     say_all,
-    say_files,
+    say_results,
     seed_option,
+    write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.cli.results_folder import results_in
 
-MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
-SPEED = click.option('--speed', 'speed_m_per_s', type=NUMBER, help='Speed of the passes [m/s].')
-TARGET = click.option(
-    '--target-um', type=NUMBER, help='Mean film build; the speed is chosen for it [µm].'
-)
-INDEX_MIN = click.option('--index-min', 'index_min_m', type=NUMBER, help='Least index [m].')
-INDEX_MAX = click.option('--index-max', 'index_max_m', type=NUMBER, help='Greatest index [m].')
-TOLERANCE = click.option(
-    '--tolerance', type=NUMBER, help='Largest sigma_n accepted, 0.05 for 5 %.'
-)
-ONE_WAY = click.option(
-    '--one-way', is_flag=True, help='Every pass in one direction; default: they alternate.'
-)
-STANDOFF = click.option(
-    '--standoff', 'standoff_m', type=NUMBER,
-    help='Distance of the TCP from the part [m]; default: the part lies on the model plane.',
+if TYPE_CHECKING:
+    import numpy as np
+
+# How the passes of `recommend` and `plan` are to be.
+PASSES = (
+    click.option('--speed', 'speed_m_per_s', type=NUMBER, help='Speed of the passes [m/s].'),
+    click.option(
+        '--target-um', type=NUMBER, help='Mean film build; the speed is chosen for it [µm].'
+    ),
+    click.option('--index-min', 'index_min_m', type=NUMBER, help='Least index [m].'),
+    click.option('--index-max', 'index_max_m', type=NUMBER, help='Greatest index [m].'),
+    click.option('--tolerance', type=NUMBER, help='Largest sigma_n accepted, 0.05 for 5 %.'),
+    click.option(
+        '--one-way', is_flag=True, help='Every pass in one direction; default: they alternate.'
+    ),
+    click.option(
+        '--standoff', 'standoff_m', type=NUMBER,
+        help='Distance of the TCP from the part [m]; default: the part lies on the model plane.',
+    ),
+    click.option(
+        '--travel-deg', default=0.0, show_default=True, type=NUMBER,
+        help="Direction of the first pass in the tool's x-y frame, from x to y.",
+    ),
 )  # fmt: skip
-TRAVEL = click.option(
-    '--travel-deg', default=0.0, show_default=True, type=NUMBER,
-    help="Direction of the first pass in the tool's x-y frame, from x to y.",
-)  # fmt: skip
+
+
+def passes_wanted(command: Callable) -> Callable:
+    """Give a command the options ``PASSES``, in that order."""
+    return reduce(lambda taken, option: option(taken), reversed(PASSES), command)
 
 
 @click.command('calibrate')
 @CAMPAIGN
 @model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
-@output_option('model.yaml, calibration.json and pictures', required=True)
+@output_option('model.yaml, calibration.json and pictures')
 @seed_option('the starts of the fit')
 @JSON
 def calibrate_command(
@@ -67,114 +79,83 @@ def calibrate_command(
     Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
     effects of the model to start from are fitted as well; its projection is kept.
     """
-    from paint_deposition.api.inference import calibrate
-    from paint_deposition.api.writing import write
-    from paint_deposition.files.json_files import json_text
-
     with Progress('calibrate') as tell:
-        data = read_noted(campaign, tell)
-        start = read_start(data, model_file)
-        result = calibrate(data, start.model if start else None, seed=seed, progress=tell)
+        data, start = read_inputs(campaign, model_file, tell)
+        result = pd.calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
-        with results_in(output) as folder:
-            files = write(result, folder, start=start)
-    if as_json:
-        click.echo(json_text(result.to_dict()))
-        return
+        files = write_results(result, output, start=start)
+    if not as_json:
+        say_all('warning', result.warnings)
+    say_results(files, as_json, [*_calibration_lines(result), *file_lines(files)])
+
+
+def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
-        click.echo(
-            f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
-        )
+        yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
     for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
-        click.echo(
+        yield (
             f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '
             f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
             f'{found.sd_um:.2f} µm'
         )
     noise = result.study.noise
-    click.echo(
+    yield (
         f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
         f'{noise.typical_um:.2f} µm ({noise.source})'
     )
-    say_all('warning', result.warnings, err=True)
-    say_files(files, output)
 
 
 @click.command('recommend')
 @MODEL
-@SPEED
-@TARGET
-@INDEX_MIN
-@INDEX_MAX
-@TOLERANCE
+@passes_wanted
 @click.option('--width', 'width_m', type=NUMBER, help='Width to paint across the passes [m].')
 @click.option(
     '--length', 'length_m', type=NUMBER, help='Length of a pass [m]; default: the width.'
 )
-@ONE_WAY
 @click.option(
     '--gun-turns', is_flag=True,
     help='The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
 )  # fmt: skip
-@STANDOFF
-@TRAVEL
-@output_option(
-    'recommendation.json and uniformity.png; default: the working directory', default='.'
-)
+@output_option('recommendation.json and uniformity.png; default: the working directory', '.')
 @JSON
 def recommend_command(
-    model_file: Path | None,
-    output: Path,
-    as_json: bool,
-    gun_turns: bool,
-    travel_deg: float,
-    **wanted: Any,
+    model_file: Path | None, output: Path, as_json: bool, travel_deg: float, **wanted: Any
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    from paint_deposition.api.planning import recommend
-    from paint_deposition.api.writing import write
-    from paint_deposition.files.json_files import json_text
+    model = read_given_model(model_file)
+    travel_rad = math.radians(travel_deg)
+    answer = pd.recommend(model, travel_rad=travel_rad, **wanted)
+    files = write_results(answer, output)
+    say_results(files, as_json, [*_recommendation_lines(answer), *file_lines(files)])
 
-    answer = recommend(
-        read_given_model(model_file), gun_turns=gun_turns, travel_rad=math.radians(travel_deg),
-        **wanted,
-    )  # fmt: skip
-    with results_in(output) as folder:
-        files = write(answer, folder)
-    if as_json:
-        click.echo(json_text(answer.to_dict()))
-        return
-    click.echo(answer.sentence)
+
+def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
+    yield answer.sentence
     for minimum in answer.minima:
-        click.echo(f'minimum: sigma_n {minimum.sigma_n:.4f} at {minimum.index_m:.4f} m')
+        yield f'minimum: sigma_n {minimum.sigma_n:.4f} at {minimum.index_m:.4f} m'
     for low, high in answer.windows_m:
-        click.echo(f'within tolerance: {low:.4f} to {high:.4f} m')
+        yield f'within tolerance: {low:.4f} to {high:.4f} m'
     if answer.index_drift_m and answer.standoff_drift_m:
-        click.echo(
+        yield (
             f'the index may drift to {answer.index_drift_m[0]:.3f} and '
             f'{answer.index_drift_m[1]:.3f} m, the standoff by '
             f'{answer.standoff_drift_m[0] * 1e3:+.0f} and '
             f'{answer.standoff_drift_m[1] * 1e3:+.0f} mm'
         )
-    say_all('note', answer.notes)
-    say_files(files, output)
+    for note in answer.notes:
+        yield f'note: {note}'
 
 
 @click.command('plan')
 @click.option('--mesh', required=True, type=FILE, help='STL, PLY or OBJ.')
 @MODEL
-@SPEED
-@TARGET
+@passes_wanted
 @click.option(
     '--direction', default='horizontal', show_default=True,
     type=click.Choice(['horizontal', 'vertical']), help='How the passes run.',
 )  # fmt: skip
 @click.option('--index', 'index_m', type=NUMBER, help='Fixes the index [m]; default: most even.')
-@INDEX_MIN
-@INDEX_MAX
-@TOLERANCE
-@STANDOFF
 @click.option('--smoothing-radius-m', default=0.1, show_default=True, type=POSITIVE,
               help='What is finer than this on the part is not followed.')  # fmt: skip
 @click.option(
@@ -183,21 +164,19 @@ def recommend_command(
 )  # fmt: skip
 @click.option('--acceleration', 'acceleration_m_per_s2', default=2.0, show_default=True,
               type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
-@ONE_WAY
-@TRAVEL
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
 @direction_option('--down', 'Gravity in the mesh frame; default: -z, or -y for a lying part.')
-@mesh_scale_option()
+@MESH_SCALE
 @max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
-@output_option('the bag, passes.csv, passes.mod, plan.json and the film', required=True)
+@output_option('the bag, passes.csv, passes.mod, plan.json and the film')
 @JSON
 def plan_command(
     mesh: Path,
     model_file: Path | None,
     output: Path,
     travel_deg: float,
-    down: tuple[float, float, float] | None,
+    down: np.ndarray | None,
     mesh_scale: float,
     max_edge_length_m: float,
     frame_id: str,
@@ -205,42 +184,34 @@ def plan_command(
     **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
-    import numpy as np
-
-    from paint_deposition.api.planning import plan
-    from paint_deposition.api.writing import write
-    from paint_deposition.files.meshes import read_mesh
-
     model = read_given_model(model_file)
     with Progress('plan') as tell:
         tell('reading the mesh')
-        gravity = None if down is None else np.array(down)
-        surface = read_mesh(mesh, mesh_scale, max_edge_length_m, gravity)
-        result = plan(
+        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        result = pd.plan(
             surface, model, frame_id=frame_id, progress=tell, travel_rad=math.radians(travel_deg),
             **wanted,
         )  # fmt: skip
         made_from = {
             'mesh': str(mesh),
-            'model': str(model_file) if model_file else 'default',
+            'model': str(model_file or 'default'),
             'frame_id': frame_id,
         }
         tell('writing')
-        with results_in(output) as folder:
-            files = write(result, folder, made_from=made_from)
-    say_all('note', surface.notes, err=True)
-    if as_json:
-        click.echo((output / 'plan.json').read_text(), nl=False)
-        return
-    click.echo(result.sentence)
-    click.echo(
+        files = write_results(result, output, made_from=made_from)
+    say_all('note', surface.notes)
+    say_results(files, as_json, [*_plan_lines(result), *file_lines(files)])
+
+
+def _plan_lines(result: pd.Plan) -> Iterator[str]:
+    film = result.statistics
+    yield result.sentence
+    yield (
         f'on a plane: sigma_n {100 * result.plane.sigma_n:.1f} % at '
         f'{result.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
         f'{100 * result.plane_on_part.sigma_n:.1f} %'
     )
-    click.echo(
-        f'film {result.statistics.min_um:.1f} to {result.statistics.max_um:.1f} µm, coverage '
-        f'{100 * result.statistics.coverage:.0f} %, '
-        f'capture fraction {100 * result.statistics.capture_fraction:.0f} %'
+    yield (
+        f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
+        f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
-    say_files(files, output)

@@ -8,12 +8,7 @@ from pathlib import Path
 import click
 from tqdm import tqdm
 
-from paint_deposition.cli.options import (
-    FILE,
-    GUN_SIGNAL,
-    JSON,
-    max_pose_gap_option,
-)
+from paint_deposition.cli.options import FILE, GUN_SIGNAL, JSON, MAX_POSE_GAP
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_files import refuse_gun_signal
@@ -25,7 +20,7 @@ from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files
 
 @click.command('inspect')
 @click.argument('recording', type=FILE)
-@max_pose_gap_option()
+@MAX_POSE_GAP
 @GUN_SIGNAL
 @JSON
 def inspect_command(
@@ -42,20 +37,15 @@ def inspect_command(
         return
     refuse_gun_signal(recording, gun_signal)
     summary = summarise(recording, max_pose_gap_s)
-    if as_json:
-        click.echo(json_text(asdict(summary)))
-    else:
-        click.echo(_table(summary))
+    click.echo(json_text(asdict(summary)) if as_json else _table(summary))
 
 
 @click.command('recover')
 @click.argument('run', type=FILE)
 @click.option(
-    '-o',
-    '--output',
-    type=FILE,
+    '-o', '--output', type=FILE,
     help='Folder to make; default: RUN with _recovered behind its name.',
-)
+)  # fmt: skip
 @JSON
 def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.

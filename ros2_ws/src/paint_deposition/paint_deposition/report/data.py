@@ -1,7 +1,7 @@
 """Figures and arrays that the report shows, computed once from the inference's results."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -12,7 +12,6 @@ from paint_deposition.comparison.profiles import Profile, profiles_of
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.study import Study
@@ -43,50 +42,51 @@ class ReportData:
     """Everything the report is made of.
 
     Attributes:
-        study: the readings.
-        models, comparisons: base first, best last; one where nothing was added.
+        comparisons: of the first and the best model; one where nothing was added.
         diagnosis: or None after a comparison alone.
-        places, sprays: what to measure and spray next.
-        history: of the model, oldest first, as in its file.
-        library: the effects that were looked for, by id, users' own among them.
+        older: history of the model that a diagnosis started from, as in its file.
     """
 
-    study: Study
-    models: tuple[DepositionModel, ...]
     comparisons: tuple[Comparison, ...]
     diagnosis: Diagnosis | None = None
-    places: tuple[Place, ...] = ()
-    sprays: tuple[Spray, ...] = ()
-    history: tuple[Mapping[str, Any], ...] = ()
-    library: Mapping[str, type[Effect]] = field(default_factory=lambda: EFFECTS)
+    older: Sequence[Mapping[str, Any]] = ()
 
     @staticmethod
     def of(
-        study: Study,
-        models: Sequence[tuple[DepositionModel, Comparison]],
-        diagnosis: Diagnosis | None = None,
-        places: Sequence[Place] = (),
-        sprays: Sequence[Spray] = (),
-        older: Sequence[Mapping[str, Any]] = (),
-        library: Mapping[str, type[Effect]] = EFFECTS,
+        result: Comparison | Diagnosis, older: Sequence[Mapping[str, Any]] = ()
     ) -> 'ReportData':
-        """Put the results together; models between the first and the last are history."""
-        chosen = [models[0], models[-1]] if len(models) > 1 else [models[0]]
-        return ReportData(
-            study,
-            tuple(model for model, _ in chosen),
-            tuple(comparison for _, comparison in chosen),
-            diagnosis,
-            tuple(places),
-            tuple(sprays),
-            tuple(history_as_list(study, diagnosis.history, older)) if diagnosis else (),
-            library,
-        )
+        """Of a diagnosis, models between the first and the last are history only."""
+        if isinstance(result, Comparison):
+            return ReportData((result,))
+        first, *later = result.comparisons
+        return ReportData((first, *later[-1:]), result, older)
+
+    @property
+    def study(self) -> Study:
+        """The readings."""
+        return self.comparisons[0].study
+
+    @property
+    def models(self) -> tuple[DepositionModel, ...]:
+        """Base first, best last."""
+        return tuple(comparison.model for comparison in self.comparisons)
+
+    @property
+    def proposals(self) -> tuple[list[Place], list[Spray]]:
+        """What to measure and what to spray next."""
+        return self.diagnosis.proposals if self.diagnosis else ([], [])
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """Of the model, oldest first, as in its file."""
+        if self.diagnosis is None:
+            return []
+        return history_as_list(self.study, self.diagnosis.history, self.older)
 
     def effect_class(self, effect_id: str) -> type[Effect] | None:
-        """An effect of the library or of the models; None if it is neither."""
+        """An effect that was looked for or is in the models; None if it is neither."""
         owned = {e.id: type(e) for model in self.models for e in model.effects}
-        return {**owned, **self.library}.get(effect_id)
+        return (owned | dict(self.diagnosis.library if self.diagnosis else {})).get(effect_id)
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
@@ -124,17 +124,8 @@ class ReportData:
         return profiles_of(self.study, self.models)
 
     @cached_property
-    def surfaces_um(self) -> list[list[np.ndarray]]:
-        """Film on the surface: for each experiment and each model (V,) [um]."""
-        return [[painted.film_um for painted in row] for row in self._painted]
-
-    @cached_property
-    def gained_um(self) -> list[np.ndarray]:
-        """What a gauge would read more with the best model than with the first, (V,) each [um]."""
-        return [row[-1].gauge_um - row[0].gauge_um for row in self._painted]
-
-    @cached_property
-    def _painted(self) -> list[list[FilmIntegrator]]:
+    def painted(self) -> list[list[FilmIntegrator]]:
+        """The surface painted: for each experiment, with each model."""
         numbers = range(len(self.experiments))
         return [[self._paint(k, model) for model in self.models] for k in numbers]
 
@@ -146,7 +137,7 @@ class ReportData:
             others = tuple(e for e in self.model.effects if e.id != effect.id)
             without = self.model.model_copy(update={'effects': others})
             difference, area = [], []
-            for k, painted in enumerate(self._painted):
+            for k, painted in enumerate(self.painted):
                 difference.append(painted[-1].gauge_um - self._paint(k, without).gauge_um)
                 area.append(self.experiments[k].surface.vertex_areas_m2)
             found[effect.id] = _change(np.concatenate(difference), np.concatenate(area))

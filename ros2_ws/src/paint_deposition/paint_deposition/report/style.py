@@ -5,6 +5,7 @@ MUTED = '#616e7c'
 GRID = '#e4e7eb'
 BEFORE = '#9aa5b1'
 ACCENT = '#00708c'
+COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
 # 95 % of normally distributed readings lie within so many standard deviations.
 TWO_SIDED_95 = 1.96
 

@@ -105,11 +105,11 @@ def micrometres(value: float, signed: bool = False) -> str:
     return f'{minus(text)} µm'
 
 
-def in_unit(value: float, unit: str) -> tuple[str, str]:
-    """A parameter as number and unit; small lengths and times in mm and ms."""
-    if unit in ('m', 's') and abs(value) < 1.0:
-        return number(1e3 * value), f'm{unit}'
-    return number(value), unit_words(unit)
+def in_unit(unit: str, *values: float) -> tuple[str, ...]:
+    """Unit and values as they are printed; m and s as mm and ms if the first value is small."""
+    if unit in ('m', 's') and abs(values[0]) < 1.0:
+        return f'm{unit}', *(number(1e3 * value) for value in values)
+    return unit_words(unit), *(number(value) for value in values)
 
 
 def unit_words(unit: str) -> str:

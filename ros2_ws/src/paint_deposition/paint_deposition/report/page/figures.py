@@ -1,5 +1,6 @@
 """Flat charts of the report: parity, covariates, history, the unexplained."""
 
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -12,15 +13,18 @@ from paint_deposition.report.page.layout import (
     chart_title,
     figure,
     grid_domains,
+    scatter,
+    zero_axis,
 )
-from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED, TWO_SIDED_95
-from paint_deposition.report.words import covariate_label, p_words, step_words
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95
+from paint_deposition.report.words import covariate_label, minus, p_words, step_words
 
 COVARIATES_A_ROW = 4
 MOST_COVARIATES = 8
 BINS = 6
 # Conditions that differ by less than this share say nothing of the model.
 LEAST_SPREAD = 0.01
+AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
 def parity_figure(data: ReportData) -> dict[str, Any]:
@@ -28,24 +32,21 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     measured = data.study.measured_um
     predicted = [measured - residual for residual in data.residuals_um]
     top = 1.05 * max(measured.max(), *(p.max() for p in predicted))
-    ends = np.linspace(0.0, top, 40)
-    order = np.argsort(measured)
+    ends = np.array([0.0, top])
     spread = TWO_SIDED_95 * data.study.noise_floor_um
-    traces: list[dict] = [
-        {'type': 'scatter', 'x': ends, 'y': ends + spread, 'mode': 'lines',
-         'line': {'width': 0}, 'hoverinfo': 'skip', 'showlegend': False},
-        {'type': 'scatter', 'x': ends, 'y': ends - spread, 'mode': 'lines', 'fill': 'tonexty',
-         'fillcolor': 'rgba(154,165,177,0.25)', 'line': {'width': 0}, 'hoverinfo': 'skip',
-         'name': '95 % gauge noise'},
-        {'type': 'scatter', 'x': ends, 'y': ends, 'mode': 'lines', 'hoverinfo': 'skip',
-         'line': {'color': MUTED, 'width': 1}, 'showlegend': False},
+    bound = {'line': {'width': 0}, 'hoverinfo': 'skip'}
+    traces = [
+        scatter(ends, ends + spread, 'lines', **bound),
+        scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
+                fillcolor='rgba(154,165,177,0.25)', name='95 % gauge noise'),
+        scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
     ]  # fmt: skip
-    for name, values, marker in _before_and_after(data, predicted):
-        traces.append({
-            'type': 'scatter', 'x': measured[order], 'y': values[order], 'mode': 'markers',
-            'name': name, 'marker': marker,
-            'hovertemplate': 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>',
-        })  # fmt: skip
+    for name, values, colour in _before_and_after(data, predicted):
+        hover = 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>'
+        marker = {'size': 5.5, 'color': colour, 'opacity': 0.9}
+        traces.append(
+            scatter(measured, values, 'markers', name=name, marker=marker, hovertemplate=hover)
+        )
     layout = base_layout(
         xaxis=axis('measured [µm]', range=[0, top], constrain='domain'),
         yaxis=axis('predicted [µm]', range=[0, top], scaleanchor='x', constrain='domain'),
@@ -54,15 +55,10 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     return figure('parity', traces, layout, 420)
 
 
-def _before_and_after(
-    data: ReportData, values: list[np.ndarray]
-) -> list[tuple[str, np.ndarray, dict[str, Any]]]:
-    """Name, values and marker of each model, the last one in the strong colour."""
-    colours = (BEFORE, ACCENT) if data.improved else (ACCENT,)
-    return [
-        (name, value, {'size': 5.5, 'color': colour, 'opacity': 0.9})
-        for name, value, colour in zip(data.model_names, values, colours, strict=True)
-    ]
+def _before_and_after(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
+    """Name, values and colour of each model, the last one in the strong colour."""
+    colours = (BEFORE, ACCENT)[-len(data.models) :]
+    return zip(data.model_names, *values, colours, strict=True)
 
 
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
@@ -73,35 +69,39 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     dependences = dependences[:MOST_COVARIATES]
     if not dependences:
         return None
-    rows = -(-len(dependences) // min(COVARIATES_A_ROW, len(dependences)))
-    height = 96 + 220 * rows
+    rows = -(-len(dependences) // COVARIATES_A_ROW)
+    inner = 220 * rows
     layout = base_layout(margin={'l': 48, 'r': 12, 't': 56, 'b': 40}, annotations=[])
-    layout['legend'] |= {'y': 1.0 + 30 / (height - 96)}
+    layout['legend'] |= {'y': 1.0 + 30 / inner}
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
-    later = {d.covariate: d for d in data.comparisons[-1].dependences}
+    later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
     traces: list[dict] = []
-    domains = grid_domains(len(dependences), COVARIATES_A_ROW, height - 96, (36, 74))
+    domains = grid_domains(len(dependences), COVARIATES_A_ROW, inner, (36, 74))
     for k, (dependence, (x, y)) in enumerate(zip(dependences, domains, strict=True), start=1):
-        name = '' if k == 1 else str(k)
-        where = {'xaxis': f'x{name}', 'yaxis': f'y{name}'}
-        for label, residual, marker in _before_and_after(data, data.residuals_um):
-            traces += _dependence_traces(
-                values[dependence.covariate], residual, label, marker, where, k == 1
-            )
-        layout[f'xaxis{name}'] = axis(
-            covariate_label(dependence.covariate), domain=x, anchor=f'y{name}', nticks=5
-        )
-        layout[f'yaxis{name}'] = axis(
-            'residual [µm]' if x[0] == 0.0 else '', domain=y, anchor=f'x{name}',
-            range=[-reach, reach], zeroline=True, zerolinecolor=MUTED, zerolinewidth=1,
+        name = dependence.covariate
+        x_mean, residual_means = _means(values[name], data.residuals_um)
+        for label, residual, mean, colour in _before_and_after(
+            data, data.residuals_um, residual_means
+        ):
+            common = {'xaxis': f'x{k}', 'yaxis': f'y{k}', 'legendgroup': label}
+            traces += [
+                scatter(values[name], residual, 'markers', name=label, showlegend=k == 1,
+                        marker={'size': 4, 'color': colour, 'opacity': 0.6},
+                        hovertemplate=f'{AT_VALUE}<extra>{label}</extra>', **common),
+                scatter(x_mean, mean, 'lines', line={'color': colour, 'width': 2.5},
+                        hoverinfo='skip', **common),
+            ]  # fmt: skip
+        layout[f'xaxis{k}'] = axis(covariate_label(name), domain=x, anchor=f'y{k}', nticks=5)
+        layout[f'yaxis{k}'] = zero_axis(
+            'residual [µm]' if x[0] == 0.0 else '', domain=y, anchor=f'x{k}',
+            range=[-reach, reach],
         )  # fmt: skip
         text = f'ρ {dependence.correlation:+.2f}'
-        after = later.get(dependence.covariate)
-        if data.improved and after is not None:
-            text += f' → {after.correlation:+.2f}'
+        if data.improved and name in later:
+            text += f' → {later[name]:+.2f}'
         text += f', {p_words(dependence.p_value)}'
-        layout['annotations'].append(chart_title(text.replace('-', '−'), x[0], y[1], 11))
-    return figure('covariates', traces, layout, height)
+        layout['annotations'].append(chart_title(minus(text), k, 11))
+    return figure('covariates', traces, layout, inner + 96)
 
 
 def _conditions(data: ReportData) -> dict[str, np.ndarray]:
@@ -110,29 +110,12 @@ def _conditions(data: ReportData) -> dict[str, np.ndarray]:
     return values | {'spray_pass': values['spray_pass'] + 1.0}
 
 
-def _dependence_traces(
-    x: np.ndarray,
-    residual: np.ndarray,
-    label: str,
-    marker: dict[str, Any],
-    where: dict[str, Any],
-    first: bool,
-) -> list[dict]:
-    common = where | {'type': 'scatter', 'legendgroup': label, 'name': label}
+def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the covariate, and of each model's residual, over sixths of the readings."""
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
-    traces = [common | {
-        'x': x, 'y': residual, 'mode': 'markers', 'showlegend': first,
-        'marker': marker | {'size': 4, 'opacity': 0.6},
-        'hovertemplate': '%{y:.2f} µm at %{x:.3g}<extra>' + label + '</extra>',
-    }]  # fmt: skip
-    if len(edges) > 2:
-        mean_x, mean_r = (binned_statistic(x, v, 'mean', edges).statistic for v in (x, residual))
-        filled = np.isfinite(mean_x)
-        traces.append(common | {
-            'x': mean_x[filled], 'y': mean_r[filled], 'mode': 'lines', 'showlegend': False,
-            'line': {'color': marker['color'], 'width': 2.5}, 'hoverinfo': 'skip',
-        })  # fmt: skip
-    return traces
+    means = binned_statistic(x, [x, *residuals], 'mean', edges).statistic
+    filled = means[:, np.isfinite(means[0])]
+    return filled[0], filled[1:]
 
 
 def history_figure(data: ReportData) -> dict[str, Any] | None:
@@ -147,7 +130,7 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     ]
     traces = [
         {'type': 'bar', 'x': names, 'y': values, 'name': name, 'marker': {'color': colour},
-         'text': [f'{v:.2f}' for v in values], 'textposition': 'inside',
+         'texttemplate': '%{y:.2f}', 'textposition': 'inside',
          'insidetextanchor': 'start', 'textangle': 0, 'insidetextfont': {'color': text},
          'hovertemplate': name + ': %{y:.2f} µm<extra></extra>'}
         for name, values, colour, text in bars
@@ -177,20 +160,15 @@ def unknown_figure(data: ReportData) -> dict[str, Any] | None:
         return None
     covariate, y = list(unknown.curve.values())[:2]
     x = np.add(covariate, 1.0 if unknown.covariate == 'spray_pass' else 0.0)
-    hover = {'hovertemplate': '%{y:.2f} µm at %{x:.3g}<extra></extra>'}
+    hover = f'{AT_VALUE}<extra></extra>'
     traces = [
-        hover | {
-            'type': 'scatter', 'mode': 'markers', 'name': 'residual of each point',
-            'x': _conditions(data)[unknown.covariate], 'y': data.residuals_um[-1],
-            'marker': {'size': 5, 'color': BEFORE},
-        },
-        hover | {
-            'type': 'scatter', 'x': x, 'y': y, 'mode': 'lines', 'name': 'smoothed',
-            'line': {'color': ACCENT, 'width': 2.5},
-        },
+        scatter(_conditions(data)[unknown.covariate], data.residuals_um[-1], 'markers',
+                name='residual of each point', hovertemplate=hover,
+                marker={'size': 5, 'color': BEFORE}),
+        scatter(x, np.asarray(y), 'lines', name='smoothed', hovertemplate=hover,
+                line={'color': ACCENT, 'width': 2.5}),
     ]  # fmt: skip
     layout = base_layout(
-        xaxis=axis(covariate_label(unknown.covariate)),
-        yaxis=axis('residual [µm]', zeroline=True, zerolinecolor=MUTED, gridcolor=GRID),
+        xaxis=axis(covariate_label(unknown.covariate)), yaxis=zero_axis('residual [µm]')
     )
     return figure('unknown', traces, layout, 320)

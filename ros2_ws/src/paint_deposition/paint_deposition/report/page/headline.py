@@ -8,7 +8,7 @@ from scipy.stats import f as fisher
 from paint_deposition.diagnosis.run import ALPHA, SURE
 from paint_deposition.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.tables import class_rows, effect_rows
+from paint_deposition.report.page.tables import class_rows
 from paint_deposition.report.words import (
     capital,
     covariate_label,
@@ -17,6 +17,7 @@ from paint_deposition.report.words import (
     joined,
     micrometres,
     p_words,
+    percent_words,
 )
 
 # Chance of deviations this large from the gauge alone, below which the model is called off.
@@ -46,16 +47,17 @@ def headline(data: ReportData) -> Headline:
     diagnosis = data.diagnosis
     if diagnosis is None:
         return _compared(data)
-    if _least_probable(diagnosis) <= SURE:
-        return _asked_for(data, diagnosis)
-    verdict = {
+    # A diagnosis adds only what it is sure of.
+    added = [c.probability for c in diagnosis.classes if c.best in diagnosis.accepted]
+    if added and min(added) <= SURE:
+        return _asked_for(data, diagnosis, min(added))
+    return {
         'effect_missing': _missing,
         'none_missing': _nothing,
         'undecided': _undecided,
         'unknown_effect': _unknown,
         'fit_broken': _broken,
-    }[diagnosis.verdict]
-    return verdict(data, diagnosis)
+    }[diagnosis.verdict](data, diagnosis)
 
 
 def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
@@ -70,19 +72,13 @@ def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     return Headline('found', 'An effect is missing', f'The model lacked {names}', facts)
 
 
-def _least_probable(diagnosis: Diagnosis) -> float:
-    """Of the effects added, the least probability; a diagnosis adds only what it is sure of."""
-    added = [c.probability for c in diagnosis.classes if c.best in diagnosis.accepted]
-    return min(added, default=1.0)
-
-
-def _asked_for(data: ReportData, diagnosis: Diagnosis) -> Headline:
+def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> Headline:
     """An effect that the user had added although the readings do not show it for sure."""
     rows = _accepted_rows(data)
     names = joined([row['name'] for row in rows])
     title = (
         f'The readings do not call for {names}'
-        if _least_probable(diagnosis) < LIKELY
+        if probability < LIKELY
         else f'The readings do not settle whether {names} was missing'
     )
     more = 'Something is missing: run the diagnosis to find the cause.'
@@ -107,14 +103,11 @@ def _nothing(data: ReportData, diagnosis: Diagnosis) -> Headline:
 
 def _undecided(data: ReportData, diagnosis: Diagnosis) -> Headline:
     rows = [row for row in class_rows(data) if not row['accepted']]
-    causes = [f'{_with_confounded(row)} ({row["probability"]})' for row in rows[:3]]
+    causes = [f'{_with_confounded(row)} ({percent(row["found"].probability)})' for row in rows[:3]]
     more = 'more ' if diagnosis.accepted else ''
     facts = (
         ('What is missing', f'Something {more}is, most likely {joined(causes, "or")}.'),
-        (
-            'How sure',
-            f'{_chance(diagnosis)} No single cause is probable enough to be added.',
-        ),
+        ('How sure', f'{_chance(diagnosis)} No single cause is probable enough to be added.'),
         ('What changes', _changes(data, diagnosis)),
         ('What to do', _next(data)),
     )
@@ -129,15 +122,15 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
         'Write the effect you suspect as a file of your own and add it; the charts of the '
         'residual below show its shape.'
     )
-    if unknown is not None:
+    if unknown:
         label = covariate_label(unknown.covariate).split(' [')[0].split(',')[0].lower()
         where = (
             f'{capital(in_print(unknown.where))}; most clearly against {label} '
             f'({p_words(unknown.p_value)}).'
         )
-    if unknown is not None and unknown.kind == 'footprint':
-        title = "The gun's pattern differs from the model's two Gaussians"
-        remedy = 'Spray one straight pass on a flat panel and measure across it.'
+        if unknown.kind == 'footprint':
+            title = "The gun's pattern differs from the model's two Gaussians"
+            remedy = 'Spray one straight pass on a flat panel and measure across it.'
     facts = (
         ('What is missing', diagnosis.reason),
         ('Where it shows', where),
@@ -164,13 +157,12 @@ def _compared(data: ReportData) -> Headline:
     regions, points = data.comparisons[-1].regions, data.comparisons[-1].points
     freedom = min(data.study.noise.degrees_of_freedom, 1e6)
     chance = float(fisher.sf(points.chi_square_per_reading, len(points), freedom))
-    off = bool(regions) or chance < CHANCE
+    title = 'The model agrees with the readings'
     if regions:
         title = 'The model misses the readings in places'
-    elif off:
+    elif chance < CHANCE:
         title = 'The model is further off than the gauge explains'
-    else:
-        title = 'The model agrees with the readings'
+    off = bool(regions) or chance < CHANCE
     worst = float(np.abs(points.residual_um[points.worst]))
     where = ' '.join(f'{capital(in_print(region.description))}.' for region in regions[:3])
     facts = (
@@ -187,25 +179,20 @@ def _compared(data: ReportData) -> Headline:
 
 def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     """(label, before or '', after, remark) of the figures beside the facts."""
-    found = []
-    diagnosis = data.diagnosis
-    if diagnosis is None:
-        found.append(
-            ('RMSE', '', f'{data.comparisons[-1].points.rmse_um:.2f}', 'µm on all points')
-        )
-    else:
-        first, last = diagnosis.history[0], diagnosis.history[-1]
-        for label, before, after in (
-            ('RMSE, fitted points', first.rmse_um, last.rmse_um),
-            ('RMSE, points left out', first.holdout_rmse_um, last.holdout_rmse_um),
-        ):
-            was = f'{before:.2f}' if len(diagnosis.history) > 1 else ''
-            found.append((label, was, f'{after:.2f}', 'µm'))
-    noise = data.study.noise
+    noise, diagnosis = data.study.noise, data.diagnosis
     source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
-    found.append(('Gauge noise', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}'))
-    if diagnosis is not None and diagnosis.classes:
-        best = diagnosis.classes[0]
+    floor = ('Gauge noise', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
+    if diagnosis is None:
+        rmse_um = data.comparisons[-1].points.rmse_um
+        return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]
+    fitted = [f'{step.rmse_um:.2f}' for step in diagnosis.history]
+    left_out = [f'{step.holdout_rmse_um:.2f}' for step in diagnosis.history]
+    found = [
+        (f'RMSE, {label}', errors[0] if len(errors) > 1 else '', errors[-1], 'µm')
+        for label, errors in (('fitted points', fitted), ('points left out', left_out))
+    ]
+    found.append(floor)
+    for best in diagnosis.classes[:1]:
         remark = 'probability' + (', with its like' if len(best.members) > 1 else '')
         found.append((effect_name(best.best), '', percent(best.probability), remark))
     return found
@@ -226,7 +213,7 @@ def _sure(rows: list[dict]) -> str:
     found = []
     for row in rows:
         names = joined([row['name'], *row['others']], 'or')
-        text = f'{capital(names)} with a probability of {row["probability_words"]}'
+        text = f'{capital(names)} with a probability of {percent_words(row["found"].probability)}'
         if row['others']:
             text += '; these readings cannot tell them apart'
         found.append(f'{text}.')
@@ -242,16 +229,13 @@ def _chance(diagnosis: Diagnosis) -> str:
 
 def _costs(data: ReportData, diagnosis: Diagnosis) -> str:
     """What each effect that was added does to the readings."""
-    found = []
-    for row in effect_rows(data):
-        if row['id'] in diagnosis.accepted:
-            change = row['change']
-            found.append(
-                f'{capital(row["name"])} changes the reading by '
-                f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} '
-                f'over the part, {micrometres(change.rms_um)} RMS.'
-            )
-    return ' '.join(found)
+    return ' '.join(
+        f'{capital(effect_name(name))} changes the reading by '
+        f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} '
+        f'over the part, {micrometres(change.rms_um)} RMS.'
+        for name, change in data.changes.items()
+        if name in diagnosis.accepted
+    )
 
 
 def _accepted_rows(data: ReportData) -> list[dict]:
@@ -285,8 +269,9 @@ def _blind(diagnosis: Diagnosis) -> str:
 
 
 def _next(data: ReportData) -> str:
-    if not data.sprays:
+    _, sprays = data.proposals
+    if not sprays:
         return 'Take more readings, and repeats at some points.'
-    spray = data.sprays[0]
+    spray = sprays[0]
     first, second = (effect_name(e) for e in spray.separates)
     return f'Spray {spray.what}: it separates {first} from {second}.'

@@ -11,14 +11,11 @@ from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
-def plotly_scale(table: bytes, steps: int = 32) -> list[list[Any]]:
+def plotly_scale(table: bytes) -> list[list[Any]]:
     """A table of 256 RGB colours as plotly's colour scale."""
-    rgb = np.frombuffer(table, dtype=np.uint8).reshape(-1, 3)
-    rows = np.round(np.linspace(0, len(rgb) - 1, steps)).astype(int)
-    return [
-        [round(k / (steps - 1), 4), 'rgb({},{},{})'.format(*rgb[row])]
-        for k, row in enumerate(rows)
-    ]
+    colours = np.frombuffer(table, dtype=np.uint8).reshape(-1, 3)
+    places = np.linspace(0.0, 1.0, len(colours)).round(4).tolist()
+    return [[place, f'rgb({r},{g},{b})'] for place, (r, g, b) in zip(places, colours, strict=True)]
 
 
 FILM_COLOURS = plotly_scale(VIRIDIS)
@@ -57,16 +54,27 @@ def axis(title: str = '', **more: Any) -> dict[str, Any]:
     } | more
 
 
+def zero_axis(title: str, **more: Any) -> dict[str, Any]:
+    """An axis with a line at zero."""
+    return axis(title, zeroline=True, zerolinecolor=MUTED, zerolinewidth=1, **more)
+
+
+def scatter(x: np.ndarray, y: np.ndarray, mode: str, **more: Any) -> dict[str, Any]:
+    """A trace of lines or markers, or both; without a name it is not in the legend."""
+    return {'type': 'scatter', 'x': x, 'y': y, 'mode': mode, 'showlegend': 'name' in more} | more
+
+
 def figure(name: str, traces: list[dict], layout: dict, height: int) -> dict[str, Any]:
     """What the page's script draws into the element that asks for ``name``."""
     return {'name': name, 'data': traces, 'layout': layout | {'height': height}}
 
 
-def chart_title(text: str, x: float, y: float, size: int = 12) -> dict[str, Any]:
-    """A line of text over the upper left corner of a small chart."""
+def chart_title(text: str, number: int, size: int = 12) -> dict[str, Any]:
+    """A line of text over the upper left corner of a small chart, the one with these axes."""
     return {
-        'text': text, 'x': x, 'y': y, 'xref': 'paper', 'yref': 'paper', 'xanchor': 'left',
-        'yanchor': 'bottom', 'showarrow': False, 'font': {'size': size, 'color': INK},
+        'text': text, 'x': 0, 'y': 1, 'xref': f'x{number} domain', 'yref': f'y{number} domain',
+        'xanchor': 'left', 'yanchor': 'bottom', 'showarrow': False,
+        'font': {'size': size, 'color': INK},
     }  # fmt: skip
 
 

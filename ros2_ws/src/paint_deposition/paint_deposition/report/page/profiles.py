@@ -12,12 +12,14 @@ from paint_deposition.report.page.layout import (
     chart_title,
     figure,
     grid_domains,
+    scatter,
+    zero_axis,
 )
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
+from paint_deposition.report.style import ACCENT, BEFORE, INK, TWO_SIDED_95, charts_a_row
 
 ROW_PX, TOP_PX, BOTTOM_PX = 300, 56, 40
-# Share of a chart's height that the residual takes, and the gap above it.
-RESIDUAL_SHARE, GAP_SHARE = 0.26, 0.05
+# Share of a chart's height that the residual takes, and above which the film begins.
+RESIDUAL_SHARE, FILM_FROM = 0.26, 0.31
 
 
 def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
@@ -32,25 +34,31 @@ def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
     traces: list[dict] = []
     domains = grid_domains(len(profiles), columns, inner, (46, 66))
     for k, (profile, (x, y)) in enumerate(zip(profiles, domains, strict=True)):
-        film, residual = (f'{2 * k + n}' if 2 * k + n > 1 else '' for n in (1, 2))
-        cut = y[0] + RESIDUAL_SHARE * (y[1] - y[0])
-        floor = cut + GAP_SHARE * (y[1] - y[0])
-        traces += _film_traces(data, profile, f'x{film}', f'y{film}', k == 0)
-        traces += _residual_traces(data, profile, f'x{film}', f'y{residual}')
+        # The film's axes have odd numbers; the residual shares its position with the film.
+        film, residual = 2 * k + 1, 2 * k + 2
+        cut, floor = (y[0] + share * (y[1] - y[0]) for share in (RESIDUAL_SHARE, FILM_FROM))
+        traces += [
+            trace | {'xaxis': f'x{film}', 'yaxis': f'y{film}'}
+            for trace in _film_traces(data, profile, k == 0)
+        ]
+        traces += [
+            trace | {'xaxis': f'x{film}', 'yaxis': f'y{residual}'}
+            for trace in _residual_traces(data, profile)
+        ]
+        first = x[0] == 0.0
         layout[f'xaxis{film}'] = axis(
             f'{profile.axis} [mm]', domain=x, anchor=f'y{residual}', nticks=7
         )
-        first = x[0] == 0.0
         layout[f'yaxis{film}'] = axis(
             'film [µm]' if first else '', domain=[floor, y[1]], anchor=f'x{film}',
             range=film_range, nticks=6,
         )  # fmt: skip
-        layout[f'yaxis{residual}'] = axis(
+        layout[f'yaxis{residual}'] = zero_axis(
             'residual' if first else '', domain=[y[0], cut], anchor=f'x{film}',
-            range=residual_range, nticks=4, zeroline=True, zerolinecolor=MUTED, zerolinewidth=1,
+            range=residual_range, nticks=4,
         )  # fmt: skip
         text = f'<b>{_escaped(profile.label)}</b>  {data.errors_in_words(profile.rows)}'
-        layout['annotations'].append(chart_title(text, x[0], y[1]))
+        layout['annotations'].append(chart_title(text, film))
     return figure(f'profiles-{index}', traces, layout, inner + TOP_PX + BOTTOM_PX)
 
 
@@ -64,67 +72,57 @@ def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], lis
     return [0.0, 1.03 * max(*lines, *measured, 1.0) + noise], [-reach, reach]
 
 
-def _film_traces(data: ReportData, p: Profile, x: str, y: str, first: bool) -> list[dict]:
-    common = {'xaxis': x, 'yaxis': y, 'type': 'scatter'}
-    line_mm = 1e3 * p.line_m
+def _film_traces(data: ReportData, p: Profile, first: bool) -> list[dict]:
+    line_mm, at_mm, measured = 1e3 * p.line_m, 1e3 * p.position_m, data.study.measured_um[p.rows]
     traces = [
-        common | {
-            'x': line_mm, 'y': single, 'mode': 'lines', 'name': 'each pass alone',
-            'legendgroup': 'pass', 'showlegend': first and number == 0, 'legendrank': 9,
-            'line': {'color': BEFORE, 'width': 1, 'dash': 'dot'},
-            'hovertemplate': f'pass {number + 1}: %{{y:.1f}} µm<extra></extra>',
-        }
-        for number, single in enumerate(p.passes_um)
+        scatter(line_mm, single, 'lines', name='each pass alone', legendgroup='pass',
+                showlegend=first and number == 1, legendrank=9,
+                line={'color': BEFORE, 'width': 1, 'dash': 'dot'},
+                hovertemplate=f'pass {number}: %{{y:.1f}} µm<extra></extra>')
+        for number, single in enumerate(p.passes_um, start=1)
     ]  # fmt: skip
     # The thin line lies over the bold one, so that both are seen where they agree.
     for k, name in reversed(list(enumerate(data.model_names))):
         last = k == len(data.models) - 1
-        trace = common | {
-            'name': name, 'legendgroup': name, 'showlegend': first, 'legendrank': 2 + k,
-            'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',
-        }  # fmt: skip
         if len(line_mm):
             style = {'color': ACCENT, 'width': 3.5} if last else {'color': INK, 'width': 1.2}
-            trace |= {'x': line_mm, 'y': p.lines_um[k], 'mode': 'lines', 'line': style}
+            trace = scatter(line_mm, p.lines_um[k], 'lines', line=style)
         else:
             marker = {'size': 8, 'color': ACCENT} if last else {
                 'size': 7, 'symbol': 'circle-open', 'color': INK}  # fmt: skip
-            predicted = data.study.measured_um[p.rows] - data.residuals_um[k][p.rows]
-            trace |= {'x': 1e3 * p.position_m, 'y': predicted, 'mode': 'markers',
-                      'marker': marker}  # fmt: skip
-        traces.append(trace)
-    traces.append(common | {
-        'x': 1e3 * p.position_m, 'y': data.study.measured_um[p.rows], 'mode': 'markers',
-        'name': 'measured, bars: 95 % gauge noise', 'legendgroup': 'measured',
-        'showlegend': first, 'legendrank': 1, 'marker': {'size': 5, 'color': INK},
-        'error_y': _bars(data, p),
-        'hovertemplate': 'measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>',
-    })  # fmt: skip
+            predicted = measured - data.residuals_um[k][p.rows]
+            trace = scatter(at_mm, predicted, 'markers', marker=marker)
+        traces.append(trace | {
+            'name': name, 'legendgroup': name, 'showlegend': first, 'legendrank': 2 + k,
+            'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',
+        })  # fmt: skip
+    traces.append(
+        scatter(at_mm, measured, 'markers', name='measured, bars: 95 % gauge noise',
+                legendgroup='measured', showlegend=first, legendrank=1,
+                marker={'size': 5, 'color': INK}, error_y=_bars(data, p, INK),
+                hovertemplate='measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>')
+    )  # fmt: skip
     return traces
 
 
-def _residual_traces(data: ReportData, p: Profile, x: str, y: str) -> list[dict]:
+def _residual_traces(data: ReportData, p: Profile) -> list[dict]:
     """Measured minus predicted; the bars of the last are the gauge's noise."""
-    traces = []
-    for k, residual in enumerate(data.residuals_um):
-        last = k == len(data.models) - 1
-        colour = ACCENT if last else BEFORE
-        trace = {
-            'xaxis': x, 'yaxis': y, 'type': 'scatter', 'mode': 'lines+markers',
-            'x': 1e3 * p.position_m, 'y': residual[p.rows], 'showlegend': False,
-            'marker': {'size': 4.5, 'color': colour}, 'line': {'width': 1, 'color': colour},
-            'hovertemplate': 'residual %{y:+.2f} µm<extra></extra>',
-        }  # fmt: skip
-        if last:
-            trace['error_y'] = _bars(data, p) | {'color': ACCENT}
-        traces.append(trace)
-    return traces
+    traces = [
+        scatter(1e3 * p.position_m, residual[p.rows], 'lines+markers',
+                marker={'size': 4.5, 'color': colour}, line={'width': 1, 'color': colour},
+                hovertemplate='residual %{y:+.2f} µm<extra></extra>')
+        for residual, colour in zip(
+            reversed(data.residuals_um), (ACCENT, BEFORE), strict=False
+        )
+    ]  # fmt: skip
+    traces[0]['error_y'] = _bars(data, p, ACCENT)
+    return traces[::-1]
 
 
-def _bars(data: ReportData, p: Profile) -> dict[str, Any]:
+def _bars(data: ReportData, p: Profile, colour: str) -> dict[str, Any]:
     return {
         'type': 'data', 'array': TWO_SIDED_95 * data.study.sigma_um[p.rows],
-        'color': INK, 'thickness': 1, 'width': 0,
+        'color': colour, 'thickness': 1, 'width': 0,
     }  # fmt: skip
 
 

@@ -1,7 +1,8 @@
 """The report: one HTML file that needs no network, for the browser and for paper."""
 
 import json
-from collections.abc import Callable, Mapping, Sequence
+from base64 import b64encode
+from collections.abc import Callable
 from datetime import datetime
 from pathlib import Path
 from typing import Any
@@ -9,15 +10,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition import __version__
-from paint_deposition.comparison.comparison import Comparison
-from paint_deposition.diagnosis.next_experiment import Place, Spray
-from paint_deposition.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.provenance import git_version
-from paint_deposition.fitting.study import Study
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
@@ -30,28 +25,8 @@ TEMPLATES = Path(__file__).parent / 'templates'
 SPRAYS_SHOWN = 5
 
 
-def write_report(
-    path: str | Path,
-    study: Study,
-    models: Sequence[tuple[DepositionModel, Comparison]],
-    diagnosis: Diagnosis | None = None,
-    places: Sequence[Place] = (),
-    sprays: Sequence[Spray] = (),
-    older: Sequence[Mapping[str, Any]] = (),
-    library: Mapping[str, type[Effect]] = EFFECTS,
-) -> None:
-    """Write the report as one HTML file, whole or not at all.
-
-    Args:
-        path: where to.
-        study: the readings.
-        models: with their comparisons, base first, best last; one where nothing was added.
-        diagnosis: None after a comparison alone.
-        places, sprays: what to measure and spray next.
-        older: history of the model that a diagnosis started from, as in its file.
-        library: the effects that were looked for, by id, users' own among them.
-    """
-    data = ReportData.of(study, models, diagnosis, places, sprays, older, library)
+def write_report(path: str | Path, data: ReportData) -> None:
+    """Write the report as one HTML file, whole or not at all."""
     write_text(path, report_html(data))
 
 
@@ -69,12 +44,28 @@ def report_html(data: ReportData) -> str:
         'signed': lambda value: words.micrometres(value, signed=True).removesuffix(' µm'),
         'whole': lambda value: words.minus(f'{value:.0f}'),
         'p': words.p_words,
+        'percent': percent,
         'in_print': words.in_print,
         'effect': words.effect_name,
+        'step': words.step_words,
     }
     environment.filters.update(filters)
-    scenes = [scene_data(data, k) for k in range(len(data.experiments))]
-    figures = _figures(data)
+    numbers = range(len(data.experiments))
+    drawn = [
+        *(profile_figure(data, k) for k in numbers),
+        charts.parity_figure(data),
+        charts.covariate_figure(data),
+        charts.history_figure(data),
+        charts.unknown_figure(data),
+    ]
+    figures = [figure for figure in drawn if figure]
+    content = {
+        'scenes': [scene_data(data, k) for k in numbers],
+        'first': _most_telling(data),
+        'places': [places_scene(data, k) for k in numbers],
+        'figures': figures,
+    }
+    places, sprays = data.proposals
     return environment.get_template('report.html.j2').render(
         data=data,
         headline=headline(data),
@@ -84,39 +75,17 @@ def report_html(data: ReportData) -> str:
         effects=tables.effect_rows(data),
         pattern=tables.pattern_rows(data),
         blind=tables.blind_rows(data),
-        history=tables.history_rows(data),
         misfits=tables.misfit_rows(data),
-        sprays=data.sprays[:SPRAYS_SHOWN],
+        places=places,
+        sprays=sprays[:SPRAYS_SHOWN],
         provenance=_provenance(),
         lined=all(len(p.line_m) for p in data.profiles),
-        figures=[f['name'] for f in figures],
-        content=_as_json(
-            {
-                'scenes': scenes,
-                'first': _most_telling(data),
-                'places': _places(data),
-                'figures': figures,
-            }
-        ),
+        figures=[figure['name'] for figure in figures],
+        content=_as_json(content),
         style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
     )
-
-
-def _figures(data: ReportData) -> list[dict[str, Any]]:
-    found = [
-        *(profile_figure(data, k) for k in range(len(data.experiments))),
-        charts.parity_figure(data),
-        charts.covariate_figure(data),
-        charts.history_figure(data),
-        charts.unknown_figure(data),
-    ]
-    return [f for f in found if f is not None]
-
-
-def _places(data: ReportData) -> list[dict[str, Any] | None]:
-    return [places_scene(data, k) for k in range(len(data.experiments))]
 
 
 def _most_telling(data: ReportData) -> int:
@@ -143,22 +112,10 @@ def _as_json(content: Any) -> str:
 
 
 def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in 'fiu':
-        return _typed_array(value)
-    if isinstance(value, np.ndarray):
+    if isinstance(value, np.ndarray) and value.ndim == 1:
+        kind = 'f4' if value.dtype.kind == 'f' else 'i4'
+        little = value.astype(f'<{kind}').tobytes()
+        return {'dtype': kind, 'bdata': b64encode(little).decode('ascii')}
+    if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
-    if isinstance(value, np.generic):
-        return value.item()
     raise TypeError(f'{type(value).__name__} cannot be written into the report')
-
-
-def _typed_array(values: np.ndarray) -> dict[str, str]:
-    from base64 import b64encode
-
-    if values.dtype == np.float64:
-        values = values.astype(np.float32)
-    if values.dtype == np.int64:
-        values = values.astype(np.int32)
-    kind = f'{values.dtype.kind}{values.dtype.itemsize}'
-    little = values.astype(values.dtype.newbyteorder('<'))
-    return {'dtype': kind, 'bdata': b64encode(little.tobytes()).decode('ascii')}

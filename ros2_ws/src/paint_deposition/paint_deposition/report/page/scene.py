@@ -21,7 +21,7 @@ SURFACE = '#c3c9cf'
 # Few readings beyond the end of the colours do not take the contrast from all others.
 SHOWN_SHARE = 0.98
 POINTS_A_PASS = 60
-RESIDUAL = 'measured minus predicted [µm]'
+RESIDUAL, FILM = 'measured minus predicted [µm]', 'film [µm]'
 # Marks float this far above the surface, so that it does not swallow half of them [m].
 LIFT_M = 0.008
 # Bare surface shows its relief; film and residual have the colours of their scale.
@@ -40,173 +40,161 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
     Each trace has ``views``, those in which it is shown, and ``geometry``, the faces it has.
     """
     experiment, rows = data.experiments[index], data.rows_of(index)
-    points, surface = experiment.points, experiment.surface
-    count = len(experiment)
-    positions, normals = points.positions_m[:count], points.normals[:count]
+    surface, painted = experiment.surface, data.painted[index]
+    positions, normals = _places_of(experiment)
     fields = [spread_over_surface(surface, positions, normals, r[rows]) for r in data.residuals_um]
     near = np.isfinite(fields[0])[surface.faces].all(axis=1)
     traces = []
-    last = len(data.models) - 1
-    for pane, k in enumerate((0, last) if data.improved else (last,)):
-        scene = {'scene': f'scene{pane + 1 if pane else ""}'}
-        traces += [
-            _mesh('far', ['residual'], color=SURFACE) | scene,
-            _mesh('near', ['residual'], intensity=_f32(fields[k]), coloraxis='coloraxis') | scene,
-            _mesh('all', ['film'], intensity=_f32(data.surfaces_um[index][k]),
-                  coloraxis='coloraxis2') | scene,
-            _readings(data, positions + LIFT_M * normals, rows, k) | scene,
-        ]  # fmt: skip
-        traces += [trace | scene for trace in _passes(experiment.path)]
-    views = [
-        _view('residual', 'Residual', RESIDUAL, [f'residual {when}' for when in _times(data)]),
-        _view('film', 'Film', 'film [µm]', [f'film predicted {when}' for when in _times(data)]),
-    ]
-    if data.improved:
-        views.append(
-            _view('change', 'What was missing', 'residual, and change of the model [µm]',
-                  ['residual before', 'what the model gained'])
-        )  # fmt: skip
-        gained = data.gained_um[index]
-        traces[0]['views'].append('change')
-        traces[1]['views'].append('change')
-        traces[3]['views'].append('change')
-        traces.append(
-            _mesh('all', ['change'], intensity=_f32(gained), coloraxis='coloraxis')
-            | {'scene': 'scene2'}
-        )
+    for k, scene in enumerate(('scene', 'scene2')[: len(data.models)]):
+        # What the model gained is set beside the residual before.
+        views = ['residual', 'change'] if data.improved and k == 0 else ['residual']
+        panes = [
+            _mesh('far', views, color=SURFACE),
+            _mesh('near', views, intensity=fields[k], coloraxis='coloraxis'),
+            _mesh('all', ['film'], intensity=painted[k].film_um, coloraxis='coloraxis2'),
+            _readings(data, positions + LIFT_M * normals, rows, k) | {'views': views},
+            *_passes(experiment.path),
+        ]
+        if k:
+            gained = painted[k].gauge_um - painted[0].gauge_um
+            panes.append(_mesh('all', ['change'], intensity=gained, coloraxis='coloraxis'))
+        traces += [trace | {'scene': scene} for trace in panes]
+    times = (' before', ' after') if data.improved else ('',)
+    views_shown = [
+        ('residual', 'Residual', RESIDUAL, [f'Residual{when}' for when in times]),
+        ('film', 'Film', FILM, [f'Film predicted{when}' for when in times]),
+        ('change', 'What was missing', 'residual, and change of the model [µm]',
+         ['Residual before', 'What the model gained']),
+    ]  # fmt: skip
     return {
         'name': experiment.name,
         'geometry': _geometry(surface, near),
         'data': traces,
         'layout': _layout(data, experiment),
-        'views': views,
+        'views': [
+            dict(zip(('key', 'label', 'bar', 'titles'), view, strict=True))
+            for view in views_shown[: 3 if data.improved else 2]
+        ],
     }
 
 
 def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
     """The part with what was measured and what to measure next; None where nothing is."""
-    experiment = data.experiments[index]
-    numbered = [(k + 1, p) for k, p in enumerate(data.places) if p.experiment == experiment.name]
+    experiment, (places, _) = data.experiments[index], data.proposals
+    numbered = [(k, p) for k, p in enumerate(places, start=1) if p.experiment == experiment.name]
     if not numbered:
         return None
-    count = len(experiment)
-    points = experiment.points
-    measured = points.positions_m[:count] + LIFT_M * points.normals[:count]
+    positions, normals = _places_of(experiment)
     wanted = np.array([place.position_m for _, place in numbered])
-    lifted = wanted + 2.0 * LIFT_M * experiment.surface.outward
     traces = [
-        _mesh('all', ['places'], color=SURFACE),
-        {'type': 'scatter3d', **_xyz(measured), 'mode': 'markers', 'name': 'measured',
-         'marker': {'size': 3, 'color': MUTED}, 'hoverinfo': 'skip', 'views': ['places']},
-        {'type': 'scatter3d', **_xyz(lifted), 'mode': 'markers+text', 'name': 'to measure',
-         'text': [f'<b>{number}</b>' for number, _ in numbered],
-         'textposition': 'top center', 'textfont': {'size': 14, 'color': ACCENT},
-         'marker': {'size': 7, 'symbol': 'diamond', 'color': ACCENT,
-                    'line': {'color': 'white', 'width': 1}},
-         'customdata': np.round(wanted, 4),
-         'hovertemplate': '%{customdata[0]:.3f}, %{customdata[1]:.3f}, %{customdata[2]:.3f} m'
-                          '<extra>measure</extra>', 'views': ['places']},
+        _mesh('all', [], color=SURFACE),
+        _marks(positions + LIFT_M * normals, name='measured', hoverinfo='skip',
+               marker={'size': 3, 'color': MUTED}),
+        _marks(wanted + 2.0 * LIFT_M * experiment.surface.outward, mode='markers+text',
+               name='to measure', text=[f'<b>{number}</b>' for number, _ in numbered],
+               textposition='top center', textfont={'size': 14, 'color': ACCENT},
+               marker={'size': 7, 'symbol': 'diamond', 'color': ACCENT,
+                       'line': {'color': 'white', 'width': 1}},
+               customdata=np.round(wanted, 4),
+               hovertemplate='%{customdata[0]:.3f}, %{customdata[1]:.3f}, %{customdata[2]:.3f} m'
+                             '<extra>measure</extra>'),
     ]  # fmt: skip
-    layout = base_layout(margin={'l': 0, 'r': 0, 't': 0, 'b': 0}, height=420, showlegend=False)
-    return {
-        'name': experiment.name,
-        'data': traces,
-        'layout': layout
-        | {'scene': _scene(experiment, [0.0, 1.0], experiment.surface.vertices_m, PANE_ASPECT)},
-        'views': [],
-    }
+    scene = _scene(experiment, [0.0, 1.0], experiment.surface.vertices_m, PANE_ASPECT)
+    return {'data': traces, 'layout': _scene_layout(420, 0, 0, scene=scene)}
 
 
-def _times(data: ReportData) -> tuple[str, ...]:
-    return ('before', 'after') if data.improved else ('',)
-
-
-def _view(key: str, label: str, bar: str, titles: list[str]) -> dict[str, Any]:
-    titles = [title.strip().capitalize() for title in titles]
-    return {'key': key, 'label': label, 'bar': bar, 'titles': titles}
+def _places_of(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+    """(P, 3) positions of the readings' points [m] and (P, 3) normals there."""
+    points, count = experiment.points, len(experiment)
+    return points.positions_m[:count], points.normals[:count]
 
 
 def _geometry(surface: Surface, near: np.ndarray) -> dict[str, Any]:
-    kind = np.uint16 if len(surface.vertices_m) < 2**16 else np.int32
     faces = {'all': surface.faces, 'near': surface.faces[near], 'far': surface.faces[~near]}
     return {'vertices': _xyz(surface.vertices_m)} | {
-        name: {axis: chosen[:, k].astype(kind) for k, axis in enumerate('ijk')}
-        for name, chosen in faces.items()
+        name: dict(zip('ijk', chosen.T, strict=True)) for name, chosen in faces.items()
     }
 
 
-def _mesh(faces: str, views: list[str], **more: Any) -> dict[str, Any]:
-    trace = {
-        'type': 'mesh3d', 'geometry': faces, 'views': views, 'flatshading': False,
-        'lighting': SHADED if 'color' in more else TRUE_COLOURS,
-        'hoverinfo': 'skip',
-    }  # fmt: skip
-    if 'intensity' in more:
-        trace |= {'hovertemplate': '%{intensity:.2f} µm<extra></extra>', 'hoverinfo': 'all'}
-    return trace | more
+def _mesh(faces: str, views: list[str], **look: Any) -> dict[str, Any]:
+    """Faces of the part in one colour, or coloured by the intensity at their vertices."""
+    if 'intensity' in look:
+        hover = {'lighting': TRUE_COLOURS, 'hovertemplate': '%{intensity:.2f} µm<extra></extra>'}
+    else:
+        hover = {'lighting': SHADED, 'hoverinfo': 'skip'}
+    return {'type': 'mesh3d', 'geometry': faces, 'views': views} | hover | look
+
+
+def _marks(points_m: np.ndarray, **look: Any) -> dict[str, Any]:
+    return {'type': 'scatter3d', 'mode': 'markers', **_xyz(points_m), **look}
 
 
 def _readings(data: ReportData, lifted_m: np.ndarray, rows: slice, k: int) -> dict[str, Any]:
     residual = data.residuals_um[k][rows]
     measured = data.study.measured_um[rows]
-    return {
-        'type': 'scatter3d', **_xyz(lifted_m), 'mode': 'markers', 'views': ['residual'],
-        'marker': {'size': 4.5, 'color': _f32(residual), 'coloraxis': 'coloraxis',
-                   'line': {'color': INK, 'width': 1}},
-        'customdata': np.round(np.column_stack([measured, measured - residual]), 2),
-        'hovertemplate': 'measured %{customdata[0]:.2f} µm<br>predicted %{customdata[1]:.2f} µm'
-                         '<br>residual %{marker.color:+.2f} µm<extra></extra>',
-    }  # fmt: skip
+    return _marks(
+        lifted_m,
+        marker={'size': 4.5, 'color': residual, 'coloraxis': 'coloraxis',
+                'line': {'color': INK, 'width': 1}},
+        customdata=np.round(np.column_stack([measured, measured - residual]), 2),
+        hovertemplate='measured %{customdata[0]:.2f} µm<br>predicted %{customdata[1]:.2f} µm'
+                      '<br>residual %{marker.color:+.2f} µm<extra></extra>',
+    )  # fmt: skip
 
 
 def _passes(path: SprayPath) -> list[dict[str, Any]]:
     """Spraying passes as lines, numbered where they begin."""
+    spraying = path.select(path.flow > 0.0)
     line: list[np.ndarray] = []
-    starts, labels = [], []
-    for number in np.unique(path.spray_pass[path.spray_pass >= 0]):
-        rows = np.flatnonzero((path.spray_pass == number) & (path.flow > 0.0))
-        if not len(rows):
-            continue
-        chosen = rows[np.linspace(0, len(rows) - 1, min(POINTS_A_PASS, len(rows))).astype(int)]
-        line += [path.position_m[chosen], np.full((1, 3), np.nan)]
-        starts.append(path.position_m[rows[0]])
-        labels.append(str(number + 1))
+    starts: dict[str, np.ndarray] = {}
+    for number in np.unique(spraying.spray_pass[spraying.spray_pass >= 0]):
+        way_m = spraying.position_m[spraying.spray_pass == number]
+        chosen = np.linspace(0, len(way_m) - 1, min(POINTS_A_PASS, len(way_m))).astype(int)
+        line += [way_m[chosen], np.full((1, 3), np.nan)]
+        starts[str(number + 1)] = way_m[0]
     if not line:
         return []
-    views = ['residual', 'film', 'change']
+    shown = {'passes': True, 'views': ['residual', 'film', 'change']}
     return [
-        {'type': 'scatter3d', **_xyz(np.concatenate(line)), 'mode': 'lines', 'passes': True,
-         'line': {'color': MUTED, 'width': 2.5}, 'hoverinfo': 'skip', 'views': views},
-        {'type': 'scatter3d', **_xyz(np.array(starts)), 'mode': 'markers+text', 'text': labels,
-         'textposition': 'middle left', 'textfont': {'size': 12, 'color': INK}, 'passes': True,
-         'marker': {'size': 3, 'color': INK}, 'views': views,
-         'hovertemplate': 'pass %{text} begins<extra></extra>'},
+        _marks(np.concatenate(line), mode='lines', line={'color': MUTED, 'width': 2.5},
+               hoverinfo='skip', **shown),
+        _marks(np.array(list(starts.values())), mode='markers+text', text=list(starts),
+               textposition='middle left', textfont={'size': 12, 'color': INK},
+               marker={'size': 3, 'color': INK},
+               hovertemplate='pass %{text} begins<extra></extra>', **shown),
     ]  # fmt: skip
 
 
 def _layout(data: ReportData, experiment: Experiment) -> dict[str, Any]:
     absolute = np.abs(np.concatenate(data.residuals_um))
     reach = round_up(float(np.quantile(absolute, SHOWN_SHARE)))
-    films = [film for part in data.surfaces_um for film in part]
+    films = [painted.film_um for part in data.painted for painted in part]
     thickest = round_up(max(float(film.max()) for film in films))
+    spraying = experiment.path.position_m[experiment.path.flow > 0.0]
+    shown = np.concatenate([experiment.surface.vertices_m, spraying])
+    domains = [[0.0, 0.497], [0.503, 1.0]] if data.improved else [[0.0, 1.0]]
+    aspect = PANE_ASPECT * 2.0 / len(domains)
+    scenes = [_scene(experiment, domain, shown, aspect) for domain in domains]
+    return _scene_layout(
+        520, 30, 70,
+        coloraxis=_colours(RESIDUAL, RESIDUAL_COLOURS, -reach, reach),
+        coloraxis2=_colours(FILM, FILM_COLOURS, 0.0, thickest),
+        **dict(zip(('scene', 'scene2'), scenes, strict=False)),
+    )  # fmt: skip
+
+
+def _scene_layout(height: int, top: int, bottom: int, **more: Any) -> dict[str, Any]:
+    margin = {'l': 0, 'r': 0, 't': top, 'b': bottom}
+    return base_layout(margin=margin, height=height, showlegend=False, **more)
+
+
+def _colours(title: str, scale: list[list[Any]], low: float, high: float) -> dict[str, Any]:
     bar = {
         'orientation': 'h', 'thickness': 12, 'len': 0.5, 'x': 0.5, 'xanchor': 'center',
         'y': 0.0, 'yanchor': 'top', 'outlinewidth': 0, 'tickfont': {'size': 11, 'color': MUTED},
+        'title': {'text': title, 'side': 'bottom'},
     }  # fmt: skip
-    layout = base_layout(
-        margin={'l': 0, 'r': 0, 't': 30, 'b': 70}, height=520, showlegend=False,
-        coloraxis={'cmin': -reach, 'cmax': reach, 'colorscale': RESIDUAL_COLOURS,
-                   'colorbar': bar | {'title': {'text': RESIDUAL, 'side': 'bottom'}}},
-        coloraxis2={'cmin': 0, 'cmax': thickest, 'colorscale': FILM_COLOURS,
-                    'colorbar': bar | {'title': {'text': 'film [µm]', 'side': 'bottom'}}},
-    )  # fmt: skip
-    domains = [[0.0, 0.497], [0.503, 1.0]] if data.improved else [[0.0, 1.0]]
-    spraying = experiment.path.position_m[experiment.path.flow > 0.0]
-    shown = np.concatenate([experiment.surface.vertices_m, spraying])
-    for k, domain in enumerate(domains):
-        aspect = PANE_ASPECT * (1.0 if data.improved else 2.0)
-        layout[f'scene{k + 1 if k else ""}'] = _scene(experiment, domain, shown, aspect)
-    return layout
+    return {'cmin': low, 'cmax': high, 'colorscale': scale, 'colorbar': bar}
 
 
 def _scene(
@@ -241,16 +229,10 @@ def _scene(
     }
     return axes | {
         'domain': {'x': domain, 'y': [0.0, 1.0]},
-        'aspectmode': 'manual',
         'aspectratio': _named(extent / largest),
         'dragmode': 'turntable' if abs(up[2]) > 0.9 else 'orbit',
-        'camera': {
-            'eye': _named(distance * gaze),
-            'up': _named(up),
-            'center': {'x': 0, 'y': 0, 'z': 0},
-            'projection': {'type': 'perspective'},
-        },
-    }  # fmt: skip
+        'camera': {'eye': _named(distance * gaze), 'up': _named(up)},
+    }
 
 
 def _named(vector: np.ndarray) -> dict[str, float]:
@@ -258,8 +240,4 @@ def _named(vector: np.ndarray) -> dict[str, float]:
 
 
 def _xyz(points: np.ndarray) -> dict[str, np.ndarray]:
-    return {axis: points[:, k].astype(np.float32) for k, axis in enumerate('xyz')}
-
-
-def _f32(values: np.ndarray) -> np.ndarray:
-    return np.asarray(values, dtype=np.float32)
+    return dict(zip('xyz', points.T, strict=True))

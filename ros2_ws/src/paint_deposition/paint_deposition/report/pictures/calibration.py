@@ -7,17 +7,8 @@ from matplotlib.axes import Axes
 
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.pictures.chart import (
-    COMPONENTS,
-    MEASURED,
-    MM,
-    MODEL,
-    legend,
-    new_figure,
-    quiet,
-    save_png,
-)
-from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_png
+from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
 
 LINE_POINTS = 600
 
@@ -60,7 +51,9 @@ def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
         standoff_m=panel.distance_m,
         travel_rad=panel.travel_rad,
     )
-    axes.plot(MM * x, own.thickness_um(x), color=MODEL, linewidth=1.6, label='2D model, collapsed')
+    axes.plot(
+        MM * x, own.thickness_um(x), color=ACCENT, linewidth=1.6, label='2D model, collapsed'
+    )
     axes.set_xlim(MM * x[0], MM * x[-1])
     axes.set_ylim(bottom=0.0)
     legend(axes, loc='upper right')
@@ -82,12 +75,12 @@ def draw_panel(axes: Axes, calibration: Calibration, number: int, one: PanelFit)
         axes.axvline(MM * line, color=MUTED, linewidth=0.8, linestyle=':')
     across = np.linspace(panel.across_m.min(), panel.across_m.max(), LINE_POINTS)
     axes.plot(
-        MM * (across - middle), panel.film_um(calibration.model, across), color=MODEL,
+        MM * (across - middle), panel.film_um(calibration.model, across), color=ACCENT,
         linewidth=1.8, label='model',
     )  # fmt: skip
     axes.errorbar(
         MM * (panel.across_m - middle), measured, study.sigma_um[rows],
-        fmt='o', color=MEASURED, markersize=3.5, linewidth=0.8, label='measured',
+        fmt='o', color=INK, markersize=3.5, linewidth=0.8, label='measured',
     )  # fmt: skip
     axes.set_ylim(bottom=0.0)
 
@@ -100,7 +93,7 @@ def draw_agreement(
     top = 1.08 * float(max(predicted_um.max(), measured_um.max()))
     axes.plot([0.0, top], [0.0, top], color=MUTED, linewidth=0.9, linestyle='--')
     axes.errorbar(
-        predicted_um, measured_um, sigma_um, fmt='o', color=MODEL, markersize=3.5, linewidth=0.8
+        predicted_um, measured_um, sigma_um, fmt='o', color=ACCENT, markersize=3.5, linewidth=0.8
     )
     axes.set_xlim(0.0, top)
     axes.set_ylim(0.0, top)

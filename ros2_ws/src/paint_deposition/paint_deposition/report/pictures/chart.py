@@ -8,13 +8,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from paint_deposition.files.atomic import replacing
-from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED
+from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
 
 DOTS_PER_INCH = 150
 MM = 1e3
-MEASURED = INK
-MODEL = ACCENT
-COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:

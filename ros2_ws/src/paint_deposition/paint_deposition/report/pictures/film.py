@@ -16,7 +16,7 @@ from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 
 from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, FilmStatistics
+from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
@@ -44,8 +44,8 @@ def write_door_picture(
     film_um: np.ndarray,
     spray: SprayPath,
     statistics: FilmStatistics,
-    title: str = 'Film',
-    subtitle: str = '',
+    title: str,
+    subtitle: str,
 ) -> Path:
     """Draw a painted part with the figures of its film, replacing an older picture at once.
 
@@ -56,7 +56,7 @@ def write_door_picture(
         statistics: of the film.
         title, subtitle: what to write above.
     """
-    low, high = _window(surface, spray, View.of_surface(surface))
+    low, high = _window(surface, spray, View.of_front(surface.outward, surface.down))
     figure, axes = _canvas(high - low)
     scale = draw_film(axes, surface, film_um, spray, statistics.painted_above_um)
     axes.set_title(title, loc='left', fontsize=13, color=INK, pad=24)
@@ -73,21 +73,21 @@ def draw_film(
     axes: Axes,
     surface: Surface,
     film_um: np.ndarray,
-    spray: SprayPath | None = None,
-    painted_above_um: float = DEFAULT_PAINTED_ABOVE_UM,
+    spray: SprayPath,
+    painted_above_um: float,
 ) -> ColourScale:
     """Draw a painted part on axes of your own, seen from the gun's side.
 
     Args:
         axes: their limits, aspect and labels are set.
         film_um: (V,) film at the vertices of the surface [um].
-        spray: the tool path, drawn over the part if given.
+        spray: the tool path, drawn over the part.
         painted_above_um: film that counts as painted; less is shown as bare metal.
 
     Returns:
         The scale of the colours.
     """
-    view, spray = View.of_surface(surface), spray or SprayPath.empty()
+    view = View.of_front(surface.outward, surface.down)
     scale = film_scale(film_um)
     low, high = _window(surface, spray, view)
     _dress(axes, view, low, high)

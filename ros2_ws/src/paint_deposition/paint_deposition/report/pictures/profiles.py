@@ -1,15 +1,12 @@
 """Profiles by column, measured, before and after, as a picture for paper and web."""
 
-from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.comparison.profiles import Profile
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_png
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
@@ -17,40 +14,26 @@ from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_
 TEXT_PT = 8.0
 
 
-def write_comparison_picture(
-    path: str | Path, study: Study, models: Sequence[tuple[DepositionModel, Comparison]]
-) -> Path:
-    """Write the film along each column or row, and the residual below it, as PNG.
-
-    Args:
-        path: where to; replaced whole or not at all.
-        study: the readings.
-        models: with their comparisons, base first, best last.
-    """
-    data = ReportData.of(study, models)
+def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
+    """Write the film along each column or row, and the residual below it, as PNG."""
     columns = charts_a_row(len(data.profiles))
     rows = -(-len(data.profiles) // columns)
     figure = new_figure(3.4 * columns + 0.4, 2.9 * rows + 0.9)
     cells = figure.add_gridspec(rows, columns)
-    films: list[Axes] = []
-    residuals: list[Axes] = []
+    film, residual = None, None
     for k, profile in enumerate(data.profiles):
         cell = cells[k // columns, k % columns].subgridspec(2, 1, height_ratios=(3, 1))
-        films.append(figure.add_subplot(cell[0], sharey=films[0] if films else None))
-        residuals.append(
-            figure.add_subplot(
-                cell[1], sharex=films[-1], sharey=residuals[0] if residuals else None
-            )
-        )
-        draw_profile(films[-1], data, profile)
-        draw_residual(residuals[-1], data, profile)
-        films[-1].set_xlabel('')
-        films[-1].tick_params(labelbottom=False)
+        film = figure.add_subplot(cell[0], sharey=film)
+        residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
+        draw_profile(film, data, profile)
+        draw_residual(residual, data, profile)
+        film.set_xlabel('')
+        film.tick_params(labelbottom=False)
         if k % columns:
-            for axes in (films[-1], residuals[-1]):
+            for axes in (film, residual):
                 axes.set_ylabel('')
                 axes.tick_params(labelleft=False)
-    handles, labels = films[0].get_legend_handles_labels()
+    handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc='outside upper left', ncols=len(labels), fontsize=9, frameon=False
     )
@@ -70,20 +53,17 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
     )  # fmt: skip
     for k, label in enumerate(data.model_names):
         last = k == len(data.models) - 1
-        colour = ACCENT if last else INK
         # The thin line lies over the bold one, so that both are seen where they agree.
-        order = 3 - 0.1 * k
+        style: dict[str, Any] = {
+            'color': ACCENT if last else INK,
+            'label': label,
+            'zorder': 3 - 0.1 * k,
+        }
         if len(line_mm):
-            axes.plot(
-                line_mm, profile.lines_um[k], color=colour, lw=3 if last else 1, label=label,
-                zorder=order,
-            )  # fmt: skip
+            axes.plot(line_mm, profile.lines_um[k], lw=3 if last else 1, **style)
         else:
             predicted = measured - data.residuals_um[k][profile.rows]
-            axes.plot(
-                at_mm, predicted, 'o', ms=4, mfc=ACCENT if last else 'none', mec=colour,
-                label=label, zorder=order,
-            )  # fmt: skip
+            axes.plot(at_mm, predicted, 'o', ms=4, fillstyle='full' if last else 'none', **style)
     for number, single in enumerate(profile.passes_um):
         label = '' if number else 'each pass alone'
         axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)

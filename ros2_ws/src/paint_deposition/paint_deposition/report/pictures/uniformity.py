@@ -6,15 +6,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import (
-    MM,
-    MODEL,
-    legend,
-    new_figure,
-    quiet,
-    save_png,
-)
-from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_png
+from paint_deposition.report.style import ACCENT, INK, MUTED
 
 PERCENT = 100.0
 POINTS = 600
@@ -47,12 +40,12 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color=WITHIN_TOLERANCE, linewidth=0.0, zorder=0)
     axes.plot(
-        MM * answer.curve.index_m, PERCENT * answer.curve.sigma_n, color=MODEL, linewidth=1.8
+        MM * answer.curve.index_m, PERCENT * answer.curve.sigma_n, color=ACCENT, linewidth=1.8
     )
     for minimum in answer.minima:
         axes.plot(
             MM * minimum.index_m, PERCENT * minimum.sigma_n, 'o', markersize=5,
-            markerfacecolor='white', markeredgecolor=MODEL, markeredgewidth=1.5,
+            markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
         )  # fmt: skip
     chosen = MM * answer.index_m, PERCENT * answer.sigma_n
     axes.plot(*chosen, 'o', color=CHOSEN, markersize=7)
@@ -82,7 +75,7 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
                 label='single pass' if number == 0 else None,
             )  # fmt: skip
     total = parallel.thickness_um(index, x)
-    axes.plot(MM * x, total, color=MODEL, linewidth=1.8, label='sum of passes')
+    axes.plot(MM * x, total, color=ACCENT, linewidth=1.8, label='sum of passes')
     axes.axhline(
         answer.mean_um, color=INK, linewidth=0.9, linestyle='--',
         label=f'mean {answer.mean_um:.1f} µm',

@@ -4,8 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.part.surface import Surface
-
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
 
@@ -24,11 +22,6 @@ class View:
     labels: tuple[str, str]
 
     @staticmethod
-    def of_surface(surface: Surface) -> 'View':
-        """From the gun's side of a part."""
-        return View.of_front(surface.outward, surface.down)
-
-    @staticmethod
     def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':
         """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
         toward, down = _snapped(outward), _snapped(down)
@@ -45,13 +38,12 @@ class View:
 
 
 def _snapped(direction: np.ndarray) -> np.ndarray:
-    largest = int(np.abs(direction).argmax())
+    largest = np.abs(direction).argmax()
     if abs(direction[largest]) < SNAP_COSINE:
         return direction
     return np.sign(direction[largest]) * np.eye(3)[largest]
 
 
 def _name(direction: np.ndarray, otherwise: str) -> str:
-    largest = int(np.abs(direction).argmax())
-    on_axis = abs(direction[largest]) > 1.0 - 1e-9
-    return f'{"xyz"[largest]} [m]' if on_axis else f'{otherwise} [m]'
+    along = np.isclose(np.abs(direction), 1.0, atol=1e-9)
+    return f'{"xyz"[along.argmax()] if along.any() else otherwise} [m]'
