@@ -37,17 +37,16 @@ from numba import njit
 
 from paint_deposition.effects.base import Ray
 from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.kernel.code_cache import CodeCache, identity
+from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.laws import product
 
 law = load_effect_file(sys.argv[1]).flux_factor
 factor = product([(law, 1)], float)
 
-@njit
-def compiled(ray, parameters):
+def scaled(ray, parameters):
     return factor(ray, parameters)
 
-compiled._cache = CodeCache(compiled.py_func, identity([law]))
+compiled = njit(cache=True)(named_for_its_code(scaled, [law]))
 print(compiled(Ray(0.1, 0.2, 1.7, 0.6, 0.4), (0.5,)))
 print(sum(compiled.stats.cache_hits.values()))
 """

@@ -147,7 +147,7 @@ def test_outputs_and_triggers_switch_the_gun(read):
     TriggL {target(1)},v600,on,z50,tBell;
     TriggL {target(2)},v600,off,z50,tBell;
     MoveL {target(3)},v600,z50,tBell;
-    SetDO doGun\SDelay:=0.1,high;
+    SetDO \SDelay:=0.1,doGun,high;
     MoveL {target(4)},v600,z50,tBell;
     Reset doGun;
     MoveLDO {target(5)},v600,z50,tBell,doGun,1;
@@ -176,7 +176,7 @@ def test_conditions_without_moves_do_no_harm(read):
     body = f"""
     IF TestDI(diReady) THEN
       WaitDI diReady,0;
-    ELSEIF reg1 > 3 THEN
+    ELSEIF reg1 > 3 + 1 THEN
       TPWrite "more ""than"" three \\Num:=" \\Num:=reg1;
     ELSE
       reg1 := 4;
