@@ -168,10 +168,11 @@ def compile_kernel(
         'shadowed': shadowed,
         'parameter_count': first_scale + sum(count for _, count in pattern_scales),
     }
-    block = njit(fastmath=True, error_model='numpy')(_variant(paint_block, names))
-    whole = _variant(accumulate, names | {'paint_block': block})
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
+    block = named_for_its_code(_variant(paint_block, names), laws, counts, shadowed, real.__name__)
+    block = njit(fastmath=True, error_model='numpy')(block)
+    whole = _variant(accumulate, names | {'paint_block': block})
     whole = named_for_its_code(whole, laws, counts, shadowed, real.__name__)
     options = {'parallel': True, 'nogil': True, 'fastmath': True, 'error_model': 'numpy'}
     return njit(cache=True, **options)(whole)

@@ -5,6 +5,8 @@ from types import FunctionType
 
 from numba.extending import register_jitable
 
+from paint_deposition.kernel.code_cache import named_for_its_code
+
 Law = Callable[..., float]
 
 
@@ -52,12 +54,14 @@ def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law
 
         return one
     (law, count), rest = laws[0], laws[1:]
-    head = register_jitable(in_precision(law, real))
+    variant = [count for _, count in laws], real.__name__, offset
+    functions = [law for law, _ in laws]
+    # Symbols of compiled code from different processes can share a name: each names its code.
+    head = register_jitable(named_for_its_code(in_precision(law, real), functions[:1], *variant))
     end = offset + count
     tail = product(rest, real, end)
 
-    @register_jitable
     def both(ray, parameters):
         return head(ray, *parameters[offset:end]) * tail(ray, parameters)
 
-    return both
+    return register_jitable(named_for_its_code(both, functions, *variant))
