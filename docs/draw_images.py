@@ -44,7 +44,7 @@ def paint(command: str, *arguments: object) -> None:
 def of_the_door(profiles: Image.Image) -> Image.Image:
     """The legend and the lower half, where the door's four columns are."""
     width, height = profiles.size
-    legend, door = int(0.035 * height), int(0.53 * height)
+    legend, door = int(0.045 * height), int(0.518 * height)
     picture = Image.new('RGB', (width, legend + height - door), 'white')
     picture.paste(profiles.crop((0, 0, width, legend)), (0, 0))
     picture.paste(profiles.crop((0, door, width, height)), (0, legend))

@@ -1,5 +1,8 @@
 """The picture of profiles: measured, before and after."""
 
+from dataclasses import replace
+
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from PIL import Image
@@ -8,7 +11,7 @@ from paint_deposition.comparison.comparison import compare
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.profiles import write_comparison_picture
+from paint_deposition.report.pictures.profiles import draw_profile, write_comparison_picture
 from paint_deposition.report.style import ACCENT
 from small_campaign import small_campaign
 
@@ -24,3 +27,16 @@ def test_columns_and_strips_are_drawn(tmp_path):
         accent = [int(ACCENT[k : k + 2], 16) for k in (1, 3, 5)]
         assert np.all(image == accent, axis=2).mean() > 2e-4
         assert min(image.shape[:2]) > 400
+
+
+@pytest.mark.slow
+def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
+    study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
+    data = ReportData((compare(study, DepositionModel()),))
+    thin = data.profiles[0]
+    thick = replace(thin, lines_um=2.0 * thin.lines_um)
+    figure, row = plt.subplots(1, 2, sharey=True)
+    for axes, profile in zip(row, (thin, thick), strict=True):
+        draw_profile(axes, data, profile)
+    assert row[0].get_ylim()[1] > thick.lines_um.max()
+    plt.close(figure)

@@ -33,6 +33,8 @@ def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
             for axes in (film, residual):
                 axes.set_ylabel('')
                 axes.tick_params(labelleft=False)
+    if film is not None:
+        film.set_ylim(bottom=0.0)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc='outside upper left', ncols=len(labels), fontsize=9, frameon=False
@@ -67,7 +69,7 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
     for number, single in enumerate(profile.passes_um):
         label = '' if number else 'each pass alone'
         axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(bottom=0.0, auto=None)  # Axes that share the scale may need more of it.
 
 
 def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
