@@ -113,6 +113,7 @@ def diagnosed(study, fit, *classes: EffectClass, accepted=()) -> Diagnosis:
     return Diagnosis(study, 'undecided', '', 0.01, accepted, classes, (step,))
 
 
+@pytest.mark.slow
 def test_the_rivals_are_the_leading_explanations(study, fit):
     shift = {'shift_down_m': Interval(0.03, 0.02, 0.04)}
     alone = EffectClass(('air_drift',), 0.6, 'air_drift', shift)

@@ -16,6 +16,7 @@ def demo(repository: Path, *arguments: object) -> subprocess.CompletedProcess:
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_a_folder_that_is_no_demo_is_left_alone(repository, tmp_path):
     (tmp_path / 'readings').mkdir()
     (tmp_path / 'readings/door.csv').write_text('years of work')

@@ -21,6 +21,8 @@ from .files import write
 from .gauge import GaugeNoise, layout
 from .shop import generate
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope='module')
 def campaign():

@@ -189,6 +189,7 @@ while True:
 """
 
 
+@pytest.mark.slow
 def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     run, tests = tmp_path / 'run', repository / 'tests'
     process = subprocess.Popen(
