@@ -11,7 +11,6 @@ from paint_deposition.api.simulation import Film
 from paint_deposition.comparison.comparison import Comparison
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.fitting.calibration import Calibration
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.calibration import draw_agreement
@@ -42,15 +41,10 @@ def _draw(result: Any, ax: Axes) -> None:
     raise TypeError(f'{type(result).__name__} is not a result that can be drawn')
 
 
-@_draw.register
-def _(result: Film, ax: Axes) -> None:
+@_draw.register(Film)
+@_draw.register(Plan)
+def _(result: Film | Plan, ax: Axes) -> None:
     draw_film(ax, result.surface, result.film_um, result.path, result.statistics.painted_above_um)
-
-
-@_draw.register
-def _(result: Plan, ax: Axes) -> None:
-    path, _ = spray_path(result.trajectory)
-    draw_film(ax, result.surface, result.film_um, path, result.statistics.painted_above_um)
 
 
 @_draw.register

@@ -14,7 +14,6 @@ from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.fitting.calibration import Calibration
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.data import ReportData
@@ -98,10 +97,9 @@ def _(result: Recommendation, folder: str | Path) -> list[Path]:
 def _(result: Plan, folder: str | Path, made_from: Mapping[str, Any] | None = None) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
     files = write_plan(folder, result, result.surface, about)
-    path, _ = spray_path(result.trajectory)
     picture = write_door_picture(
-        Path(folder) / 'film.png', result.surface, result.film_um, path, result.statistics,
-        'Planned passes and their film', result.sentence,
+        Path(folder) / 'film.png', result.surface, result.film_um, result.path,
+        result.statistics, 'Planned passes and their film', result.sentence,
     )  # fmt: skip
     return [*files, picture]
 

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import require_above_zero
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
@@ -113,6 +115,11 @@ class Plan:
     def cycle_time_s(self) -> float:
         """From the first pose to the last [s]."""
         return self.trajectory.duration_s
+
+    @cached_property
+    def path(self) -> SprayPath:
+        """The motion cut into sub-steps."""
+        return spray_path(self.trajectory)[0]
 
     @property
     def sentence(self) -> str:
