@@ -12,6 +12,8 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
+from paint_deposition.kernel.code_cache import named_for_its_code
+
 # Fused multiply-add only: the rest of fast-math would cancel the rounding to an integer.
 WITHOUT_REORDERING = {'fastmath': {'contract'}}
 
@@ -111,15 +113,14 @@ def _horner(terms: Sequence[float]) -> Callable[[float], float]:
     value = terms[0]
     if len(terms) == 1:
 
-        @register_jitable
         def constant(x):
             return value
 
-        return constant
+        return register_jitable(named_for_its_code(constant, [], terms))
     higher = _horner(terms[1:])
 
-    @register_jitable
     def nested(x):
         return value + x * higher(x)
 
-    return nested
+    # Symbols of compiled code from different processes can share a name: each names its terms.
+    return register_jitable(named_for_its_code(nested, [], terms))

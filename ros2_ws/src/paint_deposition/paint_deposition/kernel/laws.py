@@ -48,11 +48,10 @@ def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law
     """
     if not laws:
 
-        @register_jitable
         def one(ray, parameters):
             return real(1.0)
 
-        return one
+        return register_jitable(named_for_its_code(one, [], real.__name__))
     (law, count), rest = laws[0], laws[1:]
     variant = [count for _, count in laws], real.__name__, offset
     functions = [law for law, _ in laws]
