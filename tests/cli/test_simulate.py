@@ -148,6 +148,29 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel, one_pass,
     assert results[1][1] == results[0][1]
 
 
+def test_a_learned_law_changes_the_film_and_an_unknown_one_is_told_the_nearest(
+    panel, one_pass, tmp_path
+):
+    law = 'effects: [{id: learned, covariate: COVARIATE, high: 99.0, learned: [0.25, 0.25]}]'
+    films = []
+    for model in ('effects: []', law.replace('COVARIATE', 'time_s')):
+        (tmp_path / 'model.yaml').write_text(model)
+        out = tmp_path / f'out{len(films)}'
+        done = paint(
+            'simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE,
+            '--model', tmp_path / 'model.yaml', '-o', out,
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        films.append(np.genfromtxt(out / 'film.csv', delimiter=',', names=True)['thickness_um'])
+    assert np.allclose(films[1], 1.25 * films[0], atol=2e-3)
+    (tmp_path / 'model.yaml').write_text(law.replace('COVARIATE', 'tim_s'))
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
+        '-o', tmp_path / 'refused',
+    )  # fmt: skip
+    assert_refused(done, "'tim_s'; did you mean 'time_s'?")
+
+
 def test_older_results_are_replaced_whole(panel, one_pass, tmp_path):
     out = tmp_path / 'out'
     out.mkdir()

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.diagnosis.evidence import Hypothesis, NullModel
+from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
@@ -26,17 +26,23 @@ def linear_fit(random: np.random.Generator, count: int, data: np.ndarray | None 
     return fit_linear(jacobian, data)
 
 
-def fit_linear(jacobian: np.ndarray, data: np.ndarray) -> Fit:
+def fit_linear(
+    jacobian: np.ndarray, data: np.ndarray, parameters: FreeParameters = PARAMETERS
+) -> Fit:
     """The most probable values (ridge regression toward the priors)."""
-    centre, width = PARAMETERS.prior
+    centre, width = parameters.prior
     precision = jacobian.T @ jacobian + np.diag(width**-2.0)
     vector = np.linalg.solve(precision, jacobian.T @ data + centre / width**2)
     predicted = jacobian @ vector
     nuisance = np.empty((len(data), 0))
-    residual = data - predicted
     return Fit(
-        PARAMETERS, vector, DepositionModel(), predicted, residual, jacobian, True, nuisance
+        parameters, vector, parameters.start, predicted, data - predicted, jacobian, True, nuisance
     )
+
+
+def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
+    """The null hypothesis around a fit, with nuisance directions (P, n) or none."""
+    return NullModel.around(fit, frozenset(), fit.nuisance if nuisance is None else nuisance)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:
@@ -54,10 +60,3 @@ def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
     """Bounds of amplitudes with these signs, ten typical sizes wide."""
     sides = np.array(sides, dtype=float)
     return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)
-
-
-def hypothesis(null: NullModel, columns: np.ndarray, sides=None, **named) -> Hypothesis:
-    """Something missing along these directions of the readings."""
-    sides = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)
-    given = {'effects': ('x',), 'other': '', 'prior': 0.5} | named
-    return Hypothesis(columns=null.whiten(columns), sides=sides, **given)

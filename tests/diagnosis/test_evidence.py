@@ -2,11 +2,23 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import quad
+from scipy.integrate import dblquad, quad
+from scipy.special import log_ndtr
 from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
-from diagnosis.linear import deviation, hypothesis, linear_fit, prior_covariance
-from paint_deposition.diagnosis.evidence import Evidence, NullModel, simulated
+from diagnosis.linear import PARAMETERS, deviation, fit_linear, linear_fit, null_of
+from diagnosis.linear import prior_covariance as covariance_of
+from paint_deposition.diagnosis.evidence import (
+    KNOWN_NOISE,
+    NullModel,
+    log_bayes_factor,
+    log_normal_cdf,
+    simulated,
+)
+from paint_deposition.diagnosis.model_space import SIZES, _by_size
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 
 READINGS = 30
 
@@ -21,104 +33,157 @@ def columns():
     return np.random.default_rng(4).normal(size=(READINGS, 3))
 
 
+def log_factor(columns, deviations, sides=None, sizes=None, freedom=np.inf) -> float:
+    """The log Bayes factor of whitened directions (P, n) for whitened deviations (P,)."""
+    count = columns.shape[1]
+    return log_bayes_factor(
+        columns.T @ columns,
+        columns.T @ deviations,
+        float(deviations @ deviations),
+        np.zeros(count) if sides is None else np.array(sides, dtype=float),
+        np.ones(count) if sizes is None else np.array(sizes, dtype=float),
+        min(freedom, 2.0 * KNOWN_NOISE),
+        len(deviations),
+    )
+
+
 def test_whitening_makes_the_null_model_standard_normal(fit, columns):
-    null = NullModel.of(fit, columns)
-    covariance = prior_covariance(fit) + columns @ columns.T
+    null = null_of(fit, columns)
+    covariance = covariance_of(fit) + columns @ columns.T
     assert null.lower @ null.lower.T == pytest.approx(covariance)
     assert null.lower @ null.deviation == pytest.approx(deviation(fit))
 
 
+def test_some_of_the_readings_have_the_covariance_among_them(fit, columns):
+    null, rows = null_of(fit, columns), np.arange(READINGS) % 3 > 0
+    part = null.select(rows)
+    covariance = null.lower @ null.lower.T
+    assert part.lower @ part.lower.T == pytest.approx(covariance[np.ix_(rows, rows)])
+    assert part.lower @ part.deviation == pytest.approx(null.raw[rows])
+
+
+def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart():
+    """Its directions are no longer the null's, and the data are compared with those without it."""
+    random = np.random.default_rng(5)
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown())
+    names = parameters.names[len(PATTERN) :]
+    assert set(names) == {'corner_slowdown.gain', 'corner_slowdown.length_m'}
+    centre, width = parameters.prior
+    jacobian = random.normal(size=(READINGS, len(centre))) / width
+    jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
+    data = jacobian @ (centre + width * random.normal(size=len(width)))
+    fit = fit_linear(jacobian, data, parameters)
+    apart = NullModel.around(fit, frozenset(['corner_slowdown']), fit.nuisance)
+    without = fit_linear(jacobian[:, : len(PATTERN)], data, PARAMETERS)
+    assert apart.raw == pytest.approx(deviation(without))
+    assert apart.lower @ apart.lower.T == pytest.approx(covariance_of(without))
+    kept = NullModel.around(fit, frozenset(), fit.nuisance)
+    assert kept.lower @ kept.lower.T == pytest.approx(covariance_of(fit))
+
+
 def test_factor_is_the_ratio_of_gaussian_densities(fit, columns):
-    null = NullModel.of(fit)
-    without = prior_covariance(fit)
+    null, without = null_of(fit), covariance_of(fit)
+    sizes = np.array([0.5, 1.0, 2.0])
     expected = multivariate_normal.logpdf(
-        deviation(fit), cov=without + columns @ columns.T
+        deviation(fit), cov=without + (columns * sizes**2) @ columns.T
     ) - multivariate_normal.logpdf(deviation(fit), cov=without)
-    assert Evidence(hypothesis(null, columns)).log_bayes_factor(null.deviation) == pytest.approx(
-        expected
-    )
+    found = log_factor(null.whiten(columns), null.deviation, sizes=sizes)
+    assert found == pytest.approx(expected)
 
 
 @pytest.mark.parametrize('freedom', [6.0, 40.0])
 def test_factor_is_the_ratio_of_student_densities_where_the_noise_was_estimated(
     fit, columns, freedom
 ):
-    null = NullModel.of(fit)
-    without = prior_covariance(fit)
+    null, without = null_of(fit), covariance_of(fit)
     expected = multivariate_t.logpdf(
         deviation(fit), shape=without + columns @ columns.T, df=freedom
     ) - multivariate_t.logpdf(deviation(fit), shape=without, df=freedom)
-    evidence = Evidence(hypothesis(null, columns), freedom)
-    assert evidence.log_bayes_factor(null.deviation) == pytest.approx(expected)
+    found = log_factor(null.whiten(columns), null.deviation, freedom=freedom)
+    assert found == pytest.approx(expected)
 
 
 def test_many_degrees_of_freedom_are_a_known_noise(fit, columns):
-    null = NullModel.of(fit)
-    missing = hypothesis(null, columns)
-    known = Evidence(missing).log_bayes_factor(null.deviation)
-    assert Evidence(missing, 1e7).log_bayes_factor(null.deviation) == pytest.approx(
-        known, abs=1e-3
-    )
+    null = null_of(fit)
+    white = null.whiten(columns)
+    known = log_factor(white, null.deviation)
+    assert log_factor(white, null.deviation, freedom=1e7) == pytest.approx(known, abs=1e-3)
+    assert log_factor(white, null.deviation, freedom=10.0) != pytest.approx(known, abs=1e-3)
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])
 @pytest.mark.parametrize('strength', [-0.6, 0.0, 0.9])
 def test_factor_of_a_signed_amplitude_is_the_integral_over_its_side(fit, columns, side, strength):
-    null = NullModel.of(fit)
-    column = null.whiten(columns[:, :1])
+    null = null_of(fit)
+    column, size = null.whiten(columns[:, :1]), 1.4
     data = null.deviation + strength * column[:, 0]
 
     def likelihood_ratio(amplitude: float) -> float:
         left = data - amplitude * column[:, 0]
-        return np.exp(0.5 * (data @ data - left @ left)) * 2.0 * norm.pdf(amplitude)
+        return np.exp(0.5 * (data @ data - left @ left)) * 2.0 * norm.pdf(amplitude, scale=size)
 
     ends = sorted((0.0, 8.0 * side))
     integral, _ = quad(likelihood_ratio, *ends, points=[strength] if ends[0] < strength < ends[1]
                        else None, limit=200)  # fmt: skip
-    evidence = Evidence(hypothesis(null, columns[:, :1], [side]))
-    assert evidence.log_bayes_factor(data) == pytest.approx(np.log(integral), abs=1e-6)
+    found = log_factor(column, data, [side], [size])
+    assert found == pytest.approx(np.log(integral), abs=1e-6)
+
+
+def test_a_signed_amplitude_beside_free_ones_is_integrated_over_its_side():
+    """Two directions that are not orthogonal, the second of one sign."""
+    random = np.random.default_rng(6)
+    columns = random.normal(size=(8, 2)) * 0.5
+    columns[:, 1] += 0.5 * columns[:, 0]
+    data = random.normal(size=8) + columns @ [0.5, 1.0]
+
+    def likelihood_ratio(second: float, first: float) -> float:
+        left = data - columns @ [first, second]
+        prior = 2.0 * norm.pdf(first) * norm.pdf(second)
+        return np.exp(0.5 * (data @ data - left @ left)) * prior
+
+    integral, _ = dblquad(likelihood_ratio, -7.0, 7.0, 0.0, 7.0)
+    assert log_factor(columns, data, [0, 1]) == pytest.approx(np.log(integral), abs=1e-5)
 
 
 def test_the_wrong_sign_speaks_against_a_signed_amplitude(fit, columns):
-    null = NullModel.of(fit)
-    column = columns[:, :1]
-    data = null.deviation - 1.5 * null.whiten(column)[:, 0]
-    free = Evidence(hypothesis(null, column)).log_bayes_factor(data)
-    wrong = Evidence(hypothesis(null, column, [1.0])).log_bayes_factor(data)
-    right = Evidence(hypothesis(null, column, [-1.0])).log_bayes_factor(data)
+    null = null_of(fit)
+    column = null.whiten(columns[:, :1])
+    data = null.deviation - 1.5 * column[:, 0]
+    free, right, wrong = (log_factor(column, data, [side]) for side in (0.0, -1.0, 1.0))
     assert right == pytest.approx(free + np.log(2.0), abs=1e-3)
     assert wrong < 0.0 < free
 
 
-def test_amplitudes_are_those_of_ridge_regression(fit, columns):
-    null = NullModel.of(fit)
-    white = null.whiten(columns)
-    expected = np.linalg.solve(np.eye(3) + white.T @ white, white.T @ null.deviation)
-    evidence = Evidence(hypothesis(null, columns))
-    assert evidence.posterior_mean(null.deviation) == pytest.approx(expected)
+def test_the_normal_distribution_function_holds_far_out():
+    """Where it underflows, an expansion is used, which is good to 1 / x^2."""
+    x = np.array([-200.0, -31.0, -29.0, -5.0, 0.0, 3.0])
+    assert [log_normal_cdf(value) for value in x] == pytest.approx(log_ndtr(x), abs=2e-3)
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 12.0])
-@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, -1)])
-def test_many_deviations_at_once_are_those_one_by_one(fit, columns, freedom, sides):
-    null = NullModel.of(fit)
-    evidence = Evidence(hypothesis(null, columns, sides), freedom)
+@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, 0), (1, 0, -1)])
+def test_simulated_deviations_are_weighed_like_the_readings(columns, freedom, sides):
+    """Of many deviations at once and of one, at every size."""
     draws = simulated(READINGS, freedom, 5, seed=1)
-    together = evidence.log_bayes_factor(draws)
-    assert together == pytest.approx([evidence.log_bayes_factor(draw) for draw in draws.T])
+    sides = np.array(sides, dtype=float)
+    together = _by_size(columns, sides, draws, freedom)
+    assert together.shape == (len(SIZES), 5)
+    for size, row in zip(SIZES, together, strict=True):
+        one_by_one = [log_factor(columns, draw, sides, [size] * 3, freedom) for draw in draws.T]
+        assert row == pytest.approx(one_by_one, rel=1e-6)
 
 
-def test_no_column_is_no_evidence(fit):
-    null = NullModel.of(fit)
-    nothing = hypothesis(null, np.empty((READINGS, 0)))
-    assert Evidence(nothing).log_bayes_factor(null.deviation) == 0.0
+def test_directions_that_nearly_coincide_are_no_trouble():
+    column = np.random.default_rng(7).normal(size=(READINGS, 1))
+    data = 2.0 * column[:, 0]
+    twice = log_factor(np.hstack([column, column]) / np.sqrt(2.0), data)
+    assert twice == pytest.approx(log_factor(column, data), rel=1e-9)
 
 
-def test_a_factor_averages_to_one_where_nothing_is_missing(fit, columns):
+def test_a_factor_averages_to_one_where_nothing_is_missing(columns):
     """The defining property of a Bayes factor, whatever the sides and the noise."""
-    null = NullModel.of(fit)
-    evidence = Evidence(hypothesis(null, 0.1 * columns[:, :2], (1, 0)))
-    factors = np.exp(evidence.log_bayes_factor(simulated(READINGS, np.inf, 40_000, seed=2)))
+    draws = simulated(READINGS, np.inf, 40_000, seed=2)
+    factors = np.exp(_by_size(0.1 * columns[:, :2], np.array([1.0, 0.0]), draws, np.inf)[1])
     assert factors.mean() == pytest.approx(1.0, abs=4.0 * factors.std() / 200.0)
 
 

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LEARNED
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
@@ -122,6 +123,44 @@ def test_a_users_effect_is_found_beside_the_model_file(tmp_path: Path):
     write_model(path, model)
     assert yaml.safe_load(path.read_text())['effects'][0]['file'] == '../effects/my_effect.py'
     assert read_model(path) == model
+
+
+@pytest.mark.parametrize('law', LEARNED.values(), ids=LEARNED)
+def test_a_learned_law_reads_back_to_the_bit(law, tmp_path: Path):
+    curve = law(low=0.1, high=0.2 + 1e-9, kind=law.kinds[-1], learned=(0.1, -1.0 / 3.0, 1e-7))
+    path = tmp_path / 'model.yaml'
+    write_model(path, DepositionModel(effects=(curve,)))
+    assert read_model(path).effects == (curve,)
+    (entry,) = yaml.safe_load(path.read_text())['effects']
+    assert entry['id'] == 'learned'
+    assert entry['covariate'] == law.covariate
+    assert law.over in path.read_text()
+
+
+def test_two_learned_laws_stand_beside_each_other_and_what_they_leave_out_is_neutral(written):
+    path = written(
+        'effects: [{id: learned, covariate: time_s}, {id: learned, covariate: height_fraction}]'
+    )
+    effects = read_model(path).effects
+    assert [effect.id for effect in effects] == ['learned:time_s', 'learned:height_fraction']
+    assert all(effect.is_neutral for effect in effects)
+
+
+@pytest.mark.parametrize(
+    ('entry', 'message'),
+    [
+        ('covariate: tims_s', "'tims_s'; did you mean 'time_s'?"),
+        ('low: 1', 'has no covariate; give that of the learned law'),
+        ('covariate: 3', 'covariate is 3; expected text'),
+        ('covariate: time_s, high: -1', 'learned:time_s: high is -1; it must be above low, 0'),
+        ('covariate: time_s, learned: [1]', 'learned has 1 values; give two or more'),
+        ('covariate: time_s, learned: a', "learned is 'a'; expected a list of numbers"),
+        ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
+        ('covariate: time_s, heigh: 1', "unknown key 'heigh'; did you mean 'high'?"),
+    ],
+)
+def test_what_is_no_learned_law_is_said_in_one_line(written, entry: str, message: str):
+    assert message in refusal(written(f'effects: [{{id: learned, {entry}}}]'))
 
 
 def test_what_is_left_out_has_its_default(written):

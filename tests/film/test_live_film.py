@@ -1,10 +1,13 @@
 """The live film is the offline film, whatever way the motion comes in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LEARNED
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -14,6 +17,10 @@ from scenes import START_NS, lying_plane, stamps_ns, straight_pass, weaving
 MODEL = DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
 LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
+# Its film at a place depends on the time since the motion began.
+DRIFTING = MODEL.with_effect(
+    LEARNED['time_s'](low=0.0, high=4.0, learned=(0.0, 0.4, -0.3, 0.2, -0.5))
+)
 TIMES_S = np.arange(0.0, 4.0, 0.004)
 TRIGGERS = {
     'trigger_stamps_ns': stamps_ns([0.5013, 1.7502, 2.2]),
@@ -56,7 +63,9 @@ def _painted(events, model=MODEL, **options):
     return film
 
 
-@pytest.mark.parametrize('model', [MODEL, LAGGING], ids=['plain', 'whole strokes'])
+@pytest.mark.parametrize(
+    'model', [MODEL, LAGGING, DRIFTING], ids=['plain', 'whole strokes', 'over time']
+)
 @pytest.mark.parametrize('batch', [1, 7, 100, 5000])
 def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
     motion = weaving(TIMES_S)
@@ -67,6 +76,20 @@ def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
     assert np.array_equal(film.up_to_date().film_um, expected.film_um)
     assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
     assert expected.film_um.max() > 1.0
+
+
+def test_a_law_over_time_counts_from_the_start_of_the_motion():
+    """A factor over time changes the film; the clock of the recording does not matter."""
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film_um = _offline(motion, DRIFTING).film_um
+    assert np.abs(film_um - _offline(motion).film_um).max() > 0.1
+    hour = 3_600_000_000_000
+    later = replace(
+        motion,
+        stamps_ns=motion.stamps_ns + hour,
+        trigger_stamps_ns=motion.trigger_stamps_ns + hour,
+    )
+    assert np.array_equal(_offline(later, DRIFTING).film_um, film_um)
 
 
 def test_looking_at_the_film_changes_nothing():

@@ -7,9 +7,10 @@ from hypothesis import strategies as st
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LEARNED
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.fitting.parameters import PATTERN, SHAPE_DEVIATIONS, FreeParameters
 from paint_deposition.model.pattern import PlanarPattern
 
 PATTERNS = st.builds(
@@ -60,15 +61,56 @@ def test_amplitudes_count_in_their_typical_size():
     )
 
 
-def test_shapes_and_effects_that_are_not_varied_stay():
+def test_shapes_are_varied_on_a_logarithmic_scale():
+    """Neutral is the centre; the whole physical range is a few widths of the prior."""
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
+    assert parameters.names[len(PATTERN) :] == (
+        'corner_slowdown.gain',
+        'corner_slowdown.length_m',
+    )
+    vector = parameters.encode(parameters.start)
+    info = CornerSlowdown.parameters()['length_m']
+    lengths = []
+    for entry in (-0.5, 0.0, 0.5):
+        vector[-1] = entry
+        effect = parameters.decode(vector).effect('corner_slowdown')
+        assert effect.gain == pytest.approx(0.5)
+        lengths.append(effect.length_m)
+    assert lengths[1] == pytest.approx(info['neutral'])
+    assert lengths[2] / lengths[1] == pytest.approx(lengths[1] / lengths[0])
+    assert lengths[2] > lengths[0]
+    low, high = parameters.bounds
+    assert high[-1] - low[-1] == pytest.approx(SHAPE_DEVIATIONS)
+    ends = [parameters.decode(end).effect('corner_slowdown').length_m for end in (low, high)]
+    assert ends == pytest.approx([info['low'], info['high']])
+
+
+def test_a_shape_beyond_its_bounds_is_kept_at_them():
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
+    vector = parameters.encode(parameters.start)
+    vector[-1] = 100.0
+    longest = CornerSlowdown.parameters()['length_m']['high']
+    assert parameters.decode(vector).effect('corner_slowdown').length_m == longest
+
+
+def test_effects_that_are_not_varied_stay():
     start = DepositionModel(effects=(AirDrift(shift_down_m=0.03),))
     corner = CornerSlowdown(length_m=0.3)
     parameters = FreeParameters.of(start, corner)
-    assert parameters.varied == (('corner_slowdown', 'gain'),)
-    model = parameters.decode(np.concatenate([parameters.encode(parameters.start)[:-1], [1.0]]))
+    assert parameters.varied == (('corner_slowdown', 'gain'), ('corner_slowdown', 'length_m'))
+    vector = parameters.encode(parameters.start)
+    vector[len(PATTERN)] = 1.0
+    model = parameters.decode(vector)
     assert model.effect('air_drift') == AirDrift(shift_down_m=0.03)
-    assert model.effect('corner_slowdown').length_m == 0.3
+    assert model.effect('corner_slowdown').length_m == pytest.approx(0.3)
     assert model.effect('corner_slowdown').gain > 0.0
+
+
+def test_a_learned_law_has_nothing_to_vary():
+    law = LEARNED['time_s'](low=0.0, high=9.0, learned=(0.1, 0.0, -0.1))
+    parameters = FreeParameters.of(DepositionModel(), law)
+    assert len(parameters) == len(PATTERN)
+    assert parameters.decode(parameters.encode(parameters.start)).effect(law.id) == law
 
 
 @pytest.mark.parametrize('effect', EFFECTS.values(), ids=EFFECTS.keys())

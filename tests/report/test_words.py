@@ -2,9 +2,19 @@
 
 from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.learned import LEARNED
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.report.words import effect_meaning, in_unit, number, parameter_words
+from paint_deposition.report.words import (
+    effect_meaning,
+    effect_name,
+    in_unit,
+    is_learned,
+    learned_words,
+    number,
+    parameter_words,
+    step_words,
+)
 
 
 class HoleBuild(Effect):
@@ -40,3 +50,21 @@ def test_numbers_have_no_computers_exponent():
     assert [number(v) for v in (0.0, 1234.0, -0.00012345, 2.5e-9, 4e8)] == [
         '0', '1234', '−0.000123', '2.5 × 10⁻⁹', '4 × 10⁸',
     ]  # fmt: skip
+
+
+def test_learned_laws_are_told_by_what_they_depend_on():
+    name = 'learned law over the time since the motion began'
+    assert effect_name('learned:time_s') == name
+    assert effect_name('edge_build and learned:time_s') == f'edge build and {name}'
+    assert step_words({'added': 'learned:time_s'}) == f'+ {name}'
+    assert is_learned('learned:time_s')
+    assert not is_learned('edge_build')
+
+
+def test_a_learned_law_is_told_by_its_curve_and_its_range():
+    law = LEARNED['time_s'](low=2.0, high=60.0, learned=(0.1, -0.25))
+    assert learned_words(law) == [('factor', '0.75 to 1.1', ''), ('over', '2 to 60', 's')]
+    passes = LEARNED['spray_pass'](low=0.0, high=5.0)
+    assert learned_words(passes)[1] == ('over', '1 to 6', '')
+    fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
+    assert learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')

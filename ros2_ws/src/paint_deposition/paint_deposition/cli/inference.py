@@ -110,7 +110,8 @@ def diagnose_command(
 @CAMPAIGN
 @click.option(
     '--add', 'effect', required=True,
-    help="Effect to add: an id, or a Python file with one of your own; 'none' refits only.",
+    help="Effect to add: an id, a Python file with one of your own, or a law to learn over a "
+    "covariate, as learned:time_s; 'none' refits only.",
 )  # fmt: skip
 @MODEL
 @OUTPUT
@@ -151,6 +152,8 @@ def _write(
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.diagnosis.verdict import percent
+    from paint_deposition.effects.learned import LearnedLaw
+    from paint_deposition.report.words import effect_name, learned_words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -159,6 +162,10 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {percent(effects.probability)}{others}'
+        law = diagnosis.model.effect(effects.best)
+        if isinstance(law, LearnedLaw):
+            shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
+            yield f'    {effect_name(law.id)}: {shape}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]

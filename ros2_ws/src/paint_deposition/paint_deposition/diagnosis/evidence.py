@@ -1,18 +1,22 @@
-"""Evidence (marginal likelihood) of hypotheses about what is missing, in closed form.
+"""Evidence (marginal likelihood) of what may be missing, in closed form.
 
 Around the fitted model the readings are linear in the pattern's parameters and in the amplitudes
-of effects, all with normal priors. Integrated over these, the deviations are normal with a known
-covariance under every hypothesis. Whitening them by the covariance under the null hypothesis
-removes the pattern's parameters; every other hypothesis then adds a low-rank term to the identity.
+of every explanation, all with normal priors. Integrated over these, the deviations are normal
+with a known covariance. Whitening them by the covariance under the null hypothesis removes the
+pattern's parameters; every explanation then adds a low-rank term to the identity.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cholesky, solve_triangular
-from scipy.stats import norm
+from numba import njit
+from scipy.linalg import solve_triangular
 
 from paint_deposition.fitting.least_squares import Fit, covariance_factor
+
+# More degrees of freedom than this count as a noise that is known.
+KNOWN_NOISE = 1e9
 
 
 @dataclass(frozen=True)
@@ -20,95 +24,51 @@ class NullModel:
     """The null hypothesis that nothing is missing, as the distribution it gives the readings.
 
     Attributes:
-        lower: (P, P) Cholesky factor of the deviations' covariance, in units of the noise.
+        columns: (P, m) directions in which the base model and the nuisance vary, for unit
+            amplitudes, over the noise.
+        raw: (P,) deviations over the noise from the base model at the centre of its priors.
+        lower: (P, P) Cholesky factor of the deviations' covariance.
         deviation: (P,) whitened deviations; standard normal if nothing is missing.
     """
 
+    columns: np.ndarray
+    raw: np.ndarray
     lower: np.ndarray
     deviation: np.ndarray
 
     @staticmethod
-    def of(fit: Fit, nuisance: np.ndarray | None = None) -> 'NullModel':
-        """The base model, linear around a fit, with nuisance directions (P, n) over the noise."""
-        centre, width = fit.parameters.prior
-        columns = fit.jacobian * width
-        deviation = fit.residual + fit.jacobian @ (fit.vector - centre)
-        if nuisance is not None and nuisance.size:
-            columns = np.hstack([columns, nuisance])
+    def of(columns: np.ndarray, raw: np.ndarray) -> 'NullModel':
+        """From directions (P, m) and deviations (P,)."""
         lower = covariance_factor(columns)
-        return NullModel(lower, solve_triangular(lower, deviation, lower=True))
+        return NullModel(columns, raw, lower, solve_triangular(lower, raw, lower=True))
+
+    @staticmethod
+    def around(fit: Fit, apart: frozenset[str], nuisance: np.ndarray) -> 'NullModel':
+        """Linear around a fit, with nuisance directions (P, n) over the noise.
+
+        Args:
+            fit: of the model.
+            apart: ids of effects in it that the null hypothesis does not have: what they
+                contribute to the film counts as deviation.
+            nuisance: directions that carry no meaning.
+        """
+        centre, width = fit.parameters.prior
+        entries = fit.parameters.of_effects
+        pattern = len(fit.vector) - len(entries)
+        kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
+        # The shape of an effect that is not there contributes nothing; its amplitude does.
+        shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
+        counted = kept | ~shape
+        raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - centre)[counted]
+        return NullModel.of(np.hstack([(fit.jacobian * width)[:, kept], nuisance]), raw)
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
         return solve_triangular(self.lower, columns, lower=True)
 
-
-@dataclass(frozen=True)
-class Hypothesis:
-    """A statement about what is missing: the readings deviate along some directions.
-
-    Attributes:
-        effects: ids of the effects it adds; empty for the null hypothesis and for shapeless ones.
-        columns: (P, n) whitened directions, for amplitudes with unit variance.
-        sides: (n,) +1 or -1 where physics fixes the sign, else 0.
-        other: 'unknown' or 'footprint' if it also adds something outside the library, else ''.
-        prior: its prior probability.
-        shape: values of the shape parameters that the columns stand for.
-    """
-
-    effects: tuple[str, ...]
-    columns: np.ndarray
-    sides: np.ndarray
-    other: str
-    prior: float
-    shape: tuple[tuple[str, str, float], ...] = ()
-
-
-class Evidence:
-    """Evidence of one hypothesis, for any number of deviation vectors at once.
-
-    Args:
-        hypothesis: what may be missing.
-        freedom: degrees of freedom of the noise estimate; inf where the noise is known. The
-            evidence integrates over the noise's unknown scale, so with few degrees of freedom a
-            misfit counts less: the noise may have been underestimated.
-    """
-
-    def __init__(self, hypothesis: Hypothesis, freedom: float = np.inf) -> None:
-        self.hypothesis, self.freedom = hypothesis, freedom
-        self.columns = columns = hypothesis.columns
-        precision = np.eye(columns.shape[1]) + columns.T @ columns
-        self._lower = cholesky(precision, lower=True)
-        self._log_det = 2.0 * float(np.sum(np.log(np.diag(self._lower))))
-        self.covariance = np.linalg.inv(precision)
-        self._signed = np.flatnonzero(hypothesis.sides)
-        self._sides = hypothesis.sides[self._signed]
-
-    def posterior_mean(self, deviations: np.ndarray) -> np.ndarray:
-        """(n,) or (n, D) posterior means of the amplitudes for (P,) or (P, D) deviations."""
-        return self.covariance @ (self.columns.T @ deviations)
-
-    def explained(self, deviations: np.ndarray) -> np.ndarray:
-        """By how much the chi-square of the deviations falls; scalar or (D,)."""
-        scores = solve_triangular(self._lower, self.columns.T @ deviations, lower=True)
-        return np.sum(scores**2, axis=0)
-
-    def log_bayes_factor(self, deviations: np.ndarray) -> np.ndarray:
-        """Log Bayes factor against the null hypothesis; scalar or (D,)."""
-        explained = self.explained(deviations)
-        if np.isfinite(self.freedom):
-            before = self.freedom + np.sum(deviations**2, axis=0)
-            count = self.freedom + len(deviations)
-            factor = -0.5 * count * np.log1p(-explained / before) - 0.5 * self._log_det
-        else:
-            factor = 0.5 * (explained - self._log_det)
-        if len(self._signed):
-            means = self.posterior_mean(deviations)[self._signed]
-            spread = np.sqrt(np.diag(self.covariance)[self._signed])
-            spread = spread[:, np.newaxis] if means.ndim > 1 else spread
-            sides = self._sides[:, np.newaxis] if means.ndim > 1 else self._sides
-            factor = factor + np.sum(np.log(2.0) + norm.logcdf(sides * means / spread), axis=0)
-        return factor
+    def select(self, rows: np.ndarray) -> 'NullModel':
+        """The same for some of the readings."""
+        return NullModel.of(self.columns[rows], self.raw[rows])
 
 
 def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
@@ -122,3 +82,69 @@ def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
     if np.isfinite(freedom):
         deviations /= np.sqrt(random.chisquare(freedom, draws) / freedom)
     return deviations
+
+
+@njit(cache=True)
+def log_normal_cdf(x):
+    """Logarithm of the standard normal distribution function."""
+    if x > -30.0:
+        return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
+    return -0.5 * x * x - math.log(-x * math.sqrt(2.0 * math.pi))
+
+
+@njit(cache=True)
+def log_bayes_factor(gram, scores, square, sides, scale, freedom, count):
+    """Log Bayes factor of explanations together against the null hypothesis.
+
+    Args:
+        gram: (n, n) products of their whitened directions. scores: (n,) products with the
+            deviations. square: of the deviations' length.
+        sides: (n,) +1 or -1 where the sign of an amplitude is known, else 0; several such
+            amplitudes count as independent in the posterior.
+        scale: (n,) standard deviation of each amplitude, in units of its direction.
+        freedom: degrees of freedom of the noise estimate; the evidence integrates over the
+            noise's unknown scale, so with few a misfit counts less.
+        count: of readings.
+    """
+    n = len(scores)
+    lower, half = np.zeros((n, n)), np.empty(n)
+    log_det = explained = 0.0
+    for i in range(n):
+        for j in range(i + 1):
+            value = gram[i, j] * scale[i] * scale[j]
+            for k in range(j):
+                value -= lower[i, k] * lower[j, k]
+            if i == j:
+                lower[i, i] = math.sqrt(max(value + 1.0, 1e-12))
+                log_det += 2.0 * math.log(lower[i, i])
+            else:
+                lower[i, j] = value / lower[j, j]
+        value = scores[i] * scale[i]
+        for k in range(i):
+            value -= lower[i, k] * half[k]
+        half[i] = value / lower[i, i]
+        explained += half[i] * half[i]
+    if freedom < KNOWN_NOISE:
+        share = min(explained / (freedom + square), 1.0 - 1e-12)
+        factor = -0.5 * (freedom + count) * math.log1p(-share) - 0.5 * log_det
+    else:
+        factor = 0.5 * (explained - log_det)
+    if not sides.any():
+        return factor
+    mean, column = np.empty(n), np.empty(n)
+    for i in range(n - 1, -1, -1):
+        value = half[i]
+        for k in range(i + 1, n):
+            value -= lower[k, i] * mean[k]
+        mean[i] = value / lower[i, i]
+    for i in range(n):
+        if sides[i] != 0.0:
+            variance = 0.0
+            for row in range(i, n):
+                value = 1.0 if row == i else 0.0
+                for k in range(i, row):
+                    value -= lower[row, k] * column[k]
+                column[row] = value / lower[row, row]
+                variance += column[row] * column[row]
+            factor += math.log(2.0) + log_normal_cdf(sides[i] * mean[i] / math.sqrt(variance))
+    return factor

@@ -1,173 +1,386 @@
-"""The model space: every hypothesis about what is missing, with prior, evidence and posterior."""
+"""The space of models: every set of up to three causes, with its posterior probability.
 
-from dataclasses import dataclass
-from itertools import combinations, product
+Each cause is missing or not, independently of the others before the readings. A cause has several
+explanations (laws in a few shapes, free laws, fields) at several sizes; their evidence is averaged
+for one cause alone and, for sets, searched from the best ones on.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
 
 import numpy as np
-from scipy.special import logsumexp
+from numba import njit
+from numpy.typing import ArrayLike
+from scipy.special import expit, logsumexp
+from scipy.stats import norm
 
-from paint_deposition.diagnosis.discrepancy import PATTERN_DEVIATIONS, SIZES
 from paint_deposition.diagnosis.evidence import (
-    Evidence,
-    Hypothesis,
+    KNOWN_NOISE,
     NullModel,
+    log_bayes_factor,
     simulated,
 )
-from paint_deposition.diagnosis.sensitivities import Sensitivity
+from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
 
-# Prior probabilities: half that nothing is missing, the rest by kind. No measured pattern is
-# exactly a pair of Gaussians.
-PRIOR = {'none': 0.5, 'one': 0.26, 'two': 0.06, 'unknown': 0.06, 'footprint': 0.08, 'mixed': 0.04}
+# Prior probability that a cause is missing: an effect of the library, something outside it, and
+# a pattern that is no two Gaussians. No measured pattern is exactly one.
+PRIOR_EFFECT, PRIOR = 0.02, {UNKNOWN: 0.08, FOOTPRINT: 0.06}
+# Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
+SIZES = np.array([0.35, 0.7, 1.4, 2.8, 5.6])
+# How many sets are searched in full: pairs, pairs from which triples grow, and triples.
+PAIRS, GROWN, TRIPLES = 60, 12, 20
+SWEEPS = 2
+# An effect acts for certain from this posterior probability of its group on.
+SURE = 0.8
+# Probability that a group holds the cause, if one of the alternatives is it.
+CREDIBLE = 0.95
 DRAWS = 2000
-# Pairs are formed of this many effects with the highest evidence; other pairs hardly matter.
-PAIRED = 14
-# Random fields over the part that are considered beside an effect.
-MIXED_FIELDS = 2
+# Log prior share of an explanation that contradicts physics.
+NEVER = -1e6
+# The error of a law is at most this large beside the law; a smaller one, in standard deviations
+# of the noise, may be noise.
+LARGEST_ERROR, NOTICED = 0.6, 3.0
+# An effect beside a stronger shapeless cause acts only if it moves the readings by this share of
+# what the other does (squared): no shapeless cause is known more exactly.
+LEAST_BESIDE = 0.04
 
 
 @dataclass(frozen=True)
-class ModelSpace:
-    """All hypotheses with their evidence.
+class Model:
+    """A set of causes with their best explanations.
 
     Attributes:
-        hypotheses: the first is the null hypothesis that nothing is missing.
-        log_bayes_factors: (H,) against the null hypothesis.
-        p_value: probability of at least this much evidence under the null hypothesis.
+        causes: names, sorted.
+        chosen: numbers of their explanations. sizes: of their amplitudes.
+        log_weight: logarithm of its posterior weight, that of no cause being 0.
     """
 
-    hypotheses: list[Hypothesis]
-    log_bayes_factors: np.ndarray
-    p_value: float
+    causes: tuple[str, ...]
+    chosen: tuple[int, ...] = ()
+    sizes: tuple[float, ...] = ()
+    log_weight: float = 0.0
 
-    @staticmethod
-    def of(
-        null: NullModel,
-        sensitivities: list[Sensitivity],
-        fields: list[np.ndarray],
-        deviations: list[np.ndarray],
-        freedom: float,
-        seed: int,
-    ) -> 'ModelSpace':
-        """Compute the evidence of all hypotheses and test the null hypothesis.
 
-        Args:
-            null: the null hypothesis, with the deviations of the readings.
-            sensitivities: to the effects; each shape of an effect is a hypothesis of its own.
-            fields: (P, n) square roots of the random fields' covariances, over the noise.
-            deviations: (P, n) pattern deviations of each kind, over the noise.
-            freedom: degrees of freedom of the noise estimate.
-            seed: of the simulated deviations for the p-value.
+class ModelSpace:
+    """All models around a null model.
+
+    Args:
+        null: the null hypothesis.
+        explanations: of all causes.
+        freedom: degrees of freedom of the noise estimate.
+    """
+
+    def __init__(
+        self, null: NullModel, explanations: Sequence[Explanation], freedom: float
+    ) -> None:
+        self.null, self.freedom = null, freedom
+        self.explanations = sorted(explanations, key=lambda e: e.cause)
+        self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
+        names = [e.cause for e in self.explanations]
+        self._first = np.array([names.index(c) for c in self.causes])
+        self._last = np.append(self._first[1:], len(names))
+        self.columns = [null.whiten(e.columns) for e in self.explanations]
+        self._start = np.cumsum([0, *(c.shape[1] for c in self.columns)])
+        together = np.hstack(self.columns)
+        self._gram = together.T @ together
+        self._scores = together.T @ null.deviation
+        self._square = float(null.deviation @ null.deviation)
+        self._sides = np.concatenate([e.sides for e in self.explanations])
+        shares = np.log([e.share / len(SIZES) for e in self.explanations])
+        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
+        for k in range(len(self.explanations)):
+            for s, size in enumerate(SIZES):
+                if not self._is_physical(k, float(size)):
+                    self._log_share[k, s] = NEVER
+        odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
+        self._log_odds = np.log(odds / (1.0 - odds))
+
+    @cached_property
+    def models(self) -> tuple[Model, ...]:
+        """The models that matter, most probable first."""
+        alone = {model.causes[0]: model for model in self._alone}
+        pairs = [_joined(*pair) for pair in combinations(self._alone, 2)]
+        pairs = [self._refined(m) for m in self._most_probable(pairs, PAIRS)]
+        grown = {
+            tuple(sorted((*pair.causes, cause))): _joined(pair, single)
+            for pair in self._most_probable(pairs, GROWN)
+            for cause, single in alone.items()
+            if cause not in pair.causes
+        }
+        triples = [self._refined(m) for m in self._most_probable(grown.values(), TRIPLES)]
+        found = [Model((), (), (), 0.0), *self._alone, *pairs, *triples]
+        return tuple(sorted(found, key=lambda m: -m.log_weight))
+
+    @cached_property
+    def probabilities(self) -> np.ndarray:
+        """Posterior probability of each of ``models``."""
+        weights = np.array([m.log_weight for m in self.models])
+        return np.exp(weights - logsumexp(weights))
+
+    def inclusion(self, *causes: str) -> float:
+        """Posterior probability that at least one of these causes acts."""
+        holds = [bool(set(causes) & set(m.causes)) for m in self.models]
+        return float(self.probabilities[holds].sum())
+
+    def against_nothing(self, cause: str) -> float:
+        """Posterior probability of one cause against none, if both were as probable before."""
+        number = self.causes.index(cause)
+        return float(expit(self._alone[number].log_weight - self._log_odds[number]))
+
+    def alternatives(self, cause: str) -> dict[str, float]:
+        """What could stand in the place of one cause beside the others of the best model.
+
+        The causes and their probabilities, which sum to one, all other causes being as they are;
+        this is the single-effect posterior of Wang et al. (JRSS-B 82, 2020). Empty where the
+        other causes are as many as a model can hold.
         """
-        nothing = Hypothesis(
-            (), np.empty((len(null.deviation), 0)), np.empty(0), '', PRIOR['none']
-        )
-        singles = _singles(null, sensitivities)
-        tested = [Evidence(h, freedom) for h in singles]
-        best = _best_shapes(singles, _log_bayes_factors(tested, null))
-        more = [*_shapeless(null, fields, deviations), *_pairs(best)]
-        tested += [Evidence(h, freedom) for h in more]
-        mixed = _mixed(null, best, fields)
-        untested = [Evidence(h, freedom) for h in mixed]
-        return ModelSpace(
-            [nothing, *singles, *more, *mixed],
-            np.concatenate([[0.0], _log_bayes_factors([*tested, *untested], null)]),
-            _p_value(tested, null, freedom, seed),
-        )
+        others = set(self.models[0].causes) - {cause}
+        found: dict[str, float] = {}
+        for model, probability in zip(self.models, self.probabilities, strict=True):
+            if len(model.causes) == len(others) + 1 and others < set(model.causes):
+                (other,) = set(model.causes) - others
+                found[other] = found.get(other, 0.0) + float(probability)
+        total = sum(found.values())
+        return {name: value / total for name, value in sorted(found.items(), key=lambda i: -i[1])}
 
-    def posterior(self, log_bayes_factors: np.ndarray | None = None) -> np.ndarray:
-        """(H,) probability of each hypothesis, for its own or for refined log Bayes factors."""
-        factors = self.log_bayes_factors if log_bayes_factors is None else log_bayes_factors
-        log_weights = factors + self.log_prior
-        return np.exp(log_weights - logsumexp(log_weights))
+    def group(self, cause: str) -> tuple[tuple[str, ...], float]:
+        """The effects that could stand in the place of a cause, and how probable one of them is.
+
+        The most probable ones that together have a chance of 95 % among all alternatives; what is
+        no effect of the library is none of them.
+        """
+        members, total = [], 0.0
+        for name, probability in self.alternatives(cause).items():
+            if total >= CREDIBLE:
+                break
+            total += probability
+            members.append(name)
+        effects = tuple(name for name in members if name not in PRIOR)
+        return effects, self.inclusion(*effects) if effects else 0.0
+
+    def _is_physical(self, k: int, size: float) -> bool:
+        """Whether an explanation, alone at some size, is what its cause can be.
+
+        The error of a law stays small beside the law, and a free law goes in its direction.
+        """
+        explanation = self.explanations[k]
+        if explanation.sensitivity is None and explanation.direction is None:
+            return True
+        alone = Model((explanation.cause,), (k,), (size,), 0.0)
+        (amounts,) = self.amplitudes(alone)
+        if explanation.sensitivity is None:
+            return explanation.goes_right(amounts)
+        of_law = len(explanation.sensitivity.names)
+        columns = self.columns[k]
+        law = np.linalg.norm(columns[:, :of_law] @ amounts[:of_law])
+        error = np.linalg.norm(columns[:, of_law:] @ amounts[of_law:])
+        return bool(error <= max(NOTICED, LARGEST_ERROR * law))
 
     @property
-    def log_prior(self) -> np.ndarray:
-        """(H,) logarithm of the prior probabilities."""
-        return np.log([h.prior for h in self.hypotheses])
+    def accepted(self) -> list[tuple[str, int, float]]:
+        """Causes of the most probable model that act with some certainty.
+
+        Each with the number of its explanation and the size of its amplitudes.
+        """
+        best = self.models[0]
+        if not best.causes:
+            return []
+        amounts = self.amplitudes(best)
+        moved = {
+            cause: float(np.sum((self.columns[k] @ part) ** 2))
+            for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
+        }
+        least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
+        return [
+            (cause, k, size)
+            for cause, k, size in zip(best.causes, best.chosen, best.sizes, strict=True)
+            if cause not in PRIOR and moved[cause] >= least and self.group(cause)[1] > SURE
+        ]
+
+    def select(self, rows: np.ndarray) -> 'ModelSpace':
+        """The space that some of the readings (P,) bool give, explanations in the same order."""
+        few = [explanation.select(rows) for explanation in self.explanations]
+        return ModelSpace(self.null.select(rows), few, self.freedom)
+
+    def amplitudes(self, model: Model) -> list[np.ndarray]:
+        """Posterior mean amplitudes of each of a model's explanations, in their own units."""
+        parts = [size * self.columns[k] for k, size in zip(model.chosen, model.sizes, strict=True)]
+        columns = np.hstack(parts)
+        precision = np.eye(columns.shape[1]) + columns.T @ columns
+        mean = np.linalg.solve(precision, columns.T @ self.null.deviation)
+        ends = np.cumsum([part.shape[1] for part in parts])
+        return [
+            size * amounts
+            for size, amounts in zip(model.sizes, np.split(mean, ends[:-1]), strict=True)
+        ]
+
+    def p_value(self, seed: int) -> float:
+        """Probability of at least this much evidence for any cause if none acted.
+
+        By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes, which is
+        computed for every draw as for the readings: nothing is chosen on the readings.
+        """
+        count = len(self.null.deviation)
+        draws = simulated(count, self.freedom, DRAWS, seed)
+        together = np.column_stack([self.null.deviation, draws])
+        terms = []
+        for k, explanation in enumerate(self.explanations):
+            evidence = _by_size(self.columns[k], explanation.sides, together, self.freedom)
+            odds = self._log_odds[self.causes.index(explanation.cause)]
+            share = np.log(explanation.share / len(SIZES))
+            terms.append(logsumexp(evidence, axis=0) + share + odds)
+        total = logsumexp(terms, axis=0)
+        return float((1 + np.count_nonzero(total[1:] >= total[0])) / (1 + DRAWS))
+
+    @cached_property
+    def _alone(self) -> list[Model]:
+        """One cause each: its evidence averaged, and its best explanation."""
+        found = []
+        for number, cause in enumerate(self.causes):
+            options = [
+                (self._log_evidence((k,), (size,)) + self._log_share[k, s], k, size)
+                for k in range(self._first[number], self._last[number])
+                for s, size in enumerate(SIZES)
+            ]
+            _, k, size = max(options)
+            weight = float(logsumexp([value for value, _, _ in options])) + self._log_odds[number]
+            found.append(Model((cause,), (k,), (float(size),), weight))
+        return found
+
+    @cached_property
+    def _averaging(self) -> dict[str, float]:
+        """By how much a cause's averaged log evidence, with its odds, exceeds that of its best."""
+        return {
+            model.causes[0]: model.log_weight - self._log_evidence(model.chosen, model.sizes)
+            for model in self._alone
+        }
+
+    def _most_probable(self, models: Iterable[Model], count: int) -> list[Model]:
+        """The best ones, weighed with the explanations that they have."""
+        weighed = [
+            replace(
+                model,
+                log_weight=self._log_evidence(model.chosen, model.sizes)
+                + sum(self._averaging[c] for c in model.causes),
+            )
+            for model in models
+        ]
+        return sorted(weighed, key=lambda m: -m.log_weight)[:count]
+
+    def _refined(self, model: Model) -> Model:
+        """The same causes with the explanations and sizes that are best together."""
+        numbers = np.array([self.causes.index(c) for c in model.causes])
+        chosen, sizes = np.array(model.chosen), np.array(model.sizes)
+        _refine(
+            self._gram, self._scores, self._square, self._sides, self._start, self._log_share,
+            self._first[numbers], self._last[numbers], SIZES, chosen, sizes, self._freedom,
+            len(self.null.deviation), SWEEPS,
+        )  # fmt: skip
+        weight = self._log_evidence(chosen, sizes)
+        alone = {m.causes[0]: m for m in self._alone}
+        for cause, k in zip(model.causes, chosen, strict=True):
+            best = self.explanations[alone[cause].chosen[0]]
+            weight += self._averaging[cause]
+            weight += np.log(self.explanations[k].share / best.share)
+        return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
+
+    def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
+        numbers = np.asarray(chosen, dtype=np.int64)
+        rows, scale = _rows(self._start, numbers, np.asarray(sizes, dtype=float))
+        return log_bayes_factor(
+            self._gram[np.ix_(rows, rows)], self._scores[rows], self._square, self._sides[rows],
+            scale, self._freedom, len(self.null.deviation),
+        )  # fmt: skip
+
+    @property
+    def _freedom(self) -> float:
+        return min(self.freedom, 2.0 * KNOWN_NOISE)
 
 
-def _log_bayes_factors(evidence: list[Evidence], null: NullModel) -> np.ndarray:
-    return np.array([float(e.log_bayes_factor(null.deviation)) for e in evidence])
-
-
-def _singles(null: NullModel, sensitivities: list[Sensitivity]) -> list[Hypothesis]:
-    ids = [s.id for s in sensitivities]
-    effects = len(set(ids))
-    return [
-        Hypothesis(
-            (s.id,),
-            null.whiten(s.columns),
-            s.sides,
-            '',
-            PRIOR['one'] / effects / ids.count(s.id),
-            s.shape,
+def _joined(first: Model, second: Model) -> Model:
+    """The causes of both with the explanations of both, sorted by cause."""
+    members = sorted(
+        zip(
+            (*first.causes, *second.causes),
+            (*first.chosen, *second.chosen),
+            (*first.sizes, *second.sizes),
+            strict=True,
         )
-        for s in sensitivities
-    ]
+    )
+    causes, chosen, sizes = zip(*members, strict=True)
+    return Model(causes, chosen, sizes)
 
 
-def _shapeless(
-    null: NullModel, fields: list[np.ndarray], deviations: list[np.ndarray]
-) -> list[Hypothesis]:
-    chosen = []
-    for root, size in product(map(null.whiten, fields), SIZES):
-        prior = PRIOR['unknown'] / (len(fields) * len(SIZES))
-        chosen.append(_field(size * root, 'unknown', prior))
-    for kind, size in product(map(null.whiten, deviations), PATTERN_DEVIATIONS):
-        prior = PRIOR['footprint'] / (len(deviations) * len(PATTERN_DEVIATIONS))
-        chosen.append(_field(size * kind, 'footprint', prior))
-    return chosen
+def _by_size(
+    columns: np.ndarray, sides: np.ndarray, deviations: np.ndarray, freedom: float
+) -> np.ndarray:
+    """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
+    left, singular, right = np.linalg.svd(columns, full_matrices=False)
+    scores = left.T @ deviations
+    squares, found = np.sum(deviations**2, axis=0), []
+    for size in SIZES:
+        ratio = (size * singular) ** 2
+        shrink = ratio / (1.0 + ratio)
+        explained, log_det = shrink @ scores**2, float(np.log1p(ratio).sum())
+        if np.isfinite(freedom):
+            count = freedom + len(deviations)
+            factor = -0.5 * count * np.log1p(-explained / (freedom + squares)) - 0.5 * log_det
+        else:
+            factor = 0.5 * (explained - log_det)
+        mean = right.T @ ((size * singular / (1.0 + ratio))[:, np.newaxis] * scores)
+        variance = 1.0 - (right.T**2) @ shrink
+        for i in np.flatnonzero(sides):
+            factor = factor + np.log(2.0) + norm.logcdf(sides[i] * mean[i] / np.sqrt(variance[i]))
+        found.append(factor)
+    return np.array(found)
 
 
-def _field(columns: np.ndarray, other: str, prior: float) -> Hypothesis:
-    return Hypothesis((), columns, np.zeros(columns.shape[1]), other, prior)
+@njit(cache=True)
+def _rows(start, chosen, sizes):
+    """Rows of the chosen explanations among all directions, and the size of each."""
+    count = 0
+    for k in chosen:
+        count += start[k + 1] - start[k]
+    rows, scale = np.empty(count, np.int64), np.empty(count)
+    at = 0
+    for number, k in enumerate(chosen):
+        for row in range(start[k], start[k + 1]):
+            rows[at], scale[at] = row, sizes[number]
+            at += 1
+    return rows, scale
 
 
-def _best_shapes(singles: list[Hypothesis], evidence: np.ndarray) -> list[Hypothesis]:
-    """The shape of each effect with the highest evidence, effects in order of evidence."""
-    best: dict[str, Hypothesis] = {}
-    for k in np.argsort(-evidence):
-        best.setdefault(singles[k].effects[0], singles[k])
-    return list(best.values())
-
-
-def _pairs(best: list[Hypothesis]) -> list[Hypothesis]:
-    couples = list(combinations(best[:PAIRED], 2))
-    return [
-        Hypothesis(
-            (a.effects[0], b.effects[0]),
-            np.hstack([a.columns, b.columns]),
-            np.concatenate([a.sides, b.sides]),
-            '',
-            PRIOR['two'] / len(couples),
-            a.shape + b.shape,
-        )
-        for a, b in couples
-    ]
-
-
-def _mixed(null: NullModel, best: list[Hypothesis], fields: list[np.ndarray]) -> list[Hypothesis]:
-    chosen = best[:PAIRED]
-    roots = [null.whiten(field) for field in fields[:MIXED_FIELDS]]
-    prior = PRIOR['mixed'] / max(len(chosen) * len(roots) * len(SIZES), 1)
-    return [
-        Hypothesis(
-            h.effects,
-            np.hstack([h.columns, size * root]),
-            np.concatenate([h.sides, np.zeros(root.shape[1])]),
-            'unknown',
-            prior,
-            h.shape,
-        )
-        for h, root, size in product(chosen, roots, SIZES)
-    ]
-
-
-def _p_value(tested: list[Evidence], null: NullModel, freedom: float, seed: int) -> float:
-    """Monte-Carlo p-value of the evidence of all hypotheses together (Davison & Hinkley 1997)."""
-    draws = simulated(len(null.deviation), freedom, DRAWS, seed)
-    log_prior = np.log([e.hypothesis.prior for e in tested])
-    by_chance = np.stack([e.log_bayes_factor(draws) for e in tested])
-    under_null = logsumexp(by_chance + log_prior[:, np.newaxis], axis=0)
-    observed = logsumexp(_log_bayes_factors(tested, null) + log_prior)
-    return float((1 + np.count_nonzero(under_null >= observed)) / (1 + DRAWS))
+@njit(cache=True)
+def _refine(
+    gram, scores, square, sides, start, log_share, first, last, all_sizes, chosen, sizes, freedom,
+    count, sweeps,
+):  # fmt: skip
+    """Choose the best explanation and size of one cause after the other, in place."""
+    best = -np.inf
+    for _ in range(sweeps):
+        before = best
+        for member in range(len(chosen)):
+            kept, kept_size = chosen[member], sizes[member]
+            for k in range(first[member], last[member]):
+                chosen[member] = k
+                for s, size in enumerate(all_sizes):
+                    if log_share[k, s] <= NEVER:
+                        continue
+                    sizes[member] = size
+                    rows, scale = _rows(start, chosen, sizes)
+                    n = len(rows)
+                    products, along, sided = np.empty((n, n)), np.empty(n), np.empty(n)
+                    for i in range(n):
+                        along[i], sided[i] = scores[rows[i]], sides[rows[i]]
+                        for j in range(n):
+                            products[i, j] = gram[rows[i], rows[j]]
+                    value = log_bayes_factor(products, along, square, sided, scale, freedom, count)
+                    for other in chosen:
+                        value += log_share[other].max()
+                    if value > best:
+                        best, kept, kept_size = value, k, size
+            chosen[member], sizes[member] = kept, kept_size
+        if best < before + 0.1:
+            break

@@ -1,33 +1,38 @@
-"""Which physical effect is missing from the model, if any: the procedure.
+"""Which physical effects are missing from the model, if any: the procedure.
 
 1. Fit the pattern; stop if the fit cannot be right.
-2. Compute the evidence of every effect, pair of effects, shapeless cause and deviation of the
-   footprint, and test whether anything at all is missing.
-3. If so, and one class of effects that the readings cannot tell apart is probable enough and
-   improves the prediction of points left out: add its best member, and repeat from 2.
-4. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
+2. Compute the evidence of all sets of up to three causes around the fit, and test whether anything
+   is missing at all.
+3. If so, refit with every effect of the best set that is probable enough, and repeat 2 around that
+   fit until the set stays as it is: a strong effect bends the line along which it was judged.
+4. Learn what the accepted laws leave unexplained as curves over covariates, if readings left out
+   are predicted better.
+5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
 from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from paint_deposition.diagnosis.classes import ConfoundedClass, Posterior, class_posterior
-from paint_deposition.diagnosis.cross_validation import hold_out
-from paint_deposition.diagnosis.linearisation import Linearisation
-from paint_deposition.diagnosis.run import ALPHA, SURE, Run
+from paint_deposition.diagnosis.cross_validation import nested_rmse_um
+from paint_deposition.diagnosis.evidence import NullModel
+from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.diagnosis.learning import choose_curves
+from paint_deposition.diagnosis.model_space import Model, ModelSpace
+from paint_deposition.diagnosis.run import Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
-from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Step, percent
+from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.readings.campaign import Campaign
 
-MOST_EFFECTS = 3
-# What was added is the verdict if the evidence that remains is below this share of its own: laws
-# of effects are approximations, and with many readings even a good one leaves something.
-LEFT_OVER = 0.5
-# Candidates that are named where none is sure.
-NAMED = 3
+# Significance level of the test that something is missing.
+ALPHA = 0.05
+ROUNDS = 4
+# Effects that are at least this probable are listed, and this many named where none is sure.
+WORTH_LISTING, NAMED = 0.05, 3
+# Share by which learned curves must lower the error on points left out.
+LEAST_GAIN = 0.02
 
 
 def diagnose(
@@ -48,77 +53,127 @@ def diagnose(
     """
     run = Run(campaign, start, library, seed, progress)
     if run.trouble:
-        return run.diagnosis(None, 'fit_broken', run.trouble)
+        return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     progress('computing the evidence of what may be missing')
-    first = linear = run.linearise()
-    while True:
-        posterior = None
-        if linear.space.p_value < ALPHA:
-            progress('refitting with the most probable effects')
-            posterior = class_posterior(run.study, linear)
-        best = _to_add(run, posterior)
-        if best is None:
-            return _conclude(run, first, linear, posterior)
-        run.add(best, linear)
-        progress(f'added {best.best}; computing the evidence of what is left')
-        linear = run.linearise()
-
-
-def _to_add(run: Run, posterior: Posterior | None) -> ConfoundedClass | None:
-    """The best class if it is probable enough and improves the prediction, else None."""
-    if posterior is None or not posterior.classes or len(run.accepted) == MOST_EFFECTS:
-        return None
-    best = posterior.classes[0]
-    return best if best.probability > SURE and _predicts_better(run, best) else None
-
-
-def _predicts_better(run: Run, candidate: ConfoundedClass) -> bool:
-    """Whether points left out in patches and in passes are predicted better on average."""
-    blockings = [run.study.patches(), run.study.pass_blocks(run.fit.model)]
-    gains = [
-        hold_out(candidate.fit, blocks).log_score - hold_out(run.fit, blocks).log_score
-        for blocks in blockings
-        if len(np.unique(blocks)) > 1
-    ]
-    return bool(np.mean(gains) > 0.0)
-
-
-def _conclude(
-    run: Run, first: Linearisation, last: Linearisation, posterior: Posterior | None
-) -> Diagnosis:
-    others = tuple(
-        run.described(c, Step.of(run.study, c.best, c.fit))
-        for c in (posterior.classes if posterior else ())
-    )
-    if posterior is None and not run.accepted:
+    space = run.linearise()
+    p_value = space.p_value(seed)
+    if p_value >= ALPHA:
         reason = 'The readings agree with the model to within the noise of the gauge.'
-        return run.diagnosis(first, 'none_missing', reason)
-    if posterior is None or (run.accepted and _explains_most(run, last)):
-        names = ', and '.join(_in_words(c) for c in run.accepted)
-        return run.diagnosis(first, 'effect_missing', f'The readings show {names}.', others)
-    if posterior.unknown + posterior.footprint > posterior.named or not others:
-        footprint = posterior.footprint > posterior.unknown
-        unknown = locate_unexplained(run.study, run.fit, footprint, run.seed)
+        return run.diagnosis(p_value, 'none_missing', reason)
+    for _ in range(ROUNDS):
+        effects = _started(space)
+        if {effect.id for effect in effects} == run.added:
+            break
+        progress('refitting with ' + (', '.join(e.id for e in effects) or 'the pattern alone'))
+        run.fit = run.fitted_with(effects)
+        space = run.linearise()
+    patches, sigma_um = run.study.patches(), run.study.sigma_um
+    holdout_um = nested_rmse_um(space, patches, sigma_um, curves=False)
+    _accept(run, space, holdout_um)
+    progress('learning what the laws leave unexplained')
+    _learn(run, space, holdout_um)
+    return _conclude(run, space, p_value)
+
+
+def _started(space: ModelSpace) -> list[Effect]:
+    """The accepted effects with amplitudes to start a fit from."""
+    best = space.models[0]
+    amounts = dict(zip(best.chosen, space.amplitudes(best), strict=True)) if best.causes else {}
+    effects = []
+    for cause, k, _ in space.accepted:
+        law = space.explanations[k].sensitivity
+        amplitudes = amounts[k]
+        if law is None:
+            # A free law says nothing of the law's amplitude: take it from the law alone.
+            k = next(
+                i
+                for i, e in enumerate(space.explanations)
+                if e.cause == cause and e.sensitivity is not None
+            )
+            law = space.explanations[k].sensitivity
+            (amplitudes,) = space.amplitudes(Model((cause,), (k,), (1.0,), 0.0))
+        assert law is not None
+        effects.append(law.with_amplitudes(amplitudes[: len(law.names)]))
+    return effects
+
+
+def _accept(run: Run, space: ModelSpace, holdout_um: float) -> None:
+    """Accept the effects of the newest fit, strongest first, each as a step of the history."""
+    final = run.fit
+    effects = {e.id: e for e in final.model.effects if e.id in run.candidates}
+    left = list(effects)
+    taken: list[Effect] = []
+    while left:
+        trials = {name: run.fitted_with([*taken, effects[name]]) for name in left[1:] and left}
+        name = min(left, key=lambda n: trials[n].objective) if trials else left[0]
+        left.remove(name)
+        taken.append(effects[name])
+        before, fit = run.history[-1], trials[name] if left else final
+        members, probability = space.group(name)
+        members = (name, *(m for m in members if m not in effects))
+        run.record(name, fit, None if left else holdout_um)
+        run.accepted.append(run.described(members, probability, before))
+
+
+def _learn(run: Run, space: ModelSpace, without_um: float) -> None:
+    """Add curves over covariates if they improve the prediction of points left out."""
+    null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
+    curves = choose_curves(null, space.explanations, space.freedom)
+    if not curves or FOOTPRINT in space.models[0].causes:
+        return
+    with_um = nested_rmse_um(space, run.study.patches(), run.study.sigma_um, curves=True)
+    if with_um > (1.0 - LEAST_GAIN) * without_um:
+        return
+    fit = run.learned(curves)
+    if fit.objective > run.fit.objective:
+        return
+    laws = [e.id for e in fit.model.effects if e.family == 'learned']
+    before = run.history[-1]
+    run.record(' and '.join(laws), fit, with_um)
+    run.accepted += [run.described((law,), 1.0, before) for law in laws]
+
+
+def _conclude(run: Run, space: ModelSpace, p_value: float) -> Diagnosis:
+    """The verdict on what was found."""
+    named = [c for c in run.accepted if not c.best.startswith('learned:')]
+    others = _others(run, space)
+    if named:
+        names = ', and '.join(_in_words(c) for c in named)
+        return run.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
+    outside = space.inclusion(UNKNOWN, FOOTPRINT)
+    if outside > 0.5 or not others:
+        footprint = space.inclusion(FOOTPRINT) > space.inclusion(UNKNOWN)
+        unknown = locate_unexplained(run.study, run.history[0].fit, footprint, run.seed)
         reason = (
             'The pattern itself differs from the two Gaussians of eq. (1).'
             if footprint
             else f'Something outside the library shows against {unknown.covariate}.'
         )
-        return run.diagnosis(first, 'unknown_effect', reason, others, unknown)
+        return run.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
         f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
     )
-    return run.diagnosis(first, 'undecided', reason, others)
+    return run.diagnosis(p_value, 'undecided', reason, others)
+
+
+def _others(run: Run, space: ModelSpace) -> tuple[EffectClass, ...]:
+    """Groups of effects that may act, but are not accepted."""
+    known = {member for found in run.accepted for member in found.members}
+    best = space.models[0]
+    found: list[EffectClass] = []
+    for cause in sorted(run.candidates, key=lambda c: -space.inclusion(c)):
+        if cause in known or space.inclusion(cause) < WORTH_LISTING:
+            continue
+        members, probability = space.group(cause) if cause in best.causes else ((cause,), 0.0)
+        members = (cause, *(m for m in members if m not in known and m != cause))
+        known |= set(members)
+        fit = run.fitted_with([*run.taken, run.candidates[cause][0]])
+        probability = probability or space.inclusion(cause)
+        found.append(run.described(members, probability, run.history[-1], fit))
+    return tuple(found)
 
 
 def _in_words(found: EffectClass) -> str:
     if len(found.members) == 1:
         return found.best
     return f'{found.best} (or what they cannot tell from it: {", ".join(found.members[1:])})'
-
-
-def _explains_most(run: Run, last: Linearisation) -> bool:
-    """Whether the effects that were added explain far more than is left to explain."""
-    left = float(np.max(last.space.log_bayes_factors))
-    gained = len(run.study) * np.log(run.history[0].rmse_um / run.history[-1].rmse_um)
-    return left < LEFT_OVER * gained

@@ -1,17 +1,21 @@
-"""One run of the inference: a model is fitted to a campaign and effects are added to it.
+"""One run of the inference: a model fitted to a campaign, and what is added to it.
 
 What is added is the caller's choice: ``diagnose`` adds what is most probable, ``refit`` what the
 user asks for.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.stats import f as f_ratio
 
-from paint_deposition.diagnosis.classes import ConfoundedClass
-from paint_deposition.diagnosis.linearisation import Linearisation, linearise
-from paint_deposition.diagnosis.sensitivities import Sensitivity, neutral_shapes
+from paint_deposition.diagnosis.evidence import NullModel
+from paint_deposition.diagnosis.explanations import explanations
+from paint_deposition.diagnosis.learning import ChosenCurve
+from paint_deposition.diagnosis.model_space import ModelSpace
+from paint_deposition.diagnosis.sensitivities import neutral_shapes
+from paint_deposition.diagnosis.testability import Testability, testability
 from paint_deposition.diagnosis.verdict import (
     Diagnosis,
     EffectClass,
@@ -22,16 +26,13 @@ from paint_deposition.diagnosis.verdict import (
 )
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LearnedLaw
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
-# Significance level of the test that something is missing, and the posterior probability from
-# which an effect is said to be missing.
-ALPHA = 0.05
-SURE = 0.8
 STARTS = 10
 # A point that gets less than this share of the mean film was hardly reached by the path.
 REACHED = 0.02
@@ -50,8 +51,8 @@ class Run:
         study: the readings.
         fit: of the newest model.
         history: every model so far, the one started from first.
-        accepted: the effects added so far, each with those confounded with it.
-        candidates: effects that may be added, at neutral amplitude and in a few shapes, by id.
+        accepted: the effects and learned laws added so far, with what is confounded with each.
+        candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
         trouble: why the fit cannot be right, '' if it can.
     """
 
@@ -76,57 +77,119 @@ class Run:
         self.fit = self.study.fit(parameters, STARTS, seed, self.study.nuisance)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
+        self.testable: Testability | None = None
         self.trouble = trouble_with(self.study, self.fit)
-        self._excluded: list[Sensitivity] = []
 
-    def linearise(self) -> Linearisation:
-        """The evidence about what is missing from the newest model."""
-        return linearise(self.study, self.fit, self.candidates, self._excluded, self.seed)
+    @property
+    def added(self) -> frozenset[str]:
+        """Ids of the candidates that the newest model has."""
+        return frozenset(effect.id for effect in self.taken)
 
-    def add(self, found: ConfoundedClass, linear: Linearisation) -> None:
-        """Add the best effect of a class.
+    def linearise(self) -> ModelSpace:
+        """The space of models around the newest fit; what was added may be missing again."""
+        null = NullModel.around(self.fit, self.added, self.study.nuisance)
+        found = explanations(self.study, self.fit, self.candidates)
+        if self.testable is None:
+            self.testable = testability(null, found)
+        return ModelSpace(null, found, self.study.noise.degrees_of_freedom)
 
-        The effects confounded with it are no candidates any longer, and what they could explain
-        counts as nuisance in later rounds.
+    @property
+    def taken(self) -> list[Effect]:
+        """The candidates that the newest model has."""
+        return [e for e in self.fit.model.effects if e.id in self.candidates]
+
+    def fitted_with(self, effects: Sequence[Effect], curves: np.ndarray | None = None) -> Fit:
+        """The start model refitted with these effects instead of what was added.
+
+        Args:
+            effects: with their first values.
+            curves: (P, n) directions over the noise that are left free beside them.
         """
-        step = Step.of(self.study, found.best, found.fit)
-        self.accepted.append(self.described(found, step))
-        self.history.append(step)
-        self.fit = found.fit
-        self._excluded += [s for s in linear.sensitivities if s.id in found.members[1:]]
-        for member in found.members:
-            self.candidates.pop(member)
+        model = self.fit.model
+        kept = tuple(e for e in model.effects if e.id not in self.candidates)
+        start = model.model_copy(update={'effects': (*kept, *effects)})
+        nuisance = self.study.nuisance
+        if curves is not None:
+            nuisance = np.hstack([nuisance, curves])
+        parameters = FreeParameters.of(start, *start.effects)
+        return self.study.fit(parameters, nuisance=nuisance)
 
-    def described(self, found: ConfoundedClass, after: Step) -> EffectClass:
-        """A class with its intervals and the errors before and after adding its best effect."""
+    def learned(self, curves: Sequence[ChosenCurve]) -> Fit:
+        """The newest model with the curves that the readings call for."""
+        columns = np.hstack([curve.columns for curve in curves])
+        free = self.fitted_with(self.taken, columns)
+        covariance = np.eye(len(self.study)) + free.nuisance @ free.nuisance.T
+        amounts = columns.T @ np.linalg.solve(covariance, free.residual)
+        ends = np.cumsum([curve.columns.shape[1] for curve in curves])
+        laws: list[LearnedLaw] = []
+        for curve, part in zip(curves, np.split(amounts, ends[:-1]), strict=True):
+            assert curve.explanation.curve is not None
+            basis, at_knots = curve.explanation.curve
+            laws.append(basis.learned(at_knots @ (curve.size * part)))
+        start = free.model.model_copy(update={'effects': (*free.model.effects, *laws)})
+        parameters = FreeParameters.of(start, *start.effects)
+        return self.study.fit(parameters, nuisance=self.study.nuisance)
+
+    def record(self, added: str, fit: Fit, holdout_um: float | None = None) -> None:
+        """Take a fit as the newest model.
+
+        Args:
+            added: what it has more than the one before.
+            fit: of the model.
+            holdout_um: its error on points left out when the choice was made without them, too
+                [um]; default: when the model was refitted without them.
+        """
+        self.fit = fit
+        step = Step.of(self.study, added, fit)
+        self.history.append(
+            step if holdout_um is None else replace(step, holdout_rmse_um=holdout_um)
+        )
+
+    def described(
+        self,
+        members: tuple[str, ...],
+        probability: float,
+        before: Step,
+        trial: Fit | None = None,
+    ) -> EffectClass:
+        """A class with its intervals and the errors before and after adding its best effect.
+
+        Args:
+            members: ids, the best first.
+            probability: that one of them is missing.
+            before: the model without it.
+            trial: a fit with the best one; default: the newest model.
+        """
+        after = self.history[-1] if trial is None else Step.of(self.study, members[0], trial)
         return EffectClass(
-            found.members,
-            found.probability,
-            found.best,
-            intervals(found.fit, found.best),
-            {'before': self.history[-1].holdout_rmse_um, 'after': after.holdout_rmse_um},
+            members,
+            min(probability, 1.0),
+            members[0],
+            intervals(after.fit, members[0]),
+            {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um},
         )
 
     def diagnosis(
         self,
-        first: Linearisation | None,
+        p_value: float,
         verdict: Verdict,
         reason: str,
         others: tuple[EffectClass, ...] = (),
         unknown: Unknown | None = None,
     ) -> Diagnosis:
-        """Put the results together; ``first`` is None where nothing could be tested."""
+        """Put the results together."""
+        not_testable, detectable = self.testable or ((), {})
         return Diagnosis(
             self.study,
             verdict,
             reason,
-            first.space.p_value if first else np.nan,
+            p_value,
             tuple(c.best for c in self.accepted),
             (*self.accepted, *others),
             tuple(self.history),
             unknown,
-            first.not_testable if first else (),
-            first.detectable if first else {},
+            not_testable,
+            detectable,
         )
 
 

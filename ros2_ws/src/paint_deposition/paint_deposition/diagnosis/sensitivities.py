@@ -12,10 +12,7 @@ from paint_deposition.fitting.least_squares import Fit
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25
 # Values that are tried for each shape parameter.
-SHAPES = 3
-# Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
-# effect counts as testable.
-TESTABLE = 2.0
+SHAPES = 5
 
 
 @dataclass(frozen=True)
@@ -46,15 +43,18 @@ class Sensitivity:
         """(n,) +1 where only growth above neutral is physical, -1 below, 0 either."""
         return 1.0 * (self.low >= 0.0) - 1.0 * (self.high <= 0.0)
 
-    @property
-    def shape(self) -> tuple[tuple[str, str, float], ...]:
-        """(effect id, parameter, value) of each shape parameter."""
+    def with_amplitudes(self, amounts: np.ndarray) -> Effect:
+        """The effect with amplitudes (n,) in their typical sizes, within its bounds."""
         info = type(self.effect).parameters()
-        return tuple(
-            (self.id, name, getattr(self.effect, name))
-            for name in info
-            if info[name]['role'] == 'shape'
-        )
+        values = {
+            name: float(np.clip(
+                info[name]['neutral'] + info[name]['typical'] * amount,
+                info[name]['low'],
+                info[name]['high'],
+            ))
+            for name, amount in zip(self.names, amounts, strict=True)
+        }  # fmt: skip
+        return self.effect.model_copy(update=values)
 
 
 def neutral_shapes(effect: type[Effect]) -> list[Effect]:
@@ -100,8 +100,3 @@ def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray
         lows.append((low - neutral) / typical)
         highs.append((high - neutral) / typical)
     return Sensitivity(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))
-
-
-def signal_to_noise(whitened: np.ndarray) -> float:
-    """Of a typical amplitude, along the combination (P, n) of amplitudes that shows most."""
-    return float(np.linalg.norm(whitened, 2))

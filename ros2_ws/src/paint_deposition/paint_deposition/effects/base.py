@@ -1,8 +1,9 @@
 """What an effect is: one physical cause, its parameters, and where in the model it acts."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, ClassVar, cast
 
 import numpy as np
@@ -109,6 +110,12 @@ class Effect(BaseModel):
     signature: ClassVar[str] = ''
     rivals: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ''
+    # Covariates along which the law may be off, each with the direction in which a law of any form
+    # over it must go: it rises (1), falls (-1), or either (0).
+    covariates: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
+    # over a covariate is not that effect.
+    free_law: ClassVar[str] = ''
     needs_whole_strokes: ClassVar[bool] = False
     needs_slope: ClassVar[bool] = False
     flux_factor: ClassVar[Callable[..., float] | None] = None

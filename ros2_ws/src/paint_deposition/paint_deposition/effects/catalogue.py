@@ -6,6 +6,7 @@ from types import MappingProxyType
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned import learned_law
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.
@@ -28,11 +29,14 @@ EFFECTS = MappingProxyType(_effects_of_the_library())
 
 
 def effect_class(effect_id: str) -> type[Effect]:
-    """The class of an effect.
+    """The class of an effect of the library, or of a learned law, as 'learned:time_s'.
 
     Raises:
         ModelError: there is none of that id; names the nearest.
     """
     if effect_id in EFFECTS:
         return EFFECTS[effect_id]
+    family, is_learned, covariate = effect_id.partition(':')
+    if is_learned and family == 'learned':
+        return learned_law(covariate)
     raise ModelError(f'no effect is called {effect_id!r}; {did_you_mean(effect_id, EFFECTS)}')

@@ -10,11 +10,12 @@ from pydantic import Field
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import learned_law
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.model_text import model_text
+from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.pattern import PlanarPattern
@@ -136,9 +137,23 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
     source = entry[chosen[0]]
     if not isinstance(source, str):
         raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
+    if entry.get('id') == LEARNED_ID:
+        return _learned(where, entry)
     cls = effect_class(source) if chosen == ['id'] else load(source)
     values = {key: entry[key] for key in entry if key not in chosen}
     return checked(cls, source, values, ModelError)
+
+
+def _learned(where: str, entry: dict[str, Any]) -> Effect:
+    """A learned law: its covariate says which."""
+    covariate = _given(str, f'{where}: covariate', {f'{where}: covariate': entry.get('covariate')})
+    if not covariate:
+        raise ModelError(
+            f'{where}: has no covariate; give that of the learned law, such as time_s'
+        )
+    cls = learned_law(covariate)
+    values = {key: entry[key] for key in entry if key not in ('id', 'covariate')}
+    return checked(cls, cls.id, values, ModelError)
 
 
 def _mappings(key: str, content: dict[str, Any]) -> dict[str, dict[str, Any]]:

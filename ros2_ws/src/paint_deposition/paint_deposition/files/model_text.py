@@ -8,13 +8,16 @@ from typing import Any
 
 from pydantic import BaseModel
 from ruamel.yaml import YAML
-from ruamel.yaml.comments import CommentedMap
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LearnedLaw
 from paint_deposition.files.json_files import plain
 
 COMMENT_COLUMN = 33
+# What stands for all learned laws; the covariate says which.
+LEARNED_ID = 'learned'
 COMMENTS = {
     'planar': 'eq. (1): flux on the model plane',
     'projection': 'eq. (2): from the model plane to the surface',
@@ -58,6 +61,13 @@ def model_text(
 
 
 def _effect(effect: Effect, folder: Path) -> CommentedMap:
+    if isinstance(effect, LearnedLaw):
+        text = _fields(effect, id=LEARNED_ID, covariate=effect.covariate)
+        text['learned'] = CommentedSeq(effect.learned)
+        text['learned'].fa.set_flow_style()
+        about = f'{effect.over} [{effect.unit}]'
+        text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
+        return text
     source = 'id' if effect.file is None else 'file'
     name = effect.id if effect.file is None else _relative(effect.file, folder)
     text = _fields(effect, **{source: name})

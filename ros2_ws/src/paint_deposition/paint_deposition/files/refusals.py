@@ -38,6 +38,8 @@ def checked(model: type[Made], where: str, values: Any, refusal: type[PaintError
 def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     first, others = error.errors()[0], error.error_count() - 1
     more = f' (and {others} more)' if others else ''
+    if first['type'] == 'value_error' and not first['loc']:
+        return f'{where}: {first["ctx"]["error"]}{more}'
     if not first['loc']:
         return f'{where} is {first["input"]!r}; expected the keys {", ".join(model.model_fields)}'
     key = '.'.join(str(part) for part in first['loc'])

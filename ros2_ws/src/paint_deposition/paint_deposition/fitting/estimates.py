@@ -67,7 +67,7 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
     sigma = np.sqrt(np.diag(_spread(fit)))
     _, prior = fit.parameters.prior
     learned = np.sqrt(np.diag(covariance)) <= LEARNED * prior
-    values = _parameters(fit, fit.vector[np.newaxis])[0]
+    values = fit.parameters.values(fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
     k3, sigma_k3 = values[2], sigma[2]
     found = []
@@ -117,22 +117,6 @@ def _names(fit: Fit) -> tuple[str, ...]:
     return (*PATTERN_NAMES, *(f'{effect}.{name}' for effect, name in fit.parameters.varied))
 
 
-def _parameters(fit: Fit, vectors: np.ndarray) -> np.ndarray:
-    """(n, k) parameters in the model's units for vectors (n, k) of the fit."""
-    log_k1, k2, k3_cos, k3_sin, r, log_sigma1, log_sigma2 = vectors[:, :7].T
-    amplitudes = fit.parameters.neutral + fit.parameters.typical * vectors[:, 7:]
-    pattern = [
-        np.exp(log_k1),
-        k2,
-        np.minimum(np.hypot(k3_cos, k3_sin), 1.0),
-        np.arctan2(k3_sin, k3_cos),
-        r,
-        np.exp(log_sigma1),
-        np.exp(log_sigma2),
-    ]
-    return np.column_stack([*pattern, amplitudes])
-
-
 def _around_phase(values: np.ndarray, centre: np.ndarray) -> np.ndarray:
     """The phase, which runs in a circle, at most half a turn from its centre."""
     away = values - centre
@@ -145,7 +129,7 @@ def _spread(fit: Fit) -> np.ndarray:
     low, high = fit.parameters.bounds
     steps = STEP * np.eye(len(fit.vector))
     up, down = np.minimum(fit.vector + steps, high), np.maximum(fit.vector - steps, low)
-    change = _around_phase(_parameters(fit, up), _parameters(fit, down))
+    change = _around_phase(fit.parameters.values(up), fit.parameters.values(down))
     by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
     return by_vector @ scaled_covariance(fit) @ by_vector.T
 
@@ -157,7 +141,7 @@ def _intervals(
     random = np.random.default_rng(0)
     vectors = random.multivariate_normal(fit.vector, covariance, DRAWS, method='cholesky')
     inside = np.clip(vectors, *fit.parameters.bounds)
-    away = _around_phase(_parameters(fit, inside), values)
+    away = _around_phase(fit.parameters.values(inside), values)
     low, high = np.quantile(away, TAILS, axis=0)
     return values + low, values + high
 

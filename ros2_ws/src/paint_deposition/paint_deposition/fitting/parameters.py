@@ -2,7 +2,7 @@
 
 The vector holds smooth coordinates of the pattern: logarithms of what is positive, and the
 asymmetry as K3 cos(phi) and K3 sin(phi), so that phi is well-behaved when K3 vanishes. Amplitudes
-of effects are in units of their typical size.
+of effects are in units of their typical size, shapes logarithms of the ratio to their default.
 """
 
 from dataclasses import dataclass
@@ -13,6 +13,9 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.pattern import PlanarPattern
+
+# The range that is physical for a shape parameter is this many standard deviations of its prior.
+SHAPE_DEVIATIONS = 4.0
 
 
 @dataclass(frozen=True)
@@ -41,12 +44,57 @@ PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigm
 
 
 @dataclass(frozen=True)
+class EffectParameter:
+    """One entry of the vector for an effect: an amplitude, or a shape such as a length.
+
+    Attributes:
+        effect: id. name: of the parameter.
+        neutral, low, high: its neutral (for a shape: default) value and its bounds.
+        unit: an amplitude's typical size; for a shape, the logarithm that counts as one.
+        is_shape: whether it is a shape.
+    """
+
+    effect: str
+    name: str
+    neutral: float
+    low: float
+    high: float
+    unit: float
+    is_shape: bool
+
+    @staticmethod
+    def of(effect: Effect, name: str) -> 'EffectParameter':
+        """The entry of an effect's parameter."""
+        info = effect.parameters()[name]
+        is_shape = info['role'] == 'shape'
+        low, high = info['low'], info['high']
+        unit = np.log(high / low) / SHAPE_DEVIATIONS if is_shape else info['typical']
+        return EffectParameter(effect.id, name, info['neutral'], low, high, unit, is_shape)
+
+    def encode(self, value: float) -> float:
+        """The vector's entry for a value."""
+        if self.is_shape:
+            return float(np.log(value / self.neutral) / self.unit)
+        return (value - self.neutral) / self.unit
+
+    def decode(self, entry: np.ndarray) -> np.ndarray:
+        """Values for entries, kept within the bounds; arrays of any shape."""
+        entry = np.asarray(entry, dtype=float)
+        value = (
+            self.neutral * np.exp(self.unit * entry)
+            if self.is_shape
+            else self.neutral + self.unit * entry
+        )
+        return np.clip(value, self.low, self.high)
+
+
+@dataclass(frozen=True)
 class FreeParameters:
     """The parameters of a model that are varied.
 
     Attributes:
         start: the model that fixes everything else, effects included.
-        varied: (effect id, parameter name) of the amplitudes that are varied.
+        varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
     """
 
     start: DepositionModel
@@ -54,11 +102,11 @@ class FreeParameters:
 
     @staticmethod
     def of(start: DepositionModel, *effects: Effect) -> 'FreeParameters':
-        """The pattern and all amplitudes of these effects; those the model lacks are added."""
+        """The pattern and all parameters of these effects; those the model lacks are added."""
         for effect in effects:
             if start.effect(effect.id) is None:
                 start = start.with_effect(effect)
-        varied = [(e.id, name) for e in effects for name in type(e).amplitudes()]
+        varied = [(e.id, name) for e in effects for name in e.parameters()]
         return FreeParameters(start, tuple(varied))
 
     @property
@@ -70,31 +118,19 @@ class FreeParameters:
         return len(PATTERN) + len(self.varied)
 
     @cached_property
-    def _amplitudes(self) -> list[dict]:
-        known = {e.id: e.parameters() for e in self.start.effects}
-        return [known[e][n] for e, n in self.varied]
-
-    @property
-    def typical(self) -> np.ndarray:
-        """(A,) typical size of each amplitude, its unit in the vector."""
-        return np.array([info['typical'] for info in self._amplitudes])
-
-    @property
-    def neutral(self) -> np.ndarray:
-        """(A,) value of each amplitude at which its effect is absent."""
-        return np.array([info['neutral'] for info in self._amplitudes])
+    def of_effects(self) -> tuple[EffectParameter, ...]:
+        """The entries behind those of the pattern."""
+        known = {effect.id: effect for effect in self.start.effects}
+        return tuple(EffectParameter.of(known[e], n) for e, n in self.varied)
 
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of the vector."""
-        low = [c.low for c in PATTERN]
-        high = [c.high for c in PATTERN]
-        for info in self._amplitudes:
-            ends = sorted(
-                (info[side] - info['neutral']) / info['typical'] for side in ('low', 'high')
-            )
-            low.append(ends[0])
-            high.append(ends[1])
+        ends = [(c.low, c.high) for c in PATTERN]
+        for entry in self.of_effects:
+            first, second = sorted((entry.encode(entry.low), entry.encode(entry.high)))
+            ends.append((first, second))
+        low, high = zip(*ends, strict=True)
         return np.array(low), np.array(high)
 
     @property
@@ -116,31 +152,34 @@ class FreeParameters:
             np.log(p.sigma1_m),
             np.log(p.sigma2_m),
         ]
-        for (effect_id, name), info in zip(self.varied, self._amplitudes, strict=True):
-            value = getattr(model.effect(effect_id), name)
-            entries.append((value - info['neutral']) / info['typical'])
+        entries += [e.encode(getattr(model.effect(e.effect), e.name)) for e in self.of_effects]
         return np.clip(np.array(entries), *self.bounds)
+
+    def values(self, vectors: np.ndarray) -> np.ndarray:
+        """(n, k) parameters in the model's units, pattern first, for vectors (n, k)."""
+        log_k1, k2, k3_cos, k3_sin, r, log_sigma1, log_sigma2 = vectors[:, : len(PATTERN)].T
+        pattern = [
+            np.exp(log_k1),
+            k2,
+            np.minimum(np.hypot(k3_cos, k3_sin), 1.0),
+            np.arctan2(k3_sin, k3_cos),
+            r,
+            np.exp(log_sigma1),
+            np.exp(log_sigma2),
+        ]
+        amounts = [
+            entry.decode(column)
+            for entry, column in zip(self.of_effects, vectors[:, len(PATTERN) :].T, strict=True)
+        ]
+        return np.column_stack([*pattern, *amounts])
 
     def decode(self, vector: np.ndarray) -> DepositionModel:
         """The model of a vector."""
-        log_k1, k2, k3_cos, k3_sin, r, log_s1, log_s2 = (float(v) for v in vector[:7])
-        planar = PlanarPattern(
-            K1_cm3_per_s=np.exp(log_k1),
-            K2=k2,
-            K3=min(np.hypot(k3_cos, k3_sin), 1.0),
-            phi_rad=np.arctan2(k3_sin, k3_cos),
-            r_m=r,
-            sigma1_m=np.exp(log_s1),
-            sigma2_m=np.exp(log_s2),
-        )
+        values = [float(value) for value in self.values(vector[np.newaxis])[0]]
+        planar = PlanarPattern(**dict(zip(PATTERN_NAMES, values, strict=False)))
         changed: dict[str, dict[str, float]] = {}
-        amplitudes = vector[len(PATTERN) :]
-        for (effect_id, name), info, value in zip(
-            self.varied, self._amplitudes, amplitudes, strict=True
-        ):
-            wanted = info['neutral'] + info['typical'] * float(value)
-            inside = min(max(wanted, info['low']), info['high'])
-            changed.setdefault(effect_id, {})[name] = inside
+        for entry, value in zip(self.of_effects, values[len(PATTERN) :], strict=True):
+            changed.setdefault(entry.effect, {})[entry.name] = value
         effects = tuple(
             e.model_copy(update=changed[e.id]) if e.id in changed else e
             for e in self.start.effects

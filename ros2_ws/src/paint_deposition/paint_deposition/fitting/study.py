@@ -12,7 +12,7 @@ from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import Fit, fit_readings
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.readings.campaign import Campaign
-from paint_deposition.readings.covariates import Covariate, Rays, covariates
+from paint_deposition.readings.covariates import Covariate, Rays, along_rays, covariates
 from paint_deposition.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.readings.plausibility import check_unit
 from paint_deposition.readings.residuals import Residuals, root_mean_square
@@ -128,6 +128,11 @@ class Study:
             self._rays.clear()
             self._rays[key] = [Rays.of(e, model) for e in self.campaign.experiments]
         return self._rays[key]
+
+    def along_rays(self, model: DepositionModel) -> list[dict[str, np.ndarray]]:
+        """Covariates along the rays of each experiment."""
+        parts = zip(self.campaign.experiments, self.rays(model), strict=True)
+        return [along_rays(experiment, model, rays) for experiment, rays in parts]
 
     def covariates(self, model: DepositionModel) -> list[Covariate]:
         """Covariates of all points."""

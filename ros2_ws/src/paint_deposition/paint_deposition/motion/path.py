@@ -11,6 +11,7 @@ class SprayPath:
 
     Attributes:
         stamp_ns: (M,) int64 middle of the sub-step.
+        time_s: (M,) the same since the motion began [s], NaN where that is not known.
         dwell_s: (M,) its duration, the quadrature weight [s].
         flow: (M,) flow relative to the calibrated one; 0 is gun off.
         position_m: (M, 3) TCP [m].
@@ -28,6 +29,7 @@ class SprayPath:
     """
 
     stamp_ns: np.ndarray
+    time_s: np.ndarray
     dwell_s: np.ndarray
     flow: np.ndarray
     position_m: np.ndarray
@@ -56,8 +58,9 @@ class SprayPath:
         """The motion alone, as one endless pass without turns and trigger changes."""
         numbers, never = np.zeros(len(flow), np.int64), np.full(len(flow), np.inf)
         return SprayPath(
-            stamp_ns, dwell_s, flow, position_m, rotation, velocity_m_per_s,
-            np.zeros((len(flow), 2)), numbers, numbers, np.ones(len(flow)), *[never] * 6,
+            stamp_ns, np.full(len(flow), np.nan), dwell_s, flow, position_m, rotation,
+            velocity_m_per_s, np.zeros((len(flow), 2)), numbers, numbers, np.ones(len(flow)),
+            *[never] * 6,
         )  # fmt: skip
 
     def __len__(self) -> int:

@@ -67,6 +67,7 @@ class PathBuilder:
         self._finished: list[SprayPath] = []
         self._gap_before_next = False
         self._states: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._began_ns: int | None = None
 
     @property
     def counts(self) -> PoseCounts:
@@ -105,7 +106,7 @@ class PathBuilder:
         for stream in restarted:
             self._cut_segments(until_ns=None)
             self.counts.late_triggers -= self._flow.restart()
-            self._integrated_ns = None
+            self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
             self._waiting = [stream]
 
@@ -172,7 +173,10 @@ class PathBuilder:
         open_flow, since_on, since_off = follow_trigger(
             trigger, path.dwell_s, path.flow, after_gap
         )
+        if self._began_ns is None:
+            self._began_ns = int(path.stamp_ns[0])
         return path.with_(
+            time_s=(path.stamp_ns - self._began_ns) * 1e-9,
             stroke=stroke,
             spray_pass=spray_pass,
             open_flow=open_flow,

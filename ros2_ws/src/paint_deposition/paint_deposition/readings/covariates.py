@@ -5,11 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import along_path, at_points
 from paint_deposition.part.axes import across_axis
 from paint_deposition.readings.campaign import Experiment
 
-# Edge effects reach a few centimetres: the covariate decays over this length [m].
-EDGE_LENGTH_M = 0.03
 # Most sub-steps from which rays are traced; a longer path is thinned.
 SUB_STEPS_USED = 4000
 # A quantity whose standard deviation is a smaller share of its largest value is constant.
@@ -81,29 +80,29 @@ class Rays:
         return (self.share * values).sum(axis=0) / total
 
 
+def along_rays(
+    experiment: Experiment, model: DepositionModel, rays: Rays
+) -> dict[str, np.ndarray]:
+    """Covariates by name, as arrays that broadcast to the M sub-steps and P points.
+
+    (M, 1) what the path is like, (M, P) how a ray lands, (1, P) what the surface is like.
+    """
+    points, path = experiment.measured_points, experiment.path.select(rays.rows)
+    of_path = {name: values[:, np.newaxis] for name, values in along_path(path).items()}
+    of_points = {name: values()[np.newaxis] for name, values in at_points(points).items()}
+    return {
+        'incidence_deg': np.degrees(np.arccos(np.clip(rays.cos_incidence, -1.0, 1.0))),
+        'standoff_ratio': rays.standoff_ratio,
+        **of_path,
+        **of_points,
+        'across_m': (points.positions_m @ across_axis(points.outward, points.down))[np.newaxis],
+        'tool_x_m': rays.x_m,
+        'tool_y_m': rays.y_m,
+        'film_um': rays.share.sum(axis=0)[np.newaxis],
+    }
+
+
 def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> list[Covariate]:
-    """All covariates of an experiment's P points."""
-    points = experiment.measured_points
-    path = experiment.path.select(rays.rows)
-    start_ns = path.stamp_ns[0] if len(path) else 0
-    seconds = (path.stamp_ns - start_ns) * 1e-9
-    incidence = np.degrees(np.arccos(np.clip(rays.mean(rays.cos_incidence), -1.0, 1.0)))
-    from_end = np.minimum(path.from_turn_m, path.to_turn_m)
-    since_on = np.minimum(path.since_on_s, 1.0)
-    return [
-        Covariate('incidence_deg', incidence),
-        Covariate('standoff_ratio', rays.mean(rays.standoff_ratio)),
-        Covariate('curvature_per_m', points.curvature_per_m),
-        Covariate('edge_closeness', np.exp(-points.edge_distance_m / EDGE_LENGTH_M)),
-        Covariate('sky_view_factor', points.sky_view_factor),
-        Covariate('height_fraction', points.height_fraction),
-        Covariate('across_m', points.positions_m @ across_axis(points.outward, points.down)),
-        Covariate('spray_pass', rays.mean(path.spray_pass[:, np.newaxis])),
-        Covariate('time_s', rays.mean(seconds[:, np.newaxis])),
-        Covariate('speed_m_per_s', rays.mean(path.speed_m_per_s[:, np.newaxis])),
-        Covariate('stroke_end_m', rays.mean(from_end[:, np.newaxis])),
-        Covariate('since_trigger_s', rays.mean(since_on[:, np.newaxis])),
-        Covariate('tool_x_m', rays.mean(rays.x_m)),
-        Covariate('tool_y_m', rays.mean(rays.y_m)),
-        Covariate('film_um', rays.share.sum(axis=0)),
-    ]
+    """All covariates of an experiment's P points, on average over the film that arrived."""
+    found = along_rays(experiment, model, rays)
+    return [Covariate(name, rays.mean(values)) for name, values in found.items()]

@@ -4,8 +4,11 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned import LEARNED, LEAST_FACTOR, LearnedLaw
 from paint_deposition.fitting.study import Study
 from paint_deposition.results.fitted_model import PATTERN, REFIT
 
@@ -13,7 +16,7 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
     'incidence_deg': ('Incidence angle', 'deg'),
     'standoff_ratio': ('Distance as a multiple of Omega', '1'),
     'curvature_per_m': ('Curvature, + concave', '1/m'),
-    'edge_closeness': ('Closeness to an edge', '1'),
+    'edge_distance_m': ('Distance to the nearest edge', 'm'),
     'sky_view_factor': ('Sky view factor', '1'),
     'height_fraction': ('Height on the part', '1'),
     'across_m': ('Position across', 'm'),
@@ -45,9 +48,22 @@ def covariate_label(name: str) -> str:
 
 
 def effect_name(effect_id: str) -> str:
-    """'air_drift' as 'air drift'; names are kept for file and command line."""
+    """'air_drift' as 'air drift'; names are kept for file and command line.
+
+    A learned law is told by its covariate, several joined by 'and' one after the other.
+    """
+    if ' and ' in effect_id:
+        return joined([effect_name(one) for one in effect_id.split(' and ')])
+    family, _, covariate = effect_id.partition(':')
+    if family == 'learned' and covariate in LEARNED:
+        return f'learned law over {LEARNED[covariate].over}'
     name = effect_id.replace('tcp_', 'TCP ').replace('faraday', 'Faraday')
     return name.replace('_', ' ')
+
+
+def is_learned(effect_id: str) -> bool:
+    """Whether an id is that of a learned law, which names no cause."""
+    return effect_id.startswith('learned:')
 
 
 def step_words(step: Mapping[str, Any]) -> str:
@@ -65,6 +81,19 @@ def effect_meaning(effect: type[Effect] | None) -> str:
         return effect.__doc__.strip().splitlines()[0]
     described = [info['description'].split(' [')[0] for info in effect.parameters().values()]
     return capital(next(filter(None, [effect.signature, *described]), '').rstrip('.') + '.')
+
+
+def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
+    """A learned law's curve and range as (words, value, unit)."""
+    unit = unit_words(law.unit)
+    first = 1.0 if law.covariate == 'spray_pass' else 0.0
+    low, high = (number(end + first) for end in (law.low, law.high))
+    curve = np.array(law.learned)
+    if law.kind == 'factor':
+        curve = np.maximum(1.0 + curve, LEAST_FACTOR)
+    least, most = number(float(curve.min())), number(float(curve.max()))
+    shown = ('addition', 'µm') if law.kind == 'addition' else ('factor', '')
+    return [(shown[0], f'{least} to {most}', shown[1]), ('over', f'{low} to {high}', unit)]
 
 
 def parameter_words(name: str, unit: str) -> str:

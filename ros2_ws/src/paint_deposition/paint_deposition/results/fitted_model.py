@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.diagnosis.verdict import Step
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
@@ -43,7 +45,8 @@ def write_fitted(
     fit = steps[-1].fit
     history = history_as_list(study, steps, start.history)
     uncertainty = _uncertainty(fit, start.uncertainty)
-    write_model(path, _rounded(fit), header_comment, history, uncertainty, start.name)
+    fitted = _rounded(fit, steps[0].model.effects)
+    write_model(path, fitted, header_comment, history, uncertainty, start.name)
 
 
 def history_as_list(
@@ -79,16 +82,22 @@ def history_as_list(
     return [*kept, *found]
 
 
-def _rounded(fit: Fit) -> DepositionModel:
-    """The fitted model with what was fitted at few digits, within its bounds."""
+def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
+    """The fitted model with what was fitted at few digits, within its bounds.
+
+    Learned laws among the ``given`` effects were not learned here and stay as they are.
+    """
     pattern = {name: _few_digits(getattr(fit.model.planar, name)) for name in PATTERN_NAMES}
     model = fit.model.model_copy(update={'planar': fit.model.planar.model_copy(update=pattern)})
     for effect in model.effects:
-        values = {
+        values: dict[str, Any] = {
             name: _few_digits(getattr(effect, name), info['low'], info['high'])
             for name, info in effect.parameters().items()
             if (effect.id, name) in fit.parameters.varied
         }
+        if isinstance(effect, LearnedLaw) and effect not in given:
+            values = {'low': _few_digits(effect.low), 'high': _few_digits(effect.high)}
+            values['learned'] = tuple(_few_digits(value) for value in effect.learned)
         model = model.with_effect(effect.model_copy(update=values))
     return model
 

@@ -1,5 +1,7 @@
 """Booth air that carries the drops aside on their way."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
@@ -19,6 +21,7 @@ class AirDrift(Effect):
 
     id = 'air_drift'
     family = 'lateral shift'
+    covariates = MappingProxyType({'height_fraction': 0, 'standoff_ratio': 0})
     signature = 'pattern shifted in a direction fixed in the booth, however the gun is turned'
     rivals = ('tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag')
     source = (

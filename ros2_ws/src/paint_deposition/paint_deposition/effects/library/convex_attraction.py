@@ -1,5 +1,7 @@
 """Attraction to convex lines and corners."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
@@ -15,6 +17,8 @@ class ConvexAttraction(Effect):
 
     id = 'convex_attraction'
     family = 'curvature'
+    covariates = MappingProxyType({'curvature_per_m': -1})
+    free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'
     rivals = ('gauge_curvature_bias',)
     source = (

@@ -1,5 +1,7 @@
 """A robot that is slower near reversals than its recorded poses say."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
@@ -16,6 +18,8 @@ class CornerSlowdown(Effect):
 
     id = 'corner_slowdown'
     family = 'boundary'
+    covariates = MappingProxyType({'stroke_end_m': -1})
+    free_law = 'factor'
     signature = 'more paint where the passes turn, none along edges that they run beside'
     rivals = ('edge_build', 'trigger_lag', 'standoff_efficiency')
     source = (

@@ -1,5 +1,7 @@
 """More paint along the free edges: fat edges, picture framing."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, parameter
@@ -15,6 +17,8 @@ class EdgeBuild(Effect):
 
     id = 'edge_build'
     family = 'boundary'
+    covariates = MappingProxyType({'edge_distance_m': -1})
+    free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
     rivals = ('corner_slowdown',)
     source = (
@@ -27,7 +31,7 @@ class EdgeBuild(Effect):
         description='a, excess film at the edge; positive adds',
     )  # fmt: skip
     length_m: float = parameter(
-        0.025, low=0.005, high=0.04, unit='m', role='shape',
+        0.025, low=0.005, high=0.12, unit='m', role='shape',
         description='l, distance in which the excess falls to 37 %',
     )  # fmt: skip
 

@@ -1,5 +1,7 @@
 """Recesses that the field does not reach."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
@@ -16,6 +18,8 @@ class FaradayShielding(Effect):
 
     id = 'faraday_shielding'
     family = 'curvature'
+    covariates = MappingProxyType({'curvature_per_m': -1, 'sky_view_factor': 1})
+    free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'
     rivals = ('gauge_curvature_bias', 'occlusion')
     source = (

@@ -1,5 +1,7 @@
 """Flow that drifts from pass to pass."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
@@ -18,6 +20,8 @@ class FlowDrift(Effect):
 
     id = 'flow_drift'
     family = 'order'
+    covariates = MappingProxyType({'time_s': 0})
+    free_law = 'factor'
     signature = 'level changes in the order of the passes; reversed if their order is'
     rivals = ('fog_gradient',)
     source = (

@@ -1,5 +1,7 @@
 """Overspray that settles more on the lower part of the part."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, parameter
@@ -15,6 +17,8 @@ class FogGradient(Effect):
 
     id = 'fog_gradient'
     family = 'order'
+    covariates = MappingProxyType({'height_fraction': -1})
+    free_law = 'addition'
     signature = 'more at the bottom, by a fixed amount: not in proportion to the film'
     rivals = ('flow_drift',)
     source = 'transfer efficiency of 0.8 leaves 20 % airborne; linear form proposed here'

@@ -1,5 +1,7 @@
 """A gauge that reads high on convex surface and low in hollows."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
@@ -16,6 +18,8 @@ class GaugeCurvatureBias(Effect):
 
     id = 'gauge_curvature_bias'
     family = 'curvature'
+    covariates = MappingProxyType({'curvature_per_m': -1})
+    free_law = 'addition'
     signature = 'follows curvature, not film: the same on thin and on thick paint'
     rivals = ('faraday_shielding', 'convex_attraction')
     source = 'Helmut Fischer, application note on curvature; ISO 2178 and ISO 2360'

@@ -1,5 +1,7 @@
 """A gauge whose zero is off."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, parameter
@@ -14,6 +16,7 @@ class GaugeZero(Effect):
 
     id = 'gauge_zero'
     family = 'level'
+    covariates = MappingProxyType({'film_um': 0})
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'

@@ -1,5 +1,7 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
+from types import MappingProxyType
+
 from paint_deposition.effects.base import Effect, Ray, parameter
 
 
@@ -15,6 +17,8 @@ class IncidenceAttraction(Effect):
 
     id = 'incidence_attraction'
     family = 'incidence'
+    covariates = MappingProxyType({'incidence_deg': 0})
+    free_law = 'factor'
     signature = 'grows with incidence; most on surface that turns away from the gun'
     rivals = ('standoff_efficiency',)
     source = (
@@ -24,7 +28,7 @@ class IncidenceAttraction(Effect):
     )
 
     attraction: float = parameter(
-        0.0, low=-1.0, high=2.0, typical=1.0, unit='1',
+        0.0, low=-1.0, high=6.0, typical=1.0, unit='1',
         description='a, gain of flux at glancing incidence; positive attracts, negative rebounds',
     )  # fmt: skip
 

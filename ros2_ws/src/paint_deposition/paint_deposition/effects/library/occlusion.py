@@ -1,5 +1,7 @@
 """Metal that stands between the gun and the surface."""
 
+from types import MappingProxyType
+
 from paint_deposition.effects.base import Effect, parameter
 
 
@@ -12,6 +14,7 @@ class Occlusion(Effect):
 
     id = 'occlusion'
     family = 'visibility'
+    covariates = MappingProxyType({'sky_view_factor': 0})
     signature = 'less behind other parts of the surface, with a step at the edge of the shadow'
     rivals = ('faraday_shielding',)
     source = 'rays against the mesh (Moeller and Trumbore), as in simulators of cold spray'

@@ -1,5 +1,7 @@
 """A part that does not hang where its drawing says."""
 
+from types import MappingProxyType
+
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
@@ -17,6 +19,7 @@ class PartMisalignment(Effect):
 
     id = 'part_misalignment'
     family = 'lateral shift'
+    covariates = MappingProxyType({'height_fraction': 0})
     signature = 'pattern shifted in a direction fixed in the part, more so away from its centre'
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'sag')
     source = 'error of fixtures; size from general practice'

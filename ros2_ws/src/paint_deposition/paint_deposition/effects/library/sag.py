@@ -1,5 +1,7 @@
 """Wet paint that runs down a steep surface."""
 
+from types import MappingProxyType
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect, parameter
@@ -19,6 +21,7 @@ class Sag(Effect):
 
     id = 'sag'
     family = 'lateral shift'
+    covariates = MappingProxyType({'film_um': 0, 'height_fraction': 0})
     signature = "thick zones thinner at their top and thicker below; grows with the film's cube"
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment')
     source = (

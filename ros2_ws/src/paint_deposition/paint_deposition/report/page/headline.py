@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import f as fisher
 
-from paint_deposition.diagnosis.run import ALPHA, SURE
+from paint_deposition.diagnosis.model_space import SURE
+from paint_deposition.diagnosis.procedure import ALPHA
 from paint_deposition.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
@@ -14,6 +15,7 @@ from paint_deposition.report.words import (
     covariate_label,
     effect_name,
     in_print,
+    is_learned,
     joined,
     micrometres,
     p_words,
@@ -63,19 +65,20 @@ def headline(data: ReportData) -> Headline:
 def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     rows = _accepted_rows(data)
     facts = (
-        ('What is missing', _explained(rows)),
+        ('What is missing', _explained([row for row in rows if not is_learned(row['id'])])),
         ('How sure', f'{_sure(rows)} {_chance(diagnosis)}'),
         ('What it costs', _costs(data, diagnosis)),
         ('What changes', _changes(data, diagnosis)),
     )
-    names = joined([_with_confounded(row) for row in rows])
+    named = [row for row in rows if not is_learned(row['id'])]
+    names = joined([_with_confounded(row) for row in named])
     return Headline('found', 'An effect is missing', f'The model lacked {names}', facts)
 
 
 def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> Headline:
     """An effect that the user had added although the readings do not show it for sure."""
     rows = _accepted_rows(data)
-    names = joined([row['name'] for row in rows])
+    names = joined([_with_article(row['id']) for row in rows])
     title = (
         f'The readings do not call for {names}'
         if probability < LIKELY
@@ -128,6 +131,12 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
             f'{capital(in_print(unknown.where))}; most clearly against {label} '
             f'({p_words(unknown.p_value)}).'
         )
+        if any(map(is_learned, diagnosis.accepted)):
+            title += '; its law was learned'
+            remedy = (
+                'Look at the curve of the learned law below, and name its cause if you can. The '
+                'model with it predicts as the error says, within the range of the readings.'
+            )
         if unknown.kind == 'footprint':
             title = "The gun's pattern differs from the model's two Gaussians"
             remedy = 'Spray one straight pass on a flat panel and measure across it.'
@@ -209,9 +218,11 @@ def _with_confounded(row: dict) -> str:
 
 
 def _sure(rows: list[dict]) -> str:
-    """How probable each of the effects is."""
+    """How probable each of the effects is; a learned law names none."""
     found = []
     for row in rows:
+        if is_learned(row['id']):
+            continue
         names = joined([row['name'], *row['others']], 'or')
         text = f'{capital(names)} with a probability of {percent_words(row["found"].probability)}'
         if row['others']:
@@ -230,7 +241,7 @@ def _chance(diagnosis: Diagnosis) -> str:
 def _costs(data: ReportData, diagnosis: Diagnosis) -> str:
     """What each effect that was added does to the readings."""
     return ' '.join(
-        f'{capital(effect_name(name))} changes the reading by '
+        f'{capital(_with_article(name))} changes the reading by '
         f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} '
         f'over the part, {micrometres(change.rms_um)} RMS.'
         for name, change in data.changes.items()
@@ -257,10 +268,16 @@ def _changes(data: ReportData, diagnosis: Diagnosis) -> str:
 
 def _added(row: dict) -> str:
     values = [
-        f'{p["words"]} {p["value"]} {p["unit"]} ({p["low"]} to {p["high"]})'.replace('  ', ' ')
+        f'{p["words"]} {p["value"]} {p["unit"]}'.rstrip()
+        + (f' ({p["low"]} to {p["high"]})' if 'low' in p else '')
         for p in row['parameters']
     ]
-    return f'{capital(row["name"])} was added with {joined(values)}.'
+    text = ' '.join(values) if is_learned(row['id']) else joined(values)
+    return f'{capital(_with_article(row['id']))} was added with {text}.'
+
+
+def _with_article(name: str) -> str:
+    return f'a {effect_name(name)}' if is_learned(name) else effect_name(name)
 
 
 def _blind(diagnosis: Diagnosis) -> str:

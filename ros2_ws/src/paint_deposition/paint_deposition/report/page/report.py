@@ -18,6 +18,7 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
 from paint_deposition.report.page import tables
 from paint_deposition.report.page.headline import headline, key_figures
+from paint_deposition.report.page.learned import learned_figure
 from paint_deposition.report.page.profiles import profile_figure
 from paint_deposition.report.page.scene import places_scene, scene_data
 
@@ -57,6 +58,7 @@ def report_html(data: ReportData) -> str:
         charts.covariate_figure(data),
         charts.history_figure(data),
         charts.unknown_figure(data),
+        learned_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
     content = {

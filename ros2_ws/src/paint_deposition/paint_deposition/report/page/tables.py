@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned import LearnedLaw
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.parameters import PATTERN_NAMES
 from paint_deposition.report.data import ReportData
@@ -14,6 +15,7 @@ from paint_deposition.report.words import (
     effect_meaning,
     effect_name,
     in_unit,
+    learned_words,
     number,
     parameter_words,
 )
@@ -35,8 +37,11 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
                 'meaning': effect_meaning(effect),
                 'signature': effect.signature if effect else '',
                 'parameters': [
-                    _parameter(effect, name, *astuple(value))
-                    for name, value in found.parameters.items()
+                    *(
+                        _parameter(effect, name, *astuple(value))
+                        for name, value in found.parameters.items()
+                    ),
+                    *_learned(data.model.effect(found.best)),
                 ],
             }
         )
@@ -48,6 +53,14 @@ def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[s
     unit = effect.parameters()[name]['unit'] if effect else ''
     printed = zip(('unit', 'value', 'low', 'high'), in_unit(unit, *values), strict=False)
     return {'words': parameter_words(name, unit)} | dict(printed)
+
+
+def _learned(effect: Effect | None) -> list[dict[str, str]]:
+    """The curve and the range of a learned law; nothing for other effects."""
+    if not isinstance(effect, LearnedLaw):
+        return []
+    keys = ('words', 'value', 'unit')
+    return [dict(zip(keys, row, strict=True)) for row in learned_words(effect)]
 
 
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
@@ -73,13 +86,10 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for effect in data.model.effects:
         found = known.get(effect.id, {})
-        parameters = [
-            _parameter(
-                type(effect), name,
-                *(astuple(found[name]) if name in found else [getattr(effect, name)]),
-            )
-            for name in effect.parameters()
-        ]  # fmt: skip
+        parameters = _learned(effect)
+        for name in effect.parameters():
+            values = astuple(found[name]) if name in found else [getattr(effect, name)]
+            parameters.append(_parameter(type(effect), name, *values))
         rows.append({'id': effect.id, 'change': data.changes[effect.id], 'parameters': parameters})
     return rows
 

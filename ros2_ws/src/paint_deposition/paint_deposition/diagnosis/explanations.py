@@ -1,0 +1,234 @@
+"""Everything that may be missing, as directions in which the readings would then deviate.
+
+An effect explains by its law, whose sensitivities span the first directions, and by the error of
+that law: a smooth relative error along the covariates that the effect itself names, in proportion
+to the effect. An effect that names a free law also explains by any smooth curve over its own
+covariate. Shapeless explanations stand for causes outside the library, and deviations of the
+pattern for a footprint that is no two Gaussians.
+"""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.linalg import eigh
+
+from paint_deposition.diagnosis.footprint import pattern_deviations_um
+from paint_deposition.diagnosis.sensitivities import Sensitivity, sensitivity
+from paint_deposition.diagnosis.smooth_laws import KNOTS, CurveBasis, curve_basis
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned import LEARNED
+from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.study import Study
+
+UNKNOWN, FOOTPRINT = 'unknown', 'footprint'
+# Relative error of a law, as a standard deviation, and its length of correlation in standard
+# deviations of the covariate.
+LAW_ERROR, LAW_LENGTH = 0.3, 1.0
+# Prior share of the law against a free law over the effect's own covariate.
+LAW_SHARE = 0.7
+# Free laws: size of a factor, of an addition [um], and lengths of correlation.
+FREE_FACTOR, FREE_ADDITION_UM, FREE_LENGTHS = 0.05, 0.7, (1.0, 2.0)
+# Share of all ups and downs of a free law that may go against its direction: noise bends it.
+MOST_WRONG_WAY = 0.2
+# Shapeless causes: size as a share of the film; lengths over the part [m]; over a covariate that
+# an effect owns only what is too wiggly to be that effect's law.
+FIELD_SHARE, PART_LENGTHS_M, PART_SHARE = 0.05, (0.1, 0.25), 0.5
+WIGGLY, SMOOTH = 0.35, 1.0
+# Time is resolved more finely: pumps pulsate.
+TIME_KNOTS = 40
+FOOTPRINT_SHARE = 0.05
+NEGLIGIBLE = 2e-2
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One way in which a cause explains the readings.
+
+    Attributes:
+        cause: an effect's id, ``UNKNOWN`` or ``FOOTPRINT``.
+        columns: (P, n) directions over the noise, for amplitudes of unit variance.
+        sides: (n,) +1 or -1 where physics fixes the sign of an amplitude, else 0.
+        share: prior share of this explanation among those of its cause.
+        sensitivity: the law of an effect whose directions come first, or None.
+        curve: where the directions are curves over a covariate: their basis, and the (K, n)
+            values at its knots for unit amplitudes.
+        direction: in which that curve must go to be this cause: it rises (1), falls (-1), or
+            either (0); None where it may go up and down.
+        description: in words, for a shapeless one.
+    """
+
+    cause: str
+    columns: np.ndarray
+    sides: np.ndarray
+    share: float
+    sensitivity: Sensitivity | None = None
+    curve: tuple[CurveBasis, np.ndarray] | None = None
+    direction: int | None = None
+    description: str = ''
+
+    def goes_right(self, amounts: np.ndarray) -> bool:
+        """Whether the curve with these amplitudes (n,) goes in the direction of the cause."""
+        if self.curve is None or self.direction is None:
+            return True
+        steps = np.diff(self.curve[1] @ amounts)
+        up, down = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
+        wrong = {1: down, -1: up, 0: min(up, down)}[self.direction]
+        return bool(wrong <= MOST_WRONG_WAY * (up + down))
+
+    @property
+    def law(self) -> np.ndarray:
+        """(P, m) directions without the error of the law."""
+        return self.columns if self.sensitivity is None else self.sensitivity.columns
+
+    def select(self, rows: np.ndarray) -> 'Explanation':
+        """The same for some of the readings; sensitivity and curve stay those of all."""
+        return replace(self, columns=self.columns[rows])
+
+
+def explanations(
+    study: Study, fit: Fit, candidates: Mapping[str, list[Effect]]
+) -> list[Explanation]:
+    """All explanations at a fitted model.
+
+    Args:
+        study: the readings.
+        fit: where to linearise; candidates that are part of its model are linearised as fitted.
+        candidates: effects in the shapes to try, by id.
+    """
+    model = fit.model
+    covariates = {
+        c.name: (c.values - c.values.mean()) / c.values.std()
+        for c in study.covariates(model)
+        if c.varies
+    }
+    roots = {name: _root(values, LAW_LENGTH) for name, values in covariates.items()}
+    found: list[Explanation] = []
+    for shapes in candidates.values():
+        found += _of_effect(study, fit, shapes, roots)
+    owned = {
+        name
+        for shapes in candidates.values()
+        for name in type(shapes[0]).covariates
+        if type(shapes[0]).free_law
+    }
+    found += _shapeless(study, model, covariates, owned)
+    parts = [pattern_deviations_um(model, rays) for rays in study.rays(model)]
+    kinds = [np.vstack(kind) / study.sigma_um[:, np.newaxis] for kind in zip(*parts, strict=True)]
+    found += [
+        Explanation(FOOTPRINT, FOOTPRINT_SHARE * kind, np.zeros(kind.shape[1]), 1.0 / len(kinds))
+        for kind in kinds
+    ]
+    return found
+
+
+def _of_effect(
+    study: Study, fit: Fit, shapes: list[Effect], roots: dict[str, np.ndarray]
+) -> Iterator[Explanation]:
+    """By the law in each shape, its error included, and by free laws."""
+    effect = type(shapes[0])
+    own = [name for name in effect.covariates if name in roots]
+    bases = _free_laws(study, fit.model, effect) if effect.free_law else []
+    law_share = LAW_SHARE if bases else 1.0
+    fitted = fit.model.effect(effect.id)
+    if fitted is not None:
+        amplitudes = {name: getattr(fitted, name) for name in effect.amplitudes()}
+        shapes = [shape.model_copy(update=amplitudes) for shape in shapes] + [fitted]
+    for shape in shapes:
+        law = sensitivity(study.forward, fit, shape, study.sigma_um)
+        errors = [
+            LAW_ERROR / np.sqrt(len(own)) * column[:, np.newaxis] * roots[name]
+            for column in law.columns.T
+            for name in own
+        ]
+        columns = np.hstack([law.columns, *errors])
+        sides = np.concatenate([law.sides, np.zeros(columns.shape[1] - len(law.sides))])
+        yield Explanation(effect.id, columns, sides, law_share / len(shapes), law)
+    for basis, values in bases:
+        columns = basis.film_um @ values / study.sigma_um[:, np.newaxis]
+        share = (1.0 - law_share) / len(bases)
+        direction = effect.covariates[basis.law.covariate]
+        yield Explanation(
+            effect.id,
+            columns,
+            np.zeros(columns.shape[1]),
+            share,
+            curve=(basis, values),
+            direction=direction,
+        )
+
+
+def _free_laws(
+    study: Study, model: DepositionModel, effect: type[Effect]
+) -> list[tuple[CurveBasis, np.ndarray]]:
+    size = FREE_ADDITION_UM if effect.free_law == 'addition' else FREE_FACTOR
+    own = [name for name in effect.covariates if name in LEARNED]
+    bases = [curve_basis(study, model, name, effect.free_law) for name in own]
+    return [
+        (basis, size * basis.root(length))
+        for basis in bases
+        if basis is not None
+        for length in FREE_LENGTHS
+    ]
+
+
+def _shapeless(
+    study: Study,
+    model: DepositionModel,
+    covariates: dict[str, np.ndarray],
+    owned: set[str],
+) -> list[Explanation]:
+    """Random fields over the part, and over covariates, in proportion to the film."""
+    film = study.forward.predict_um(model) / study.sigma_um
+    fields = [
+        Explanation(
+            UNKNOWN,
+            FIELD_SHARE * film[:, np.newaxis] * root,
+            np.zeros(root.shape[1]),
+            PART_SHARE / len(PART_LENGTHS_M),
+            description='place on the part',
+        )
+        for root in _part_roots(study)
+    ]
+    curves: list[tuple[str, np.ndarray, tuple[CurveBasis, np.ndarray] | None]] = []
+    for name, values in covariates.items():
+        length = WIGGLY if name in owned else SMOOTH
+        knots = TIME_KNOTS if name == 'time_s' else KNOTS
+        basis = curve_basis(study, model, name, knots=knots) if name in LEARNED else None
+        if basis is not None:
+            at_knots = FIELD_SHARE * basis.root(length)
+            columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
+            curves.append((name, columns, (basis, at_knots)))
+        else:
+            root = _root(values, length)
+            curves.append((name, FIELD_SHARE * film[:, np.newaxis] * root, None))
+    share = (1.0 - PART_SHARE) / max(len(curves), 1)
+    return fields + [
+        Explanation(
+            UNKNOWN, columns, np.zeros(columns.shape[1]), share, curve=curve, description=name
+        )
+        for name, columns, curve in curves
+    ]
+
+
+def _part_roots(study: Study) -> list[np.ndarray]:
+    """Square roots (P, n) of covariances over each part; parts share no field."""
+    campaign = study.campaign
+    same = campaign.experiment_of[:, np.newaxis] == campaign.experiment_of
+    away = campaign.positions_m[:, np.newaxis] - campaign.positions_m
+    square = np.sum(away**2, axis=2)
+    return [
+        _root_of(np.where(same, np.exp(-0.5 * square / length**2), 0.0))
+        for length in PART_LENGTHS_M
+    ]
+
+
+def _root(values: np.ndarray, length: float) -> np.ndarray:
+    return _root_of(np.exp(-0.5 * ((values[:, np.newaxis] - values) / length) ** 2))
+
+
+def _root_of(covariance: np.ndarray) -> np.ndarray:
+    values, vectors = eigh(covariance)
+    kept = values > NEGLIGIBLE * values[-1]
+    return vectors[:, kept] * np.sqrt(values[kept])

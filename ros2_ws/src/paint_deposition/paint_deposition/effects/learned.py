@@ -1,0 +1,319 @@
+"""Laws learned from readings: a smooth curve over one covariate, as a factor or an addition.
+
+A learned law is an effect like those of the library, but its form comes from readings: values at
+even knots over the range that the readings cover, linear in between. One step beyond that range
+it is neutral again: nothing is known there. The idea is that of an embedded discrepancy, inferred
+inside the model and shown against a physical covariate (Parish and Duraisamy, J. Comput. Phys.
+305:758, 2016).
+"""
+
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, Literal
+
+import numpy as np
+from numba.extending import register_jitable
+from pydantic import Field, model_validator
+
+from paint_deposition.effects.base import Effect, PathContext
+from paint_deposition.errors import ModelError, did_you_mean
+from paint_deposition.kernel.ray import Ray
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+
+# Scale on which the distance to an edge is resolved [m], and where it ends to matter [m].
+EDGE_SCALE_M, FARTHEST_EDGE_M = 0.01, 0.25
+# Times since the trigger and distances from a turn matter up to here.
+LONGEST_SINCE_TRIGGER_S, FARTHEST_TURN_M = 1.0, 1.0
+SHARPEST_CURVATURE_PER_M = 12.0
+# A factor never takes more than all but this share of the film away.
+LEAST_FACTOR = 0.05
+
+
+def hat_weights(position: np.ndarray, count: int) -> np.ndarray:
+    """(..., count) weights of knots 0 to count - 1 at positions (...) among them.
+
+    Linear between two knots; they fall to zero within one step beyond the first and the last.
+    """
+    away = np.abs(np.asarray(position, dtype=float)[..., np.newaxis] - np.arange(count))
+    return np.maximum(0.0, 1.0 - away)
+
+
+class LearnedLaw(Effect):
+    """A curve over a covariate; the subclass says which and where it acts.
+
+    Factor: what arrives is multiplied by 1 + h. Addition: h [um] is added to the film. The curve h
+    has the values ``learned`` at even steps on the ``axis`` of the covariate from ``low`` to
+    ``high``.
+
+    Attributes of a subclass:
+        covariate, unit: name and unit of the covariate. over: the same in words.
+        kinds: what the curve may be.
+    """
+
+    family = 'learned'
+    covariate: ClassVar[str]
+    unit: ClassVar[str]
+    over: ClassVar[str]
+    kinds: ClassVar[tuple[str, ...]] = ('factor',)
+
+    low: float = Field(0.0, description='least value of the covariate in the readings')
+    high: float = Field(1.0, description='greatest value of the covariate in the readings')
+    kind: Literal['factor', 'addition'] = Field(
+        'factor', description="'factor' 1 + h on what arrives, or 'addition' of h um to the film"
+    )
+    learned: tuple[float, ...] = Field(
+        (0.0, 0.0), description='a list of numbers: h at even steps from low to high'
+    )
+
+    @staticmethod
+    def axis(value: Any) -> Any:
+        """The covariate on the scale on which the knots lie at even steps."""
+        return value
+
+    @model_validator(mode='after')
+    def _is_a_curve(self) -> 'LearnedLaw':
+        if not self.axis(self.high) > self.axis(self.low):
+            raise ValueError(f'high is {self.high:g}; it must be above low, {self.low:g}')
+        if len(self.learned) < 2:
+            raise ValueError(f'learned has {len(self.learned)} values; give two or more')
+        if self.kind not in self.kinds:
+            raise ValueError(
+                f'kind is {self.kind!r}; over {self.covariate} give {" or ".join(self.kinds)}'
+            )
+        return self
+
+    @classmethod
+    def parameters(cls) -> dict[str, dict[str, Any]]:
+        """None: a fit does not vary the curve; it is learned by its own step."""
+        return {}
+
+    @classmethod
+    def typical(cls) -> 'LearnedLaw':
+        return cls(learned=(0.0, 0.1))
+
+    @property
+    def is_neutral(self) -> bool:
+        return not any(self.learned)
+
+    @property
+    def knots(self) -> np.ndarray:
+        """(K,) even steps on the ``axis`` at which the curve has its values."""
+        return np.linspace(self.axis(self.low), self.axis(self.high), len(self.learned))
+
+    def curve(self, value: np.ndarray) -> np.ndarray:
+        """h at values of the covariate (...) [1 or um]; 0 where the covariate is unknown."""
+        count = len(self.learned)
+        position = knot_positions(type(self), value, self.low, self.high, count)
+        # Value by value, so that it is the same to the bit for few values and for many.
+        return np.interp(position, np.arange(-1, count + 1), [0.0, *self.learned, 0.0])
+
+    def factor(self, value: np.ndarray) -> np.ndarray:
+        """What the film is multiplied by at values of the covariate."""
+        return np.maximum(1.0 + self.curve(value), LEAST_FACTOR)
+
+
+class _OverThePath(LearnedLaw):
+    """Acts on the flow, by what the path is like at each sub-step."""
+
+    def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
+        return path.with_flow_scaled(self.factor(along_path(path)[self.covariate]))
+
+
+class _OverTheSurface(LearnedLaw):
+    """Acts on the film, by what the surface is like at each point; bare metal stays bare."""
+
+    kinds = ('factor', 'addition')
+
+    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+        value = at_points(points)[self.covariate]()
+        if self.kind == 'addition':
+            return np.where(film_um > 0.0, np.maximum(film_um + self.curve(value), 0.0), film_um)
+        return film_um * self.factor(value)
+
+
+class _AlongTheRay(LearnedLaw):
+    """Acts on the flux of each ray, inside the kernel."""
+
+    def values(self) -> tuple[float, ...]:
+        """The first knot, knots per unit of the axis, and the curve at the knots."""
+        first, last = self.axis(self.low), self.axis(self.high)
+        return (float(first), (len(self.learned) - 1) / float(last - first), *self.learned)
+
+
+def knot_positions(
+    law: type[LearnedLaw], value: np.ndarray, low: float, high: float, count: int
+) -> np.ndarray:
+    """(...) positions of values of the covariate among the knots 0 to count - 1 of a law.
+
+    Where the covariate is unknown the position is beyond the reach of all knots.
+    """
+    first, last = law.axis(low), law.axis(high)
+    position = (law.axis(value) - first) / (last - first) * (count - 1)
+    return np.where(np.isfinite(position), position, -2.0)
+
+
+def knot_weights(
+    law: type[LearnedLaw], value: np.ndarray, low: float, high: float, count: int
+) -> np.ndarray:
+    """(..., count) weights of a law's knots at values of its covariate (...)."""
+    return hat_weights(knot_positions(law, value, low, high, count), count)
+
+
+def along_path(path: SprayPath) -> dict[str, np.ndarray]:
+    """Covariates (M,) of the sub-steps of a path; NaN where one is not known.
+
+    A path of which the time is not known, such as one pass by itself, has no number of the pass.
+    """
+    return {
+        'time_s': path.time_s,
+        'spray_pass': np.where(np.isnan(path.time_s), np.nan, np.maximum(path.spray_pass, 0)),
+        'stroke_end_m': np.minimum(np.minimum(path.from_turn_m, path.to_turn_m), FARTHEST_TURN_M),
+        'since_trigger_s': np.minimum(path.since_on_s, LONGEST_SINCE_TRIGGER_S),
+        'speed_m_per_s': path.speed_m_per_s,
+    }
+
+
+def at_points(points: SurfacePoints) -> dict[str, Callable[[], np.ndarray]]:
+    """Covariates (V,) of points on the surface, each computed when it is called for."""
+    return {
+        'curvature_per_m': lambda: np.clip(
+            points.curvature_per_m, -SHARPEST_CURVATURE_PER_M, SHARPEST_CURVATURE_PER_M
+        ),
+        'edge_distance_m': lambda: np.minimum(points.edge_distance_m, FARTHEST_EDGE_M),
+        'sky_view_factor': lambda: points.sky_view_factor,
+        'height_fraction': lambda: points.height_fraction,
+    }
+
+
+def _ray_factor(variable: Callable[[Ray], float]) -> Callable[..., float]:
+    """The factor of a curve over a variable of the ray, for the kernel.
+
+    The knots lie at even steps from ``low`` on. Constants and counters are floating-point numbers
+    here and none stands in ``variable``, so that the kernel's precision holds.
+    """
+    of_ray = register_jitable(variable)
+
+    def flux_factor(ray: Ray, low: float, steps_per_unit: float, *values: float) -> float:
+        away = (of_ray(ray) - low) * steps_per_unit
+        factor = 1.0
+        for value in values:
+            factor += value * max(0.0, 1.0 - abs(away))
+            away -= 1.0
+        return max(LEAST_FACTOR, factor)
+
+    return flux_factor
+
+
+class LearnedIncidence(_AlongTheRay):
+    """What arrives follows the angle of incidence, as learned."""
+
+    id, covariate, unit = 'learned:incidence_deg', 'incidence_deg', 'deg'
+    over = 'the angle of incidence'
+
+    @staticmethod
+    def axis(value: Any) -> Any:
+        """Minus its cosine, which the kernel knows."""
+        return -np.cos(np.radians(value))
+
+    flux_factor = staticmethod(_ray_factor(lambda ray: -ray.cos_incidence))
+
+
+class LearnedStandoff(_AlongTheRay):
+    """What arrives follows the distance as a multiple of Omega, as learned."""
+
+    id, covariate, unit = 'learned:standoff_ratio', 'standoff_ratio', '1'
+    over = 'the distance as a multiple of Omega'
+    flux_factor = staticmethod(_ray_factor(lambda ray: ray.standoff_ratio))
+
+
+class LearnedTime(_OverThePath):
+    """The flow follows the time since the motion began, as learned."""
+
+    id, covariate, unit = 'learned:time_s', 'time_s', 's'
+    over = 'the time since the motion began'
+
+
+class LearnedPass(_OverThePath):
+    """The flow follows the number of the pass, as learned."""
+
+    id, covariate, unit = 'learned:spray_pass', 'spray_pass', '1'
+    over = 'the number of the pass'
+
+
+class LearnedStrokeEnd(_OverThePath):
+    """The flow follows the distance to the nearer end of the stroke, as learned."""
+
+    id, covariate, unit = 'learned:stroke_end_m', 'stroke_end_m', 'm'
+    over = 'the distance to the nearer end of the stroke'
+    needs_whole_strokes = True
+
+
+class LearnedSinceTrigger(_OverThePath):
+    """The flow follows the time since the trigger opened, as learned."""
+
+    id, covariate, unit = 'learned:since_trigger_s', 'since_trigger_s', 's'
+    over = 'the time since the trigger opened'
+
+
+class LearnedSpeed(_OverThePath):
+    """The flow follows the speed of the gun, as learned."""
+
+    id, covariate, unit = 'learned:speed_m_per_s', 'speed_m_per_s', 'm/s'
+    over = 'the speed of the gun'
+
+
+class LearnedCurvature(_OverTheSurface):
+    """The film follows the curvature of the surface, as learned."""
+
+    id, covariate, unit = 'learned:curvature_per_m', 'curvature_per_m', '1/m'
+    over = 'the curvature of the surface'
+
+
+class LearnedEdgeDistance(_OverTheSurface):
+    """The film follows the distance to the nearest free edge, as learned."""
+
+    id, covariate, unit = 'learned:edge_distance_m', 'edge_distance_m', 'm'
+    over = 'the distance to the nearest free edge'
+
+    @staticmethod
+    def axis(value: Any) -> Any:
+        """A scale that resolves what is close to the edge."""
+        return np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
+
+
+class LearnedSkyViewFactor(_OverTheSurface):
+    """The film follows the share of the half-space that a point sees, as learned."""
+
+    id, covariate, unit = 'learned:sky_view_factor', 'sky_view_factor', '1'
+    over = 'the share of the half-space that a point sees'
+
+
+class LearnedHeight(_OverTheSurface):
+    """The film follows the height on the part, as learned."""
+
+    id, covariate, unit = 'learned:height_fraction', 'height_fraction', '1'
+    over = 'the height on the part'
+
+
+# Learned laws by covariate.
+LEARNED: Mapping[str, type[LearnedLaw]] = MappingProxyType(
+    {
+        law.covariate: law
+        for base in (_AlongTheRay, _OverThePath, _OverTheSurface)
+        for law in base.__subclasses__()
+    }
+)
+
+
+def learned_law(covariate: str) -> type[LearnedLaw]:
+    """The class of the learned law over a covariate.
+
+    Raises:
+        ModelError: there is none over it; names the nearest.
+    """
+    if covariate in LEARNED:
+        return LEARNED[covariate]
+    raise ModelError(
+        f'no learned law has the covariate {covariate!r}; {did_you_mean(covariate, LEARNED)}'
+    )

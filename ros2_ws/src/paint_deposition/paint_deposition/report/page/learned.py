@@ -1,0 +1,163 @@
+"""Charts of the learned laws in the model, each beside the law of the library that is nearest."""
+
+from collections.abc import Iterator, Mapping
+from itertools import product
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.base import Effect, Ray
+from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import (
+    axis,
+    base_layout,
+    chart_title,
+    figure,
+    grid_domains,
+)
+from paint_deposition.report.style import ACCENT, INK, MUTED
+from paint_deposition.report.words import covariate_label, effect_name
+
+CHARTS_A_ROW = 2
+CURVE_POINTS = 201
+# Values tried of an amplitude and of a shape when a law of the library is fitted to a curve.
+AMPLITUDES, SHAPES = 41, 5
+# Share of a curve's variance that a law must explain to be called near.
+NEAR = 0.5
+
+
+def learned_figure(data: ReportData) -> dict[str, Any] | None:
+    """Each learned law of the best model over its covariate."""
+    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedLaw)]
+    if not laws:
+        return None
+    rows = -(-len(laws) // CHARTS_A_ROW)
+    height = 100 + 260 * rows
+    layout = base_layout(margin={'l': 56, 'r': 12, 't': 56, 'b': 44}, annotations=[], shapes=[])
+    layout['legend'] |= {'y': 1.0 + 30 / (height - 100)}
+    traces: list[dict] = []
+    domains = grid_domains(len(laws), CHARTS_A_ROW, height - 100, (60, 84))
+    for k, (law, (x, y)) in enumerate(zip(laws, domains, strict=True), start=1):
+        name = '' if k == 1 else str(k)
+        traces += _traces(law, data.library, {'xaxis': f'x{name}', 'yaxis': f'y{name}'}, k == 1)
+        layout[f'xaxis{name}'] = axis(covariate_label(law.covariate), domain=x, anchor=f'y{name}')
+        layout[f'yaxis{name}'] = axis(
+            'factor' if law.kind == 'factor' else 'addition [µm]', domain=y, anchor=f'x{name}'
+        )
+        layout['annotations'].append(chart_title(effect_name(law.id), x[0], y[1]))
+        layout['shapes'] += [
+            {'type': 'line', 'xref': f'x{name}', 'yref': f'y{name} domain', 'x0': end, 'x1': end,
+             'y0': 0, 'y1': 1, 'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}
+            for end in _shown(law, np.array([law.low, law.high]))
+        ]  # fmt: skip
+    return figure('learned', traces, layout, height)
+
+
+def _traces(
+    law: LearnedLaw, library: Mapping[str, type[Effect]], where: dict[str, str], first: bool
+) -> list[dict]:
+    values = np.linspace(law.low, law.high, CURVE_POINTS)
+    step = (law.high - law.low) / (len(law.learned) - 1)
+    around = np.linspace(law.low - step, law.high + step, CURVE_POINTS)
+    common: dict[str, Any] = where | {'type': 'scatter', 'mode': 'lines'}
+    hover = '%{y:.3g} at %{x:.3g}<extra></extra>'
+    traces = [
+        common | {
+            'x': _shown(law, around), 'y': _of_law(law, around), 'name': 'learned',
+            'legendgroup': 'learned', 'showlegend': first, 'hovertemplate': hover,
+            'line': {'color': ACCENT, 'width': 2.5},
+        }
+    ]  # fmt: skip
+    near = nearest_law(law, library, values)
+    if near is not None:
+        effect, curve = near
+        traces.append(common | {
+            'x': _shown(law, values), 'y': curve, 'name': f'law of {effect_name(effect.id)}',
+            'hovertemplate': hover, 'line': {'color': INK, 'width': 1.5, 'dash': 'dash'},
+        })  # fmt: skip
+    return traces
+
+
+def _shown(law: LearnedLaw, values: np.ndarray) -> np.ndarray:
+    """Values of the covariate as the report shows them: passes count from 1."""
+    return values + (1.0 if law.covariate == 'spray_pass' else 0.0)
+
+
+def _of_law(law: LearnedLaw, values: np.ndarray) -> np.ndarray:
+    return law.factor(values) if law.kind == 'factor' else law.curve(values)
+
+
+def nearest_law(
+    law: LearnedLaw, library: Mapping[str, type[Effect]], values: np.ndarray
+) -> tuple[Effect, np.ndarray] | None:
+    """The effect whose law over the same covariate is nearest to a learned one.
+
+    Nearest up to a constant factor, or for an addition a constant, which the pattern takes up.
+
+    Args:
+        law: the learned law.
+        library: effects by id.
+        values: (N,) of the covariate, over the range of the law.
+
+    Returns:
+        The effect and its curve (N,) with the constant; None if none comes near.
+    """
+    learned = _of_law(law, values)
+    constant = float(np.var(learned))
+    found: list[tuple[float, Effect, np.ndarray]] = []
+    for effect in _effects_over(law, library):
+        curve = curve_of(effect, law, values)
+        if curve is None:
+            continue
+        if law.kind == 'factor':
+            curve = curve * float(curve @ learned) / max(float(curve @ curve), 1e-12)
+        else:
+            curve = curve + float(np.mean(learned - curve))
+        found.append((float(np.mean((curve - learned) ** 2)), effect, curve))
+    if not found or min(entry[0] for entry in found) > (1.0 - NEAR) * constant:
+        return None
+    _, effect, curve = min(found, key=lambda entry: entry[0])
+    return effect, curve
+
+
+def _effects_over(law: LearnedLaw, library: Mapping[str, type[Effect]]) -> Iterator[Effect]:
+    """Effects of one amplitude whose own law is over the covariate, in many sizes and shapes."""
+    for effect in library.values():
+        if law.covariate not in effect.covariates or effect.free_law != law.kind:
+            continue
+        if len(effect.amplitudes()) != 1:
+            continue
+        choices = [
+            np.linspace(at['low'], at['high'], AMPLITUDES) if at['role'] == 'amplitude'
+            else np.geomspace(at['low'], at['high'], SHAPES)
+            for at in effect.parameters().values()
+        ]  # fmt: skip
+        for chosen in product(*choices):
+            yield effect(**dict(zip(effect.parameters(), map(float, chosen), strict=True)))
+
+
+def curve_of(effect: Effect, law: LearnedLaw, values: np.ndarray) -> np.ndarray | None:
+    """(N,) factor or addition [um] of an effect at values (N,) of a learned law's covariate.
+
+    None where the effect acts on the path, or by more than this covariate.
+    """
+    if effect.flux_factor is not None:
+        flux_factor, numbers = effect.flux_factor, effect.values()
+        plain = Ray(0.0, 0.0, 1.0, 1.0, 0.0)
+        rays = {
+            'incidence_deg': lambda v: plain._replace(cos_incidence=float(np.cos(np.radians(v)))),
+            'standoff_ratio': lambda v: plain._replace(standoff_ratio=float(v)),
+        }
+        ray = rays.get(law.covariate)
+        return None if ray is None else np.array([flux_factor(ray(v), *numbers) for v in values])
+    points: Any = SimpleNamespace(**{law.covariate: values})
+    film = np.ones(len(values))
+    try:
+        shown = effect.on_gauge(effect.on_film(film, points), points)
+    except AttributeError:
+        return None
+    if shown is film:
+        return None
+    return shown if law.kind == 'factor' else shown - film

@@ -1,0 +1,272 @@
+"""Laws learned from readings: a curve that acts over its covariate, and nowhere else."""
+
+from dataclasses import fields
+
+import numpy as np
+import pytest
+from numba import float32, njit
+from pydantic import ValidationError
+
+from booth import MODEL, door, in_batches, painted, panel, path_of, serpentine, spot
+from paint_deposition.effects.catalogue import EFFECTS, effect_class
+from paint_deposition.effects.learned import LEARNED, LearnedLaw, along_path, at_points
+from paint_deposition.errors import ModelError
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.pass_film import collapse_um
+from paint_deposition.kernel.laws import in_precision
+from paint_deposition.kernel.ray import Ray
+from reference import reference_film_um
+
+LAW = pytest.mark.parametrize('law', LEARNED.values(), ids=LEARNED)
+RAY_LAWS = [law for law in LEARNED.values() if law.flux_factor is not None]
+RAY_LAW = pytest.mark.parametrize('law', RAY_LAWS, ids=lambda law: law.covariate)
+PATH_LAWS = ('time_s', 'spray_pass', 'stroke_end_m', 'since_trigger_s', 'speed_m_per_s')
+SURFACE_LAWS = ('curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction')
+# A range of each covariate inside what the scenes below have.
+RANGES = {
+    'incidence_deg': (10.0, 50.0),
+    'standoff_ratio': (0.8, 1.3),
+    'time_s': (1.0, 4.0),
+    'spray_pass': (0.0, 1.0),
+    'stroke_end_m': (0.1, 0.3),
+    'since_trigger_s': (0.1, 0.6),
+    'speed_m_per_s': (0.1, 0.5),
+    'curvature_per_m': (-2.0, 2.0),
+    'edge_distance_m': (0.02, 0.1),
+    'sky_view_factor': (0.6, 0.9),
+    'height_fraction': (0.2, 0.6),
+}
+VALUES = (0.3, -0.2, 0.1, 0.4)
+
+
+def law_over(covariate: str, learned=VALUES, **more) -> LearnedLaw:
+    low, high = RANGES[covariate]
+    return LEARNED[covariate](low=low, high=high, learned=learned, **more)
+
+
+@pytest.fixture(scope='module')
+def passes():
+    """Two passes over the panel, gun opening and closing on it."""
+    return path_of(serpentine((0.08, -0.08)))
+
+
+# --- the curve
+
+
+@LAW
+def test_the_curve_has_its_values_at_even_steps_and_is_linear_between(law):
+    learned = law_over(law.covariate)
+    ends = np.array([learned.low, learned.high])
+    np.testing.assert_allclose(learned.curve(ends), [0.3, 0.4], atol=1e-12)
+    many = np.linspace(learned.low, learned.high, 7)
+    expected = np.interp(law.axis(many), learned.knots, VALUES)
+    np.testing.assert_allclose(learned.curve(many), expected, atol=1e-12)
+    assert np.ptp(expected) > 0.3
+
+
+@LAW
+def test_one_step_beyond_its_range_it_is_neutral(law):
+    """On the axis of the law: the covariate itself may end sooner."""
+    linear = type('Linear', (law,), {'axis': staticmethod(lambda value: value)})
+    learned = linear(low=1.0, high=4.0, learned=VALUES)
+    assert learned.curve(np.array([0.0, 5.0, -3.0, 90.0, np.nan])).tolist() == [0.0] * 5
+    np.testing.assert_allclose(learned.curve(np.array([0.5, 4.5])), [0.15, 0.2])
+
+
+@LAW
+def test_the_curve_is_continuous(law):
+    learned = law_over(law.covariate)
+    span = learned.high - learned.low
+    values = np.linspace(max(learned.low - 2.0 * span, 0.0), learned.high + 2.0 * span, 200_001)
+    assert np.abs(np.diff(learned.curve(values))).max() < 1e-3
+
+
+def test_where_the_covariate_is_not_known_the_law_is_neutral():
+    assert law_over('time_s').factor(np.array([np.nan, np.inf])).tolist() == [1.0, 1.0]
+
+
+def test_a_factor_never_takes_all_film_away():
+    assert law_over('time_s', (-5.0, -5.0)).factor(np.array([2.0])).tolist() == [0.05]
+
+
+# --- what it does to the film
+
+
+@pytest.mark.parametrize('covariate', PATH_LAWS)
+def test_a_law_over_the_path_scales_the_flow_where_the_covariate_is_in_range(covariate, passes):
+    law = law_over(covariate, (0.2, 0.2))
+    if covariate == 'spray_pass':
+        law = LEARNED[covariate](low=1.0, high=2.0, learned=(0.2, 0.2))
+    value = along_path(passes)[covariate]
+    step = law.high - law.low
+    inside = (value >= law.low) & (value <= law.high)
+    outside = (value <= law.low - step) | (value >= law.high + step)
+    changed = law.on_path(passes, None)
+    sprays = passes.flow > 0.0
+    assert (inside & sprays).any()
+    np.testing.assert_allclose(changed.flow[inside], 1.2 * passes.flow[inside])
+    np.testing.assert_allclose(changed.open_flow[inside], 1.2 * passes.open_flow[inside])
+    assert np.array_equal(changed.flow[outside], passes.flow[outside])
+    for column in fields(passes):
+        if column.name not in ('flow', 'open_flow'):
+            before = getattr(passes, column.name)
+            assert np.array_equal(getattr(changed, column.name), before, equal_nan=True)
+
+
+@pytest.mark.parametrize('kind', ['factor', 'addition'])
+@pytest.mark.parametrize('covariate', SURFACE_LAWS)
+def test_a_law_over_the_surface_changes_the_film_where_the_covariate_is_in_range(covariate, kind):
+    points = door().points()
+    value = at_points(points)[covariate]()
+    low, high = np.quantile(value, 0.3), np.quantile(value, 0.5) + 1e-6
+    law = LEARNED[covariate](low=low, high=high, learned=(0.5, 0.5), kind=kind)
+    position = (law.axis(value) - law.axis(low)) / (law.axis(high) - law.axis(low))
+    inside, outside = (position >= 0.0) & (position <= 1.0), (position <= -1.0) | (position >= 2.0)
+    assert inside.any()
+    assert outside.any()
+    film = np.linspace(1.0, 30.0, len(points))
+    changed = law.on_film(film, points)
+    expected = 1.5 * film if kind == 'factor' else film + 0.5
+    np.testing.assert_allclose(changed[inside], expected[inside])
+    assert np.array_equal(changed[outside], film[outside])
+
+
+def test_an_addition_leaves_bare_metal_bare_and_takes_no_more_than_is_there():
+    points = door().points()
+    film = np.where(points.height_fraction > 0.5, 0.3, 0.0)
+    law = LEARNED['height_fraction'](learned=(-1.0, -1.0), kind='addition')
+    assert law.on_film(film, points).tolist() == [0.0] * len(film)
+
+
+@RAY_LAW
+def test_a_law_over_the_ray_acts_where_the_covariate_is_in_range(law):
+    """A gun at rest before a flat panel: each point has one incidence, all the same distance."""
+    points = panel().points()
+    base = painted(panel(), spot()).raw_um
+    film = painted(panel(), spot(), law_over(law.covariate, (0.25, 0.25))).raw_um
+    if law.covariate == 'standoff_ratio':
+        np.testing.assert_allclose(film, 1.25 * base, rtol=1e-12)
+        return
+    radius = np.hypot(points.positions_m[:, 0], points.positions_m[:, 2])
+    incidence = np.degrees(np.arctan2(radius, 0.30))
+    inside = (incidence > 10.0) & (incidence < 50.0) & (base > 0.0)
+    assert inside.any()
+    np.testing.assert_allclose(film[inside], 1.25 * base[inside], rtol=1e-9)
+    axis = law.axis(incidence)
+    beyond = axis >= 2.0 * law.axis(50.0) - law.axis(10.0)
+    assert np.array_equal(film[beyond], base[beyond])
+
+
+@pytest.mark.parametrize(('precision', 'tolerance'), [('double', 2e-9), ('single', 3e-6)])
+@RAY_LAW
+def test_the_kernel_computes_the_law(law, precision, tolerance):
+    points = door().points().select(slice(None, None, 7))
+    path = path_of(spot(z_m=0.45, standoff_m=0.35))
+    model = MODEL.with_effect(law_over(law.covariate))
+    integrator = FilmIntegrator(points, model, precision)
+    integrator.add(path)
+    expected = reference_film_um(points, path, model)
+    assert not np.allclose(expected, reference_film_um(points, path, MODEL), rtol=1e-2, atol=0.0)
+    np.testing.assert_allclose(
+        integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
+    )
+
+
+@RAY_LAW
+def test_the_law_of_a_ray_is_the_curve(law):
+    learned = law_over(law.covariate)
+    values = np.linspace(learned.low, learned.high, 23)
+    for value, expected in zip(values, learned.factor(values), strict=True):
+        ray = Ray(0.0, 0.0, 1.0, 1.0, 0.3)
+        if law.covariate == 'standoff_ratio':
+            ray = ray._replace(standoff_ratio=value)
+        else:
+            ray = ray._replace(cos_incidence=np.cos(np.radians(value)))
+        assert law.flux_factor(ray, *learned.values()) == pytest.approx(expected, rel=1e-12)
+
+
+@RAY_LAW
+def test_the_law_stays_in_single_precision(law):
+    ray = Ray(*np.array([0.1, 0.2, 1.1, 0.9, 0.4], np.float32))
+    values = np.array(law_over(law.covariate).values(), np.float32)
+    compiled = njit(in_precision(law.flux_factor, np.float32))
+    assert compiled(ray, *values) == pytest.approx(law.flux_factor(ray, *values), rel=1e-5)
+    (signature,) = compiled.nopython_signatures
+    assert signature.return_type == float32
+
+
+@LAW
+def test_a_curve_of_zeros_changes_nothing_to_the_bit(law, passes):
+    neutral = law_over(law.covariate, (0.0, 0.0, 0.0))
+    assert neutral.is_neutral
+    base, film = painted(door(), passes), painted(door(), passes, neutral)
+    assert np.array_equal(film.gauge_um, base.gauge_um)
+    if law.flux_factor is not None:
+        assert law.flux_factor(Ray(0.1, 0.2, 1.1, 0.9, 0.4), *neutral.values()) == 1.0
+
+
+@LAW
+@pytest.mark.parametrize('poses', [1, 40])
+def test_a_stream_paints_what_the_recording_does(law, poses):
+    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
+    learned = law_over(law.covariate)
+    model = MODEL.with_effect(learned)
+    surface = panel(0.3, 0.05)
+    whole = painted(surface, trajectory, learned)
+    live = FilmIntegrator(surface.points(), model, 'double', surface.occluder)
+    for piece in in_batches(trajectory, poses, model.needs_whole_strokes):
+        live.add(piece)
+    assert np.array_equal(live.gauge_um, whole.gauge_um)
+    if law.covariate in ('time_s', 'stroke_end_m', 'since_trigger_s'):
+        assert not np.array_equal(whole.gauge_um, painted(surface, trajectory).gauge_um)
+
+
+@pytest.mark.parametrize('covariate', ['time_s', 'spray_pass'])
+def test_a_pass_by_itself_knows_no_time_and_no_number(covariate):
+    across = np.linspace(-0.2, 0.2, 9)
+    law = LEARNED[covariate](low=0.0, high=5.0, learned=(0.5, 0.5))
+    plain = collapse_um(MODEL, across, 0.3)
+    with_law = collapse_um(MODEL.with_effect(law), across, 0.3)
+    np.testing.assert_allclose(with_law, plain, rtol=0.0, atol=2e-6 * plain.max())
+
+
+def test_a_law_over_the_speed_acts_on_a_pass_by_itself():
+    across = np.linspace(-0.2, 0.2, 9)
+    model = MODEL.with_effect(law_over('speed_m_per_s', (0.5, 0.5)))
+    plain = collapse_um(MODEL, across, 0.3)
+    np.testing.assert_allclose(
+        collapse_um(model, across, 0.3), 1.5 * plain, rtol=0.0, atol=3e-6 * plain.max()
+    )
+
+
+# --- how it is called and what is refused
+
+
+@LAW
+def test_it_is_called_by_its_covariate(law):
+    assert effect_class(f'learned:{law.covariate}') is law
+    assert law.id not in EFFECTS
+    assert law.__doc__
+    assert law.over in law.__doc__
+
+
+def test_an_unknown_covariate_is_told_the_nearest():
+    with pytest.raises(ModelError, match="'tim_s'; did you mean 'time_s'"):
+        effect_class('learned:tim_s')
+
+
+@pytest.mark.parametrize(
+    ('covariate', 'values', 'words'),
+    [
+        ('time_s', {'low': 2.0, 'high': 2.0}, 'must be above low'),
+        ('edge_distance_m', {'low': 0.4, 'high': 0.5}, 'must be above low'),
+        ('time_s', {'learned': (0.1,)}, 'two or more'),
+        ('time_s', {'learned': (0.1, float('nan'))}, 'finite'),
+        ('time_s', {'kind': 'addition'}, 'give factor'),
+        ('incidence_deg', {'kind': 'addition'}, 'give factor'),
+        ('height_fraction', {'kind': 'sum'}, "'factor' or 'addition'"),
+    ],
+)
+def test_what_is_no_curve_is_refused(covariate, values, words):
+    with pytest.raises(ValidationError, match=words):
+        LEARNED[covariate](**values)
