@@ -273,7 +273,7 @@ def _added(row: dict) -> str:
         for p in row['parameters']
     ]
     text = ' '.join(values) if is_learned(row['id']) else joined(values)
-    return f'{capital(_with_article(row['id']))} was added with {text}.'
+    return f'{capital(_with_article(row["id"]))} was added with {text}.'
 
 
 def _with_article(name: str) -> str:

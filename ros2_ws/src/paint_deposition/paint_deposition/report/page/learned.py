@@ -39,16 +39,16 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
     layout['legend'] |= {'y': 1.0 + 30 / (height - 100)}
     traces: list[dict] = []
     domains = grid_domains(len(laws), CHARTS_A_ROW, height - 100, (60, 84))
+    library = data.diagnosis.library if data.diagnosis else {}
     for k, (law, (x, y)) in enumerate(zip(laws, domains, strict=True), start=1):
-        name = '' if k == 1 else str(k)
-        traces += _traces(law, data.library, {'xaxis': f'x{name}', 'yaxis': f'y{name}'}, k == 1)
-        layout[f'xaxis{name}'] = axis(covariate_label(law.covariate), domain=x, anchor=f'y{name}')
-        layout[f'yaxis{name}'] = axis(
-            'factor' if law.kind == 'factor' else 'addition [µm]', domain=y, anchor=f'x{name}'
+        traces += _traces(law, library, {'xaxis': f'x{k}', 'yaxis': f'y{k}'}, k == 1)
+        layout[f'xaxis{k}'] = axis(covariate_label(law.covariate), domain=x, anchor=f'y{k}')
+        layout[f'yaxis{k}'] = axis(
+            'factor' if law.kind == 'factor' else 'addition [µm]', domain=y, anchor=f'x{k}'
         )
-        layout['annotations'].append(chart_title(effect_name(law.id), x[0], y[1]))
+        layout['annotations'].append(chart_title(effect_name(law.id), k))
         layout['shapes'] += [
-            {'type': 'line', 'xref': f'x{name}', 'yref': f'y{name} domain', 'x0': end, 'x1': end,
+            {'type': 'line', 'xref': f'x{k}', 'yref': f'y{k} domain', 'x0': end, 'x1': end,
              'y0': 0, 'y1': 1, 'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}
             for end in _shown(law, np.array([law.low, law.high]))
         ]  # fmt: skip
