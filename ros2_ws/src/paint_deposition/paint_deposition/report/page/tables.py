@@ -30,6 +30,7 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
         effect = data.effect_class(found.best)
         rows.append(
             {
+                'id': found.best,
                 'found': found,
                 'name': effect_name(found.best),
                 'others': [effect_name(m) for m in found.members if m != found.best],
