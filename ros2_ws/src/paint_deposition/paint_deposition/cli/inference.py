@@ -152,7 +152,7 @@ def _write(
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.diagnosis.verdict import percent
-    from paint_deposition.effects.learned import LearnedLaw
+    from paint_deposition.effects.learned.law import LearnedLaw
     from paint_deposition.report.words import effect_name, learned_words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'

@@ -1,11 +1,12 @@
 """Cross-validation: how well a fitted model predicts blocks of points that were left out."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from paint_deposition.diagnosis.evidence import NullModel
-from paint_deposition.diagnosis.learning import choose_curves
+from paint_deposition.diagnosis.learning import choose_laws
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.readings.residuals import root_mean_square
@@ -54,39 +55,48 @@ def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
 
 
 def nested_rmse_um(
-    space: ModelSpace, blocks: np.ndarray, sigma_um: np.ndarray, curves: bool
+    space: ModelSpace, blocks: np.ndarray, sigma_um: np.ndarray, learn: bool
 ) -> float:
-    """Error on points left out when causes and curves are chosen without them, too [um].
+    """Error on points left out when causes and learned laws are chosen without them, too [um].
 
     Args:
         space: of models around a fit; only its linearisation is shared by all choices.
         blocks: (P,) block of each point; some blocks at a time are left out.
         sigma_um: (P,) standard deviations of the points.
-        curves: whether curves are learned, too, or effects of the library alone.
+        learn: whether laws are learned, too, or effects of the library alone.
     """
     null = space.null
     deviation = np.empty(len(blocks))
     for fold in np.array_split(np.random.default_rng(0).permutation(np.unique(blocks)), FOLDS):
         out = np.isin(blocks, fold)
-        columns = np.hstack([null.columns, *_chosen_columns(space, ~out, curves)])
-        kept = columns[~out]
-        precision = np.eye(columns.shape[1]) + kept.T @ kept
-        amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
-        deviation[out] = null.raw[out] - columns[out] @ amounts
+        deviation[out] = left_out(null, _chosen_columns(space, ~out, learn), out)
     return root_mean_square(deviation * sigma_um)
 
 
-def _chosen_columns(space: ModelSpace, rows: np.ndarray, curves: bool) -> list[np.ndarray]:
-    """Directions (P, n) of the effects and curves that some readings (P,) bool call for."""
+def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
+    """Deviations of points from what the others predict; levels of parts do not help.
+
+    Args:
+        null: what the model varies. added: directions (P, n) of what it has besides.
+        out: (P,) bool, the points left out.
+    """
+    columns = np.hstack([null.columns, *added])
+    kept = columns[~out]
+    precision = np.eye(columns.shape[1]) + kept.T @ kept
+    amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
+    stop = null.columns.shape[1]
+    amounts[stop - null.nuisance : stop] = 0.0
+    return null.raw[out] - columns[out] @ amounts
+
+
+def _chosen_columns(space: ModelSpace, rows: np.ndarray, learn: bool) -> list[np.ndarray]:
+    """Directions (P, n) of the effects and laws that some readings (P,) bool call for."""
     part = space.select(rows)
     chosen = [size * space.explanations[k].law for _, k, size in part.accepted]
-    if not curves:
+    if not learn:
         return chosen
     null = NullModel.of(
         np.hstack([part.null.columns, *(columns[rows] for columns in chosen)]), part.null.raw
     )
-    learned = choose_curves(null, part.explanations, space.freedom)
-    whole = {
-        id(few): full for few, full in zip(part.explanations, space.explanations, strict=True)
-    }
-    return chosen + [curve.size * whole[id(curve.explanation)].columns for curve in learned]
+    laws = choose_laws(null, part.explanations, space.freedom)
+    return chosen + [size * space.explanations[k].columns for k, size in laws]

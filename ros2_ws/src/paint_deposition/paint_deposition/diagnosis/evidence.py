@@ -26,21 +26,23 @@ class NullModel:
     Attributes:
         columns: (P, m) directions in which the base model and the nuisance vary, for unit
             amplitudes, over the noise.
+        nuisance: how many of them, the last ones, are nuisance.
         raw: (P,) deviations over the noise from the base model at the centre of its priors.
         lower: (P, P) Cholesky factor of the deviations' covariance.
         deviation: (P,) whitened deviations; standard normal if nothing is missing.
     """
 
     columns: np.ndarray
+    nuisance: int
     raw: np.ndarray
     lower: np.ndarray
     deviation: np.ndarray
 
     @staticmethod
-    def of(columns: np.ndarray, raw: np.ndarray) -> 'NullModel':
-        """From directions (P, m) and deviations (P,)."""
+    def of(columns: np.ndarray, raw: np.ndarray, nuisance: int = 0) -> 'NullModel':
+        """From directions (P, m), the last of which are nuisance, and deviations (P,)."""
         lower = covariance_factor(columns)
-        return NullModel(columns, raw, lower, solve_triangular(lower, raw, lower=True))
+        return NullModel(columns, nuisance, raw, lower, solve_triangular(lower, raw, lower=True))
 
     @staticmethod
     def around(fit: Fit, apart: frozenset[str], nuisance: np.ndarray) -> 'NullModel':
@@ -60,7 +62,8 @@ class NullModel:
         shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
         counted = kept | ~shape
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - centre)[counted]
-        return NullModel.of(np.hstack([(fit.jacobian * width)[:, kept], nuisance]), raw)
+        columns = np.hstack([(fit.jacobian * width)[:, kept], nuisance])
+        return NullModel.of(columns, raw, nuisance.shape[1])
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
@@ -68,7 +71,7 @@ class NullModel:
 
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The same for some of the readings."""
-        return NullModel.of(self.columns[rows], self.raw[rows])
+        return NullModel.of(self.columns[rows], self.raw[rows], self.nuisance)
 
 
 def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
@@ -148,3 +151,12 @@ def log_bayes_factor(gram, scores, square, sides, scale, freedom, count):
                 variance += column[row] * column[row]
             factor += math.log(2.0) + log_normal_cdf(sides[i] * mean[i] / math.sqrt(variance))
     return factor
+
+
+def evidence(columns: np.ndarray, null: NullModel, freedom: float) -> float:
+    """Log Bayes factor of whitened directions (P, n), of unit variance each, against the null."""
+    count = columns.shape[1]
+    return log_bayes_factor(
+        columns.T @ columns, columns.T @ null.deviation, float(null.deviation @ null.deviation),
+        np.zeros(count), np.ones(count), min(freedom, 2.0 * KNOWN_NOISE), len(null.deviation),
+    )  # fmt: skip

@@ -11,14 +11,19 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.linalg import eigh
 
-from paint_deposition.diagnosis.footprint import pattern_deviations_um
 from paint_deposition.diagnosis.sensitivities import Sensitivity, sensitivity
-from paint_deposition.diagnosis.smooth_laws import KNOTS, CurveBasis, curve_basis
+from paint_deposition.diagnosis.smooth_laws import (
+    RandomLaw,
+    covariance_root,
+    curve_basis,
+    footprint_basis,
+    footprint_kinds,
+    map_bases,
+)
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LEARNED
+from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
 
@@ -32,14 +37,13 @@ LAW_SHARE = 0.7
 FREE_FACTOR, FREE_ADDITION_UM, FREE_LENGTHS = 0.05, 0.7, (1.0, 2.0)
 # Share of all ups and downs of a free law that may go against its direction: noise bends it.
 MOST_WRONG_WAY = 0.2
-# Shapeless causes: size as a share of the film; lengths over the part [m]; over a covariate that
-# an effect owns only what is too wiggly to be that effect's law.
-FIELD_SHARE, PART_LENGTHS_M, PART_SHARE = 0.05, (0.1, 0.25), 0.5
+# Shapeless causes: size as a share of the film; over a covariate that an effect owns only what is
+# too wiggly to be that effect's law.
+FIELD_SHARE, PART_SHARE = 0.05, 0.5
 WIGGLY, SMOOTH = 0.35, 1.0
-# Time is resolved more finely: pumps pulsate.
-TIME_KNOTS = 40
 FOOTPRINT_SHARE = 0.05
-NEGLIGIBLE = 2e-2
+# Lengths of correlation over the part [m], and over the radius of the pattern in steps.
+LENGTHS = {'place': (0.1, 0.25), 'footprint': (1.5, 4.0)}
 
 
 @dataclass(frozen=True)
@@ -52,9 +56,8 @@ class Explanation:
         sides: (n,) +1 or -1 where physics fixes the sign of an amplitude, else 0.
         share: prior share of this explanation among those of its cause.
         sensitivity: the law of an effect whose directions come first, or None.
-        curve: where the directions are curves over a covariate: their basis, and the (K, n)
-            values at its knots for unit amplitudes.
-        direction: in which that curve must go to be this cause: it rises (1), falls (-1), or
+        random: the law of any form whose amplitudes the directions are, or None.
+        direction: in which that law must go to be this cause: it rises (1), falls (-1), or
             either (0); None where it may go up and down.
         description: in words, for a shapeless one.
     """
@@ -64,15 +67,15 @@ class Explanation:
     sides: np.ndarray
     share: float
     sensitivity: Sensitivity | None = None
-    curve: tuple[CurveBasis, np.ndarray] | None = None
+    random: RandomLaw | None = None
     direction: int | None = None
     description: str = ''
 
     def goes_right(self, amounts: np.ndarray) -> bool:
-        """Whether the curve with these amplitudes (n,) goes in the direction of the cause."""
-        if self.curve is None or self.direction is None:
+        """Whether the law with these amplitudes (n,) goes in the direction of the cause."""
+        if self.random is None or self.direction is None:
             return True
-        steps = np.diff(self.curve[1] @ amounts)
+        steps = np.diff(self.random.at_knots @ amounts)
         up, down = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
         wrong = {1: down, -1: up, 0: min(up, down)}[self.direction]
         return bool(wrong <= MOST_WRONG_WAY * (up + down))
@@ -83,7 +86,7 @@ class Explanation:
         return self.columns if self.sensitivity is None else self.sensitivity.columns
 
     def select(self, rows: np.ndarray) -> 'Explanation':
-        """The same for some of the readings; sensitivity and curve stay those of all."""
+        """The same for some of the readings; sensitivity and law stay those of all."""
         return replace(self, columns=self.columns[rows])
 
 
@@ -114,13 +117,29 @@ def explanations(
         if type(shapes[0]).free_law
     }
     found += _shapeless(study, model, covariates, owned)
-    parts = [pattern_deviations_um(model, rays) for rays in study.rays(model)]
-    kinds = [np.vstack(kind) / study.sigma_um[:, np.newaxis] for kind in zip(*parts, strict=True)]
-    found += [
-        Explanation(FOOTPRINT, FOOTPRINT_SHARE * kind, np.zeros(kind.shape[1]), 1.0 / len(kinds))
-        for kind in kinds
+    basis = footprint_basis(study, model)
+    kinds = [
+        basis.random(FOOTPRINT_SHARE, length, among)
+        for length in LENGTHS['footprint']
+        for among in footprint_kinds(basis)
     ]
+    found += [of_random(FOOTPRINT, study, random, 1.0 / len(kinds)) for random in kinds]
     return found
+
+
+def of_random(
+    cause: str,
+    study: Study,
+    random: RandomLaw,
+    share: float,
+    direction: int | None = None,
+    description: str = '',
+) -> Explanation:
+    columns = random.change_um / study.sigma_um[:, np.newaxis]
+    return Explanation(
+        cause, columns, np.zeros(columns.shape[1]), share, random=random,
+        direction=direction, description=description,
+    )  # fmt: skip
 
 
 def _of_effect(
@@ -129,8 +148,8 @@ def _of_effect(
     """By the law in each shape, its error included, and by free laws."""
     effect = type(shapes[0])
     own = [name for name in effect.covariates if name in roots]
-    bases = _free_laws(study, fit.model, effect) if effect.free_law else []
-    law_share = LAW_SHARE if bases else 1.0
+    free = _free_laws(study, fit.model, effect) if effect.free_law else []
+    law_share = LAW_SHARE if free else 1.0
     fitted = fit.model.effect(effect.id)
     if fitted is not None:
         amplitudes = {name: getattr(fitted, name) for name in effect.amplitudes()}
@@ -145,28 +164,17 @@ def _of_effect(
         columns = np.hstack([law.columns, *errors])
         sides = np.concatenate([law.sides, np.zeros(columns.shape[1] - len(law.sides))])
         yield Explanation(effect.id, columns, sides, law_share / len(shapes), law)
-    for basis, values in bases:
-        columns = basis.film_um @ values / study.sigma_um[:, np.newaxis]
-        share = (1.0 - law_share) / len(bases)
-        direction = effect.covariates[basis.law.covariate]
-        yield Explanation(
-            effect.id,
-            columns,
-            np.zeros(columns.shape[1]),
-            share,
-            curve=(basis, values),
-            direction=direction,
-        )
+    for random in free:
+        direction = effect.covariates[random.basis.law.covariate]
+        yield of_random(effect.id, study, random, (1.0 - law_share) / len(free), direction)
 
 
-def _free_laws(
-    study: Study, model: DepositionModel, effect: type[Effect]
-) -> list[tuple[CurveBasis, np.ndarray]]:
+def _free_laws(study: Study, model: DepositionModel, effect: type[Effect]) -> list[RandomLaw]:
     size = FREE_ADDITION_UM if effect.free_law == 'addition' else FREE_FACTOR
-    own = [name for name in effect.covariates if name in LEARNED]
+    own = [name for name in effect.covariates if name in CURVES]
     bases = [curve_basis(study, model, name, effect.free_law) for name in own]
     return [
-        (basis, size * basis.root(length))
+        basis.random(size, length)
         for basis in bases
         if basis is not None
         for length in FREE_LENGTHS
@@ -178,38 +186,36 @@ def _shapeless(
     model: DepositionModel,
     covariates: dict[str, np.ndarray],
     owned: set[str],
-) -> list[Explanation]:
+) -> Iterator[Explanation]:
     """Random fields over the part, and over covariates, in proportion to the film."""
-    film = study.forward.predict_um(model) / study.sigma_um
-    fields = [
-        Explanation(
-            UNKNOWN,
-            FIELD_SHARE * film[:, np.newaxis] * root,
-            np.zeros(root.shape[1]),
-            PART_SHARE / len(PART_LENGTHS_M),
-            description='place on the part',
-        )
-        for root in _part_roots(study)
+    film = FIELD_SHARE * study.forward.predict_um(model) / study.sigma_um
+    roots = _part_roots(study)
+    maps = [
+        basis.random(size, length)
+        for kind, size in (('factor', FIELD_SHARE), ('addition', FREE_ADDITION_UM))
+        for basis in map_bases(study, model, kind)
+        for length in LENGTHS['place']
     ]
-    curves: list[tuple[str, np.ndarray, tuple[CurveBasis, np.ndarray] | None]] = []
+    share = PART_SHARE / (len(roots) + len(maps))
+    for root in roots:
+        yield _field(film[:, np.newaxis] * root, share, 'place on the part')
+    for random in maps:
+        yield of_random(UNKNOWN, study, random, share, description='place on the part')
+    share = (1.0 - PART_SHARE) / max(len(covariates), 1)
     for name, values in covariates.items():
         length = WIGGLY if name in owned else SMOOTH
-        knots = TIME_KNOTS if name == 'time_s' else KNOTS
-        basis = curve_basis(study, model, name, knots=knots) if name in LEARNED else None
-        if basis is not None:
-            at_knots = FIELD_SHARE * basis.root(length)
-            columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-            curves.append((name, columns, (basis, at_knots)))
+        basis = curve_basis(study, model, name) if name in CURVES else None
+        if basis is None:
+            yield _field(film[:, np.newaxis] * _root(values, length), share, name)
         else:
-            root = _root(values, length)
-            curves.append((name, FIELD_SHARE * film[:, np.newaxis] * root, None))
-    share = (1.0 - PART_SHARE) / max(len(curves), 1)
-    return fields + [
-        Explanation(
-            UNKNOWN, columns, np.zeros(columns.shape[1]), share, curve=curve, description=name
-        )
-        for name, columns, curve in curves
-    ]
+            random = basis.random(FIELD_SHARE, length)
+            yield of_random(UNKNOWN, study, random, share, description=name)
+
+
+def _field(columns: np.ndarray, share: float, description: str) -> Explanation:
+    return Explanation(
+        UNKNOWN, columns, np.zeros(columns.shape[1]), share, description=description
+    )
 
 
 def _part_roots(study: Study) -> list[np.ndarray]:
@@ -219,16 +225,10 @@ def _part_roots(study: Study) -> list[np.ndarray]:
     away = campaign.positions_m[:, np.newaxis] - campaign.positions_m
     square = np.sum(away**2, axis=2)
     return [
-        _root_of(np.where(same, np.exp(-0.5 * square / length**2), 0.0))
-        for length in PART_LENGTHS_M
+        covariance_root(np.where(same, np.exp(-0.5 * square / length**2), 0.0))
+        for length in LENGTHS['place']
     ]
 
 
 def _root(values: np.ndarray, length: float) -> np.ndarray:
-    return _root_of(np.exp(-0.5 * ((values[:, np.newaxis] - values) / length) ** 2))
-
-
-def _root_of(covariance: np.ndarray) -> np.ndarray:
-    values, vectors = eigh(covariance)
-    kept = values > NEGLIGIBLE * values[-1]
-    return vectors[:, kept] * np.sqrt(values[kept])
+    return covariance_root(np.exp(-0.5 * ((values[:, np.newaxis] - values) / length) ** 2))

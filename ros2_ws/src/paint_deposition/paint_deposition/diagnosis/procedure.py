@@ -5,8 +5,8 @@
    is missing at all.
 3. If so, refit with every effect of the best set that is probable enough, and repeat 2 around that
    fit until the set stays as it is: a strong effect bends the line along which it was judged.
-4. Learn what the accepted laws leave unexplained as curves over covariates, if readings left out
-   are predicted better.
+4. Learn what the accepted laws leave unexplained as laws of any form, if readings left out are
+   predicted better.
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
@@ -17,7 +17,7 @@ import numpy as np
 from paint_deposition.diagnosis.cross_validation import nested_rmse_um
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
-from paint_deposition.diagnosis.learning import choose_curves
+from paint_deposition.diagnosis.learning import choose_laws
 from paint_deposition.diagnosis.model_space import Model, ModelSpace
 from paint_deposition.diagnosis.run import Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
@@ -31,7 +31,7 @@ ALPHA = 0.05
 ROUNDS = 4
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
-# Share by which learned curves must lower the error on points left out.
+# Share by which learned laws must lower the error on points left out.
 LEAST_GAIN = 0.02
 
 
@@ -68,7 +68,7 @@ def diagnose(
         run.fit = run.fitted_with(effects)
         space = run.linearise()
     patches, sigma_um = run.study.patches(), run.study.sigma_um
-    holdout_um = nested_rmse_um(space, patches, sigma_um, curves=False)
+    holdout_um = nested_rmse_um(space, patches, sigma_um, learn=False)
     _accept(run, space, holdout_um)
     progress('learning what the laws leave unexplained')
     _learn(run, space, holdout_um)
@@ -116,15 +116,15 @@ def _accept(run: Run, space: ModelSpace, holdout_um: float) -> None:
 
 
 def _learn(run: Run, space: ModelSpace, without_um: float) -> None:
-    """Add curves over covariates if they improve the prediction of points left out."""
+    """Add laws of any form if they improve the prediction of points left out."""
     null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
-    curves = choose_curves(null, space.explanations, space.freedom)
-    if not curves or FOOTPRINT in space.models[0].causes:
+    chosen = choose_laws(null, space.explanations, space.freedom)
+    if not chosen:
         return
-    with_um = nested_rmse_um(space, run.study.patches(), run.study.sigma_um, curves=True)
+    with_um = nested_rmse_um(space, run.study.patches(), run.study.sigma_um, learn=True)
     if with_um > (1.0 - LEAST_GAIN) * without_um:
         return
-    fit = run.learned(curves)
+    fit = run.learned([(space.explanations[k], size) for k, size in chosen])
     if fit.objective > run.fit.objective:
         return
     laws = [e.id for e in fit.model.effects if e.family == 'learned']

@@ -6,31 +6,32 @@ from types import MappingProxyType
 import numpy as np
 from scipy.special import expit, logsumexp
 
-from paint_deposition.diagnosis.evidence import KNOWN_NOISE, NullModel, log_bayes_factor
+from paint_deposition.diagnosis.cross_validation import left_out
+from paint_deposition.diagnosis.evidence import NullModel, evidence
 from paint_deposition.diagnosis.explanations import (
     FREE_ADDITION_UM,
     FREE_FACTOR,
+    FREE_LENGTHS,
+    LENGTHS,
     UNKNOWN,
+    WIGGLY,
     Explanation,
+    of_random,
 )
-from paint_deposition.diagnosis.learning import ChosenCurve
 from paint_deposition.diagnosis.model_space import SIZES, SURE
 from paint_deposition.diagnosis.procedure import ALPHA
 from paint_deposition.diagnosis.run import Run
-from paint_deposition.diagnosis.smooth_laws import curve_basis
+from paint_deposition.diagnosis.smooth_laws import bases_over
 from paint_deposition.diagnosis.unexplained import locate_unexplained
 from paint_deposition.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.residuals import root_mean_square
 
 ALL = slice(None)
-# Lengths of correlation of a curve that is learned as asked, in standard deviations of the
-# covariate.
-LENGTHS = (0.35, 1.0, 2.0)
 
 
 def refit(
@@ -91,15 +92,15 @@ def refit(
 
 
 def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
-    """The model with a curve over the law's covariate, whatever its evidence."""
-    curves = _curves(run, law)
+    """The model with a law over the covariate, whatever its evidence."""
+    options = _options(run, law)
     null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
     freedom = run.study.noise.degrees_of_freedom
-    weights = _log_bayes_factors(null, curves, freedom)
+    weights = _log_bayes_factors(null, options, freedom)
     probability = float(expit(logsumexp(weights) - np.log(len(weights))))
     before = run.history[-1]
-    fit = run.learned([curves[int(np.argmax(weights))]])
-    run.record(law.id, fit, _holdout_um(run, null, curves))
+    fit = run.learned([options[int(np.argmax(weights))]])
+    run.record(law.id, fit, _holdout_um(run, null, options))
     run.accepted.append(run.described((law.id,), probability, before))
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
@@ -111,61 +112,47 @@ def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
 
 
-def _curves(run: Run, law: type[LearnedLaw]) -> list[ChosenCurve]:
-    """Curves over the law's covariate of every kind, length of correlation and size."""
-    found = []
-    for kind in law.kinds:
-        basis = curve_basis(run.study, run.fit.model, law.covariate, kind)
-        if basis is None:
-            raise ModelError(
-                f'{law.id}: {law.covariate} is the same at all readings; choose a covariate that '
-                'differs between them'
-            )
-        size = FREE_FACTOR if kind == 'factor' else FREE_ADDITION_UM
-        for length in LENGTHS:
-            at_knots = size * basis.root(length)
-            columns = basis.film_um @ at_knots / run.study.sigma_um[:, np.newaxis]
-            sides = np.zeros(columns.shape[1])
-            curve = Explanation(UNKNOWN, columns, sides, 1.0, curve=(basis, at_knots))
-            found += [ChosenCurve(curve, float(size)) for size in SIZES]
+def _options(run: Run, law: type[LearnedLaw]) -> list[tuple[Explanation, float]]:
+    """Laws over the covariate of every kind, length of correlation and size."""
+    found = [
+        (of_random(UNKNOWN, run.study, basis.random(unit, length), 1.0), float(size))
+        for kind in law.kinds
+        for basis in bases_over(run.study, run.fit.model, law, kind)
+        for length in LENGTHS.get(law.covariate, (WIGGLY, *FREE_LENGTHS))
+        for unit in (FREE_FACTOR if kind == 'factor' else FREE_ADDITION_UM,)
+        for size in SIZES
+    ]
+    if not found:
+        raise ModelError(
+            f'{law.id}: {law.covariate} is the same at all readings; choose a covariate that '
+            'differs between them'
+        )
     return found
 
 
 def _log_bayes_factors(
-    null: NullModel, curves: Sequence[ChosenCurve], freedom: float, rows: slice | np.ndarray = ALL
+    null: NullModel,
+    options: Sequence[tuple[Explanation, float]],
+    freedom: float,
+    rows: slice | np.ndarray = ALL,
 ) -> list[float]:
-    """Log Bayes factor of each curve against the null hypothesis for some of the readings."""
-    square = float(null.deviation @ null.deviation)
-    found = []
-    for curve in curves:
-        columns = null.whiten(curve.columns[rows])
-        free = np.zeros(columns.shape[1])
-        scores = columns.T @ null.deviation
-        found.append(
-            log_bayes_factor(
-                columns.T @ columns, scores, square, free, free + 1.0,
-                min(freedom, 2.0 * KNOWN_NOISE), len(null.deviation),
-            )
-        )  # fmt: skip
-    return found
+    """Log Bayes factor of each law against the null hypothesis for some of the readings."""
+    return [
+        evidence(null.whiten(size * explanation.columns[rows]), null, freedom)
+        for explanation, size in options
+    ]
 
 
-def _holdout_um(run: Run, null: NullModel, curves: Sequence[ChosenCurve]) -> float:
-    """Error on points left out by patches, the curve's kind, length and size chosen without them.
+def _holdout_um(run: Run, null: NullModel, options: Sequence[tuple[Explanation, float]]) -> float:
+    """Error on points left out by patches, the law's kind, length and size chosen without them.
 
     In micrometres.
     """
     blocks, freedom = run.study.patches(), run.study.noise.degrees_of_freedom
-    pattern = null.columns.shape[1] - run.study.nuisance.shape[1]
     deviation = np.empty(len(blocks))
     for block in np.unique(blocks):
         out = blocks == block
-        weights = _log_bayes_factors(null.select(~out), curves, freedom, ~out)
-        columns = np.hstack([null.columns, curves[int(np.argmax(weights))].columns])
-        kept = columns[~out]
-        precision = np.eye(columns.shape[1]) + kept.T @ kept
-        amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
-        # Like all errors, this one is without the levels of parts and other nuisance.
-        amounts[pattern : null.columns.shape[1]] = 0.0
-        deviation[out] = null.raw[out] - columns[out] @ amounts
+        weights = _log_bayes_factors(null.select(~out), options, freedom, ~out)
+        explanation, size = options[int(np.argmax(weights))]
+        deviation[out] = left_out(null, [size * explanation.columns], out)
     return root_mean_square(deviation * run.study.sigma_um)

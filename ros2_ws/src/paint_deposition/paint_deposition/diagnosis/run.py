@@ -11,8 +11,7 @@ import numpy as np
 from scipy.stats import f as f_ratio
 
 from paint_deposition.diagnosis.evidence import NullModel
-from paint_deposition.diagnosis.explanations import explanations
-from paint_deposition.diagnosis.learning import ChosenCurve
+from paint_deposition.diagnosis.explanations import Explanation, explanations
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.diagnosis.testability import Testability, testability
@@ -26,7 +25,7 @@ from paint_deposition.diagnosis.verdict import (
 )
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
@@ -34,6 +33,8 @@ from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
 STARTS = 10
+# Times that laws of any form and the model's parameters are fitted to each other.
+LEARNING_STEPS = 3
 # A point that gets less than this share of the mean film was hardly reached by the path.
 REACHED = 0.02
 MOST_UNREACHED = 0.1
@@ -96,37 +97,59 @@ class Run:
     @property
     def taken(self) -> list[Effect]:
         """The candidates that the newest model has."""
-        return [e for e in self.fit.model.effects if e.id in self.candidates]
+        return self._candidates_in(self.fit)
 
-    def fitted_with(self, effects: Sequence[Effect], curves: np.ndarray | None = None) -> Fit:
+    def _candidates_in(self, fit: Fit) -> list[Effect]:
+        return [e for e in fit.model.effects if e.id in self.candidates]
+
+    def fitted_with(
+        self,
+        effects: Sequence[Effect],
+        free: np.ndarray | None = None,
+        model: DepositionModel | None = None,
+    ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
         Args:
             effects: with their first values.
-            curves: (P, n) directions over the noise that are left free beside them.
+            free: (P, n) directions over the noise that are left free beside them.
+            model: to start from; default the newest.
         """
-        model = self.fit.model
+        model = model or self.fit.model
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
         start = model.model_copy(update={'effects': (*kept, *effects)})
         nuisance = self.study.nuisance
-        if curves is not None:
-            nuisance = np.hstack([nuisance, curves])
+        if free is not None:
+            nuisance = np.hstack([nuisance, free])
         parameters = FreeParameters.of(start, *start.effects)
         return self.study.fit(parameters, nuisance=nuisance)
 
-    def learned(self, curves: Sequence[ChosenCurve]) -> Fit:
-        """The newest model with the curves that the readings call for."""
-        columns = np.hstack([curve.columns for curve in curves])
-        free = self.fitted_with(self.taken, columns)
-        covariance = np.eye(len(self.study)) + free.nuisance @ free.nuisance.T
-        amounts = columns.T @ np.linalg.solve(covariance, free.residual)
-        ends = np.cumsum([curve.columns.shape[1] for curve in curves])
-        laws: list[LearnedLaw] = []
-        for curve, part in zip(curves, np.split(amounts, ends[:-1]), strict=True):
-            assert curve.explanation.curve is not None
-            basis, at_knots = curve.explanation.curve
-            laws.append(basis.learned(at_knots @ (curve.size * part)))
-        start = free.model.model_copy(update={'effects': (*free.model.effects, *laws)})
+    def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
+        """The newest model with the laws that these explanations, at these sizes, stand for."""
+        fit = self.fit
+        laws: tuple[LearnedLaw, ...] = ()
+        for _ in range(LEARNING_STEPS):
+            randoms = [
+                explanation.random.around(self.study, fit.model)
+                for explanation, _ in chosen
+                if explanation.random
+            ]
+            parts = [
+                size * random.change_um / self.study.sigma_um[:, np.newaxis]
+                for random, (_, size) in zip(randoms, chosen, strict=True)
+            ]
+            columns = np.hstack(parts)
+            fit = self.fitted_with(self._candidates_in(fit), columns, fit.model)
+            covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
+            amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
+            ends = np.cumsum([part.shape[1] for part in parts])[:-1]
+            laws = tuple(
+                random.learned(size * part)
+                for random, (_, size), part in zip(
+                    randoms, chosen, np.split(amounts, ends), strict=True
+                )
+            )
+        start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
         parameters = FreeParameters.of(start, *start.effects)
         return self.study.fit(parameters, nuisance=self.study.nuisance)
 

@@ -1,78 +1,138 @@
-"""Smooth curves over a covariate, as changes of the readings: the film of a law of any form.
+"""Smooth laws of any form, as changes of the readings that are linear in the laws' values.
 
-A curve is a random function with a length of correlation, given by its values at even knots. The
-film that a factor 1 + h on what arrives changes is linear in these values.
+A law is a random function with a length of correlation, given by its values at knots: a curve over
+a covariate, a map over a part, or a deviation of the footprint.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.linalg import eigh
+from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LEARNED, LearnedLaw, knot_weights
+from paint_deposition.effects.learned.curves import CURVES, knot_weights
+from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
+from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
+from paint_deposition.effects.learned.place import LearnedMap, places_m
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.covariates import Rays
 
-KNOTS = 12
+# Knots of a curve; time is resolved more finely, as pumps pulsate.
+KNOTS, TIME_KNOTS = 12, 40
 # Rays that leave less than this share of the most are left out of a covariate's range, and
 # outermost rays by this share of their number.
 FAINT, OUTERMOST = 0.02, 0.01
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
+# Steps between the knots of a map [m], and of the radius of a footprint.
+MAP_STEP_M, RADII = 0.06, 10
+# The pattern ends at this many of its widths beyond the ring.
+WIDTHS = 3.0
+# Distance of knots that have nothing in common.
+FAR = 1e6
 
 
 @dataclass(frozen=True)
-class CurveBasis:
-    """Curves over one covariate.
+class Basis:
+    """Laws over one covariate, by their values at K knots.
 
     Attributes:
-        law: what the curve becomes in a model.
-        kind: 'factor' or 'addition'.
-        low, high: range of the covariate in the readings, in its unit.
-        film_um: (P, K) change of the film for a curve of 1 (1 um) at each knot.
-        spread: standard deviation of the covariate over the points, in steps between knots.
+        law: what the values become in a model.
+        settings: what the law needs besides them.
+        film_um: (P, K) change of the film for a value of 1 (1 um) at each knot.
+        knots: (K, D) their places, in the unit in which lengths of correlation are given.
+        shortest: length that the knots resolve, in that unit.
     """
 
     law: type[LearnedLaw]
-    kind: str
-    low: float
-    high: float
+    settings: Mapping[str, Any]
     film_um: np.ndarray
-    spread: float
+    knots: np.ndarray
+    shortest: float
 
-    def root(self, length: float) -> np.ndarray:
-        """(K, n) square root of the covariance of random curves of unit variance.
+    def random(self, size: float, length: float, among: np.ndarray | None = None) -> 'RandomLaw':
+        """Random laws.
 
         Args:
-            length: of correlation, in standard deviations of the covariate.
+            size: standard deviation of the values.
+            length: of correlation.
+            among: (K,) bool, knots at which the law is not zero; default all.
         """
-        knots = np.arange(self.film_um.shape[1])
-        steps = max(length * self.spread, 1.0)
-        values, vectors = eigh(np.exp(-0.5 * ((knots[:, np.newaxis] - knots) / steps) ** 2))
-        kept = values > NEGLIGIBLE * values[-1]
-        return vectors[:, kept] * np.sqrt(values[kept])
+        kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
+        square = cdist(self.knots[kept], self.knots[kept], 'sqeuclidean')
+        small = covariance_root(np.exp(-0.5 * square / max(length, self.shortest) ** 2))
+        root = np.zeros((len(self.knots), small.shape[1]))
+        root[kept] = size * small
+        return RandomLaw(self, root)
 
-    def learned(self, values: np.ndarray) -> LearnedLaw:
-        """The law with these values (K,) at the knots."""
-        return self.law(
-            low=self.low, high=self.high, kind=self.kind, learned=tuple(map(float, values))
-        )
+
+@dataclass(frozen=True)
+class RandomLaw:
+    """A law that is a random function.
+
+    Attributes:
+        basis: its values at knots.
+        at_knots: (K, n) those values for n independent amplitudes of unit variance.
+    """
+
+    basis: Basis
+    at_knots: np.ndarray
+
+    @property
+    def change_um(self) -> np.ndarray:
+        """(P, n) change of the film for each amplitude of one."""
+        return self.basis.film_um @ self.at_knots
+
+    def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
+        """The same where another model says what arrives where."""
+        bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
+        part = self.basis.settings.get('part_m')
+        (basis,) = (basis for basis in bases if basis.settings.get('part_m') == part)
+        return replace(self, basis=basis)
+
+    def learned(self, amplitudes: np.ndarray) -> LearnedLaw:
+        """The law with these amplitudes (n,)."""
+        values = tuple(map(float, self.at_knots @ amplitudes))
+        return self.basis.law(**self.basis.settings, learned=values)
+
+
+def covariance_root(covariance: np.ndarray) -> np.ndarray:
+    """(N, n) square root of a covariance (N, N), without negligible directions."""
+    values, vectors = eigh(covariance)
+    kept = values > NEGLIGIBLE * values[-1]
+    return vectors[:, kept] * np.sqrt(values[kept])
+
+
+def bases_over(
+    study: Study, model: DepositionModel, law: type[LearnedLaw], kind: str
+) -> list[Basis]:
+    """Laws over any covariate; none where it does not vary."""
+    if law is LearnedFootprint:
+        return [footprint_basis(study, model)]
+    if law is LearnedMap:
+        return map_bases(study, model, kind)
+    basis = curve_basis(study, model, law.covariate, kind)
+    return [basis] if basis else []
 
 
 def curve_basis(
-    study: Study, model: DepositionModel, covariate: str, kind: str = 'factor', knots: int = KNOTS
-) -> CurveBasis | None:
-    """The basis of curves over a covariate; None where the covariate does not vary.
+    study: Study, model: DepositionModel, covariate: str, kind: str = 'factor'
+) -> Basis | None:
+    """Curves over a covariate; None where it does not vary.
+
+    Lengths of correlation are in standard deviations of the covariate over the points.
 
     Args:
         study: the readings.
         model: whose rays and pattern say what arrives where.
-        covariate: one that a learned law can have.
+        covariate: one that a learned curve can have.
         kind: 'factor' on what arrives, or 'addition' to the film.
-        knots: K.
     """
-    law = LEARNED[covariate]
+    law = CURVES[covariate]
+    knots = TIME_KNOTS if covariate == 'time_s' else KNOTS
     rays, values = study.rays(model), [along[covariate] for along in study.along_rays(model)]
     low, high = _range(rays, values)
     if not law.axis(high) - law.axis(low) > 1e-9:
@@ -91,9 +151,75 @@ def curve_basis(
         films.append(film)
         positions.append(part.mean(law.axis(value)))
     step = (law.axis(high) - law.axis(low)) / (knots - 1)
-    return CurveBasis(
-        law, kind, low, high, np.vstack(films), float(np.std(np.concatenate(positions)) / step)
-    )
+    step /= max(float(np.std(np.concatenate(positions))), 1e-9)
+    places = step * np.arange(knots)[:, np.newaxis]
+    settings = {'kind': kind, 'low': low, 'high': high}
+    return Basis(law, settings, np.vstack(films), places, step)
+
+
+def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> list[Basis]:
+    """Maps over each part that was measured, lengths of correlation in metres.
+
+    Parts of one shape share a map, however they were painted.
+    """
+    film_um = study.forward.predict_um(model)
+    owner, experiments = study.campaign.experiment_of, study.campaign.experiments
+    points = [experiment.measured_points for experiment in experiments]
+    sides = [tuple(np.round(p.extent_m, 3)) for p in points]
+    found = []
+    for side in dict.fromkeys(sides):
+        places = {k: places_m(points[k]) for k, other in enumerate(sides) if other == side}
+        everywhere = np.vstack(list(places.values()))
+        low, high = everywhere.min(axis=0), everywhere.max(axis=0)
+        if min(high - low) < MAP_STEP_M:
+            continue
+        columns, rows = (int(n) for n in np.ceil((high - low) / MAP_STEP_M) + 1)
+        settings = {
+            'kind': kind, 'part_m': tuple(map(float, side)), 'columns': columns,
+            'low_m': tuple(low.tolist()), 'high_m': tuple(high.tolist()),
+        }  # fmt: skip
+        law = LearnedMap(**settings, learned=(0.0,) * (rows * columns))
+        change = np.zeros((len(study), rows * columns))
+        for k, place_m in places.items():
+            change[owner == k] = law.weights(place_m)
+        if kind == 'factor':
+            change *= film_um[:, np.newaxis]
+        across, up = np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows)
+        grid = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
+        found.append(Basis(LearnedMap, settings, change, grid, MAP_STEP_M))
+    return found
+
+
+def footprint_basis(study: Study, model: DepositionModel) -> Basis:
+    """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
+
+    Each harmonic of the angle is a random function of the radius by itself.
+    """
+    planar = model.planar
+    reach = planar.r_m + WIDTHS * max(planar.sigma1_m, planar.sigma2_m)
+    films = []
+    for rays in study.rays(model):
+        near = hat_weights(np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1), RADII)
+        near *= rays.share[:, :, np.newaxis]
+        films.append(
+            np.stack([np.einsum('mpk,mp->pk', near, wave) for wave in waves(rays.x_m, rays.y_m)])
+        )
+    film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
+    radius, wave = np.indices((RADII, WAVES))
+    places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
+    change = film_um.transpose(1, 2, 0).reshape(len(study), -1)
+    return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
+
+
+def footprint_kinds(basis: Basis) -> list[np.ndarray]:
+    """(K,) knots of the mean over the angle, of each harmonic, and of all.
+
+    At the centre the angle means nothing.
+    """
+    radius, wave = np.indices((RADII, WAVES)).reshape(2, -1)
+    sound = (wave == 0) | (radius > 0)
+    order = (wave + 1) // 2
+    return [sound & (order == k) for k in range(order.max() + 1)] + [sound]
 
 
 def _range(rays: list[Rays], values: list[np.ndarray]) -> tuple[float, float]:

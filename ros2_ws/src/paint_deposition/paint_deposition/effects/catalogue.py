@@ -6,7 +6,7 @@ from types import MappingProxyType
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned import learned_law
+from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.

@@ -10,7 +10,7 @@ from pydantic import Field
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import learned_law
+from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean

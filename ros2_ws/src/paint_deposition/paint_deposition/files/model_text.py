@@ -12,7 +12,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.json_files import plain
 
 COMMENT_COLUMN = 33

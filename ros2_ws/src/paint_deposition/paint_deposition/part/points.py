@@ -22,7 +22,8 @@ class SurfacePoints:
         normals: (V, 3) outward unit normals.
         down: (3,) unit vector of gravity in the mesh frame.
         outward: (3,) mean outward unit normal of the part; default that of the points.
-        centre_m: (3,) centre of the part's bounding box [m]; default that of the points.
+        centre_m, extent_m: (3,) centre and sides of the part's bounding box [m]; default those of
+            the points.
         area_m2: (V,) surface that each point stands for, or None for gauge readings.
         curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
         edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
@@ -43,6 +44,7 @@ class SurfacePoints:
         down: np.ndarray | tuple[float, float, float] = DOWN,
         outward: np.ndarray | None = None,
         centre_m: np.ndarray | None = None,
+        extent_m: np.ndarray | None = None,
         area_m2: np.ndarray | None = None,
         curvature_per_m: Covariate | None = None,
         edge_distance_m: Covariate | None = None,
@@ -57,6 +59,7 @@ class SurfacePoints:
             outward = outward_side(self.normals, area_m2, self.down)
         self.outward = outward
         self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
+        self.extent_m = box_extent_m(self.positions_m) if extent_m is None else extent_m
         self.area_m2 = area_m2
         count = len(self.positions_m)
         self._covariates = {
@@ -125,6 +128,7 @@ class SurfacePoints:
             down=self.down,
             outward=self.outward,
             centre_m=self.centre_m,
+            extent_m=self.extent_m,
             area_m2=None if self.area_m2 is None else self.area_m2[rows],
             slope_per_m=lambda: _slope_among(self.slope_per_m, rows),
             **kept,
@@ -142,6 +146,11 @@ def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
     if not len(positions_m):
         return np.zeros(3)
     return 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
+
+
+def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
+    """(3,) sides of the bounding box of (V, 3) points [m]."""
+    return np.ptp(positions_m, axis=0) if len(positions_m) else np.zeros(3)
 
 
 def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from paint_deposition.part import creases, curvature, edge_distance, hems, slope
 from paint_deposition.part.locating import Location, SurfaceLocator
 from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
-from paint_deposition.part.points import SurfacePoints, box_centre_m, heights
+from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine
 from paint_deposition.part.visibility import Occluder
 
@@ -185,6 +185,7 @@ class Surface:
             'down': self.down,
             'outward': self.outward,
             'centre_m': self.centre_m,
+            'extent_m': box_extent_m(self.vertices_m),
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
             'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
             'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),

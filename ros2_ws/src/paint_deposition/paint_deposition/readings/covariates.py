@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import along_path, at_points
-from paint_deposition.part.axes import across_axis
+from paint_deposition.effects.learned.curves import along_path, at_points
 from paint_deposition.readings.campaign import Experiment
 
 # Most sub-steps from which rays are traced; a longer path is thinned.
@@ -95,7 +94,6 @@ def along_rays(
         'standoff_ratio': rays.standoff_ratio,
         **of_path,
         **of_points,
-        'across_m': (points.positions_m @ across_axis(points.outward, points.down))[np.newaxis],
         'tool_x_m': rays.x_m,
         'tool_y_m': rays.y_m,
         'film_um': rays.share.sum(axis=0)[np.newaxis],

@@ -8,7 +8,9 @@ import numpy as np
 
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned import LEARNED, LEAST_FACTOR, LearnedLaw
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.fitting.study import Study
 from paint_deposition.results.fitted_model import PATTERN, REFIT
 
@@ -84,16 +86,18 @@ def effect_meaning(effect: type[Effect] | None) -> str:
 
 
 def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
-    """A learned law's curve and range as (words, value, unit)."""
-    unit = unit_words(law.unit)
-    first = 1.0 if law.covariate == 'spray_pass' else 0.0
-    low, high = (number(end + first) for end in (law.low, law.high))
+    """A learned law's values and its range as (words, value, unit)."""
     curve = np.array(law.learned)
     if law.kind == 'factor':
         curve = np.maximum(1.0 + curve, LEAST_FACTOR)
     least, most = number(float(curve.min())), number(float(curve.max()))
     shown = ('addition', 'µm') if law.kind == 'addition' else ('factor', '')
-    return [(shown[0], f'{least} to {most}', shown[1]), ('over', f'{low} to {high}', unit)]
+    words = [(shown[0], f'{least} to {most}', shown[1])]
+    if isinstance(law, LearnedCurve):
+        first = 1.0 if law.covariate == 'spray_pass' else 0.0
+        low, high = (number(end + first) for end in (law.low, law.high))
+        words.append(('over', f'{low} to {high}', unit_words(law.unit)))
+    return words
 
 
 def parameter_words(name: str, unit: str) -> str:

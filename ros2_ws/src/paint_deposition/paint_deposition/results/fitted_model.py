@@ -9,7 +9,7 @@ import numpy as np
 from paint_deposition.diagnosis.verdict import Step
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
@@ -96,7 +96,11 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
             if (effect.id, name) in fit.parameters.varied
         }
         if isinstance(effect, LearnedLaw) and effect not in given:
-            values = {'low': _few_digits(effect.low), 'high': _few_digits(effect.high)}
+            values = {
+                name: _few_digits(value)
+                for name, value in dict(effect).items()
+                if isinstance(value, float)
+            }
             values['learned'] = tuple(_few_digits(value) for value in effect.learned)
         model = model.with_effect(effect.model_copy(update=values))
     return model

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect, Ray
-from paint_deposition.effects.learned import LearnedLaw
+from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,
@@ -30,7 +30,7 @@ NEAR = 0.5
 
 def learned_figure(data: ReportData) -> dict[str, Any] | None:
     """Each learned law of the best model over its covariate."""
-    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedLaw)]
+    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
     if not laws:
         return None
     rows = -(-len(laws) // CHARTS_A_ROW)
@@ -56,7 +56,7 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
 
 
 def _traces(
-    law: LearnedLaw, library: Mapping[str, type[Effect]], where: dict[str, str], first: bool
+    law: LearnedCurve, library: Mapping[str, type[Effect]], where: dict[str, str], first: bool
 ) -> list[dict]:
     values = np.linspace(law.low, law.high, CURVE_POINTS)
     step = (law.high - law.low) / (len(law.learned) - 1)
@@ -80,17 +80,17 @@ def _traces(
     return traces
 
 
-def _shown(law: LearnedLaw, values: np.ndarray) -> np.ndarray:
+def _shown(law: LearnedCurve, values: np.ndarray) -> np.ndarray:
     """Values of the covariate as the report shows them: passes count from 1."""
     return values + (1.0 if law.covariate == 'spray_pass' else 0.0)
 
 
-def _of_law(law: LearnedLaw, values: np.ndarray) -> np.ndarray:
+def _of_law(law: LearnedCurve, values: np.ndarray) -> np.ndarray:
     return law.factor(values) if law.kind == 'factor' else law.curve(values)
 
 
 def nearest_law(
-    law: LearnedLaw, library: Mapping[str, type[Effect]], values: np.ndarray
+    law: LearnedCurve, library: Mapping[str, type[Effect]], values: np.ndarray
 ) -> tuple[Effect, np.ndarray] | None:
     """The effect whose law over the same covariate is nearest to a learned one.
 
@@ -122,7 +122,7 @@ def nearest_law(
     return effect, curve
 
 
-def _effects_over(law: LearnedLaw, library: Mapping[str, type[Effect]]) -> Iterator[Effect]:
+def _effects_over(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> Iterator[Effect]:
     """Effects of one amplitude whose own law is over the covariate, in many sizes and shapes."""
     for effect in library.values():
         if law.covariate not in effect.covariates or effect.free_law != law.kind:
@@ -138,7 +138,7 @@ def _effects_over(law: LearnedLaw, library: Mapping[str, type[Effect]]) -> Itera
             yield effect(**dict(zip(effect.parameters(), map(float, chosen), strict=True)))
 
 
-def curve_of(effect: Effect, law: LearnedLaw, values: np.ndarray) -> np.ndarray | None:
+def curve_of(effect: Effect, law: LearnedCurve, values: np.ndarray) -> np.ndarray | None:
     """(N,) factor or addition [um] of an effect at values (N,) of a learned law's covariate.
 
     None where the effect acts on the path, or by more than this covariate.

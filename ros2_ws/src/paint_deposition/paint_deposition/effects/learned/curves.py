@@ -1,22 +1,15 @@
-"""Laws learned from readings: a smooth curve over one covariate, as a factor or an addition.
+"""Curves learned from readings over one covariate."""
 
-A learned law is an effect like those of the library, but its form comes from readings: values at
-even knots over the range that the readings cover, linear in between. One step beyond that range
-it is neutral again: nothing is known there. The idea is that of an embedded discrepancy, inferred
-inside the model and shown against a physical covariate (Parish and Duraisamy, J. Comput. Phys.
-305:758, 2016).
-"""
-
-from collections.abc import Callable, Mapping
-from types import MappingProxyType
-from typing import Any, ClassVar, Literal
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
 from pydantic import Field, model_validator
 
-from paint_deposition.effects.base import Effect, PathContext
-from paint_deposition.errors import ModelError, did_you_mean
+from paint_deposition.effects.base import PathContext
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied, hat_weights
+from paint_deposition.effects.learned.place import places_m
 from paint_deposition.kernel.ray import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -26,45 +19,13 @@ EDGE_SCALE_M, FARTHEST_EDGE_M = 0.01, 0.25
 # Times since the trigger and distances from a turn matter up to here.
 LONGEST_SINCE_TRIGGER_S, FARTHEST_TURN_M = 1.0, 1.0
 SHARPEST_CURVATURE_PER_M = 12.0
-# A factor never takes more than all but this share of the film away.
-LEAST_FACTOR = 0.05
 
 
-def hat_weights(position: np.ndarray, count: int) -> np.ndarray:
-    """(..., count) weights of knots 0 to count - 1 at positions (...) among them.
-
-    Linear between two knots; they fall to zero within one step beyond the first and the last.
-    """
-    away = np.abs(np.asarray(position, dtype=float)[..., np.newaxis] - np.arange(count))
-    return np.maximum(0.0, 1.0 - away)
-
-
-class LearnedLaw(Effect):
-    """A curve over a covariate; the subclass says which and where it acts.
-
-    Factor: what arrives is multiplied by 1 + h. Addition: h [um] is added to the film. The curve h
-    has the values ``learned`` at even steps on the ``axis`` of the covariate from ``low`` to
-    ``high``.
-
-    Attributes of a subclass:
-        covariate, unit: name and unit of the covariate. over: the same in words.
-        kinds: what the curve may be.
-    """
-
-    family = 'learned'
-    covariate: ClassVar[str]
-    unit: ClassVar[str]
-    over: ClassVar[str]
-    kinds: ClassVar[tuple[str, ...]] = ('factor',)
+class LearnedCurve(LearnedLaw):
+    """A curve over a covariate, with knots at even steps on its ``axis`` from low to high."""
 
     low: float = Field(0.0, description='least value of the covariate in the readings')
     high: float = Field(1.0, description='greatest value of the covariate in the readings')
-    kind: Literal['factor', 'addition'] = Field(
-        'factor', description="'factor' 1 + h on what arrives, or 'addition' of h um to the film"
-    )
-    learned: tuple[float, ...] = Field(
-        (0.0, 0.0), description='a list of numbers: h at even steps from low to high'
-    )
 
     @staticmethod
     def axis(value: Any) -> Any:
@@ -72,29 +33,16 @@ class LearnedLaw(Effect):
         return value
 
     @model_validator(mode='after')
-    def _is_a_curve(self) -> 'LearnedLaw':
+    def _is_a_curve(self) -> 'LearnedCurve':
         if not self.axis(self.high) > self.axis(self.low):
             raise ValueError(f'high is {self.high:g}; it must be above low, {self.low:g}')
         if len(self.learned) < 2:
             raise ValueError(f'learned has {len(self.learned)} values; give two or more')
-        if self.kind not in self.kinds:
-            raise ValueError(
-                f'kind is {self.kind!r}; over {self.covariate} give {" or ".join(self.kinds)}'
-            )
         return self
 
     @classmethod
-    def parameters(cls) -> dict[str, dict[str, Any]]:
-        """None: a fit does not vary the curve; it is learned by its own step."""
-        return {}
-
-    @classmethod
-    def typical(cls) -> 'LearnedLaw':
+    def typical(cls) -> 'LearnedCurve':
         return cls(learned=(0.0, 0.1))
-
-    @property
-    def is_neutral(self) -> bool:
-        return not any(self.learned)
 
     @property
     def knots(self) -> np.ndarray:
@@ -113,26 +61,23 @@ class LearnedLaw(Effect):
         return np.maximum(1.0 + self.curve(value), LEAST_FACTOR)
 
 
-class _OverThePath(LearnedLaw):
+class _OverThePath(LearnedCurve):
     """Acts on the flow, by what the path is like at each sub-step."""
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         return path.with_flow_scaled(self.factor(along_path(path)[self.covariate]))
 
 
-class _OverTheSurface(LearnedLaw):
+class _OverTheSurface(LearnedCurve):
     """Acts on the film, by what the surface is like at each point; bare metal stays bare."""
 
     kinds = ('factor', 'addition')
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        value = at_points(points)[self.covariate]()
-        if self.kind == 'addition':
-            return np.where(film_um > 0.0, np.maximum(film_um + self.curve(value), 0.0), film_um)
-        return film_um * self.factor(value)
+        return applied(film_um, self.curve(at_points(points)[self.covariate]()), self.kind)
 
 
-class _AlongTheRay(LearnedLaw):
+class _AlongTheRay(LearnedCurve):
     """Acts on the flux of each ray, inside the kernel."""
 
     def values(self) -> tuple[float, ...]:
@@ -142,7 +87,7 @@ class _AlongTheRay(LearnedLaw):
 
 
 def knot_positions(
-    law: type[LearnedLaw], value: np.ndarray, low: float, high: float, count: int
+    law: type[LearnedCurve], value: np.ndarray, low: float, high: float, count: int
 ) -> np.ndarray:
     """(...) positions of values of the covariate among the knots 0 to count - 1 of a law.
 
@@ -154,7 +99,7 @@ def knot_positions(
 
 
 def knot_weights(
-    law: type[LearnedLaw], value: np.ndarray, low: float, high: float, count: int
+    law: type[LearnedCurve], value: np.ndarray, low: float, high: float, count: int
 ) -> np.ndarray:
     """(..., count) weights of a law's knots at values of its covariate (...)."""
     return hat_weights(knot_positions(law, value, low, high, count), count)
@@ -183,6 +128,7 @@ def at_points(points: SurfacePoints) -> dict[str, Callable[[], np.ndarray]]:
         'edge_distance_m': lambda: np.minimum(points.edge_distance_m, FARTHEST_EDGE_M),
         'sky_view_factor': lambda: points.sky_view_factor,
         'height_fraction': lambda: points.height_fraction,
+        'across_m': lambda: places_m(points)[:, 0],
     }
 
 
@@ -289,6 +235,13 @@ class LearnedSkyViewFactor(_OverTheSurface):
     over = 'the share of the half-space that a point sees'
 
 
+class LearnedAcross(_OverTheSurface):
+    """The film follows the distance from the part's centre to the right, as learned."""
+
+    id, covariate, unit = 'learned:across_m', 'across_m', 'm'
+    over = "the distance from the part's centre to the right"
+
+
 class LearnedHeight(_OverTheSurface):
     """The film follows the height on the part, as learned."""
 
@@ -296,24 +249,19 @@ class LearnedHeight(_OverTheSurface):
     over = 'the height on the part'
 
 
-# Learned laws by covariate.
-LEARNED: Mapping[str, type[LearnedLaw]] = MappingProxyType(
-    {
-        law.covariate: law
-        for base in (_AlongTheRay, _OverThePath, _OverTheSurface)
-        for law in base.__subclasses__()
-    }
-)
+class LearnedFilm(LearnedCurve):
+    """The film, or what the gauge makes of it, follows the film itself, as learned."""
+
+    id, covariate, unit = 'learned:film_um', 'film_um', 'um'
+    over = 'the film itself'
+
+    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+        return applied(film_um, self.curve(film_um), self.kind)
 
 
-def learned_law(covariate: str) -> type[LearnedLaw]:
-    """The class of the learned law over a covariate.
-
-    Raises:
-        ModelError: there is none over it; names the nearest.
-    """
-    if covariate in LEARNED:
-        return LEARNED[covariate]
-    raise ModelError(
-        f'no learned law has the covariate {covariate!r}; {did_you_mean(covariate, LEARNED)}'
-    )
+# Learned curves by covariate.
+CURVES: dict[str, type[LearnedCurve]] = {
+    law.covariate: law
+    for kinds in (_AlongTheRay, _OverThePath, _OverTheSurface)
+    for law in kinds.__subclasses__()
+} | {LearnedFilm.covariate: LearnedFilm}
