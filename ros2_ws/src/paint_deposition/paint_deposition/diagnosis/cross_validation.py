@@ -9,6 +9,7 @@ from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.learning import choose_laws
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.study import Study
 from paint_deposition.readings.residuals import root_mean_square
 
 # How many times some of the blocks are left out.
@@ -54,23 +55,39 @@ def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
     return HeldOut(deviation, score / len(target))
 
 
-def nested_rmse_um(
-    space: ModelSpace, blocks: np.ndarray, sigma_um: np.ndarray, learn: bool
-) -> float:
-    """Error on points left out when causes and learned laws are chosen without them, too [um].
+@dataclass(frozen=True)
+class Stage:
+    """One step of a search: what may be missing at a fit, and what was accepted there."""
+
+    space: ModelSpace
+    accepted: frozenset[str]
+
+
+def nested_rmse_um(stages: Sequence[Stage], study: Study, learn: bool) -> float:
+    """Error on points left out when effects and learned laws are chosen without them, too [um].
+
+    For each fold the search is repeated on the other points: as long as they call for the same
+    effects, it goes on to the next stage; only the linearisations are shared by all folds.
 
     Args:
-        space: of models around a fit; only its linearisation is shared by all choices.
-        blocks: (P,) block of each point; some blocks at a time are left out.
-        sigma_um: (P,) standard deviations of the points.
+        stages: of the search; nothing was accepted at the last one.
+        study: the readings; some patches of points at a time are left out.
         learn: whether laws are learned, too, or effects of the library alone.
     """
-    null = space.null
+    blocks = study.patches()
     deviation = np.empty(len(blocks))
     for fold in np.array_split(np.random.default_rng(0).permutation(np.unique(blocks)), FOLDS):
         out = np.isin(blocks, fold)
-        deviation[out] = left_out(null, _chosen_columns(space, ~out, learn), out)
-    return root_mean_square(deviation * sigma_um)
+        for stage in stages:
+            space, part = stage.space, stage.space.select(~out)
+            found = part.accepted
+            if {cause for cause, _, _ in found} != stage.accepted:
+                break
+        columns = [size * space.explanations[k].law for _, k, size in found]
+        if learn:
+            columns += _learned(space, part, columns, ~out)
+        deviation[out] = left_out(space.null, columns, out)
+    return root_mean_square(deviation * study.sigma_um)
 
 
 def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
@@ -89,14 +106,11 @@ def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> n
     return null.raw[out] - columns[out] @ amounts
 
 
-def _chosen_columns(space: ModelSpace, rows: np.ndarray, learn: bool) -> list[np.ndarray]:
-    """Directions (P, n) of the effects and laws that some readings (P,) bool call for."""
-    part = space.select(rows)
-    chosen = [size * space.explanations[k].law for _, k, size in part.accepted]
-    if not learn:
-        return chosen
-    null = NullModel.of(
-        np.hstack([part.null.columns, *(columns[rows] for columns in chosen)]), part.null.raw
-    )
+def _learned(
+    space: ModelSpace, part: ModelSpace, columns: list[np.ndarray], rows: np.ndarray
+) -> list[np.ndarray]:
+    """Directions (P, n) of the laws that some readings (P,) bool call for beside others."""
+    given = np.hstack([part.null.columns, *(c[rows] for c in columns)])
+    null = NullModel.of(given, part.null.raw)
     laws = choose_laws(null, part.explanations, space.freedom)
-    return chosen + [size * space.explanations[k].columns for k, size in laws]
+    return [size * space.explanations[k].columns for k, size in laws]

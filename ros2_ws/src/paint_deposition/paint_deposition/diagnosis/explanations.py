@@ -31,6 +31,8 @@ UNKNOWN, FOOTPRINT = 'unknown', 'footprint'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
+# The size of an effect is what it changes at this share of the points at the most.
+LARGEST = 0.95
 # Prior share of the law against a free law over the effect's own covariate.
 LAW_SHARE = 0.7
 # Free laws: size of a factor, of an addition [um], and lengths of correlation.
@@ -57,8 +59,8 @@ class Explanation:
         share: prior share of this explanation among those of its cause.
         sensitivity: the law of an effect whose directions come first, or None.
         random: the law of any form whose amplitudes the directions are, or None.
-        direction: in which that law must go to be this cause: it rises (1), falls (-1), or
-            either (0); None where it may go up and down.
+        directions: in one of which that law must go to be this cause: it rises (1), falls (-1),
+            or either (0); in none of them, if it is shapeless: then it would be an effect.
         description: in words, for a shapeless one.
     """
 
@@ -68,17 +70,18 @@ class Explanation:
     share: float
     sensitivity: Sensitivity | None = None
     random: RandomLaw | None = None
-    direction: int | None = None
+    directions: tuple[int, ...] = ()
     description: str = ''
 
     def goes_right(self, amounts: np.ndarray) -> bool:
-        """Whether the law with these amplitudes (n,) goes in the direction of the cause."""
-        if self.random is None or self.direction is None:
+        """Whether the law with these amplitudes (n,) goes in a direction of its cause."""
+        if self.random is None or not self.directions:
             return True
         steps = np.diff(self.random.at_knots @ amounts)
         up, down = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
-        wrong = {1: down, -1: up, 0: min(up, down)}[self.direction]
-        return bool(wrong <= MOST_WRONG_WAY * (up + down))
+        wrong = {1: down, -1: up, 0: min(up, down)}
+        least = min(wrong[direction] for direction in self.directions)
+        return bool(least <= MOST_WRONG_WAY * (up + down)) == (self.cause != UNKNOWN)
 
     @property
     def law(self) -> np.ndarray:
@@ -91,7 +94,7 @@ class Explanation:
 
 
 def explanations(
-    study: Study, fit: Fit, candidates: Mapping[str, list[Effect]]
+    study: Study, fit: Fit, candidates: Mapping[str, list[Effect]], kept: frozenset[str]
 ) -> list[Explanation]:
     """All explanations at a fitted model.
 
@@ -99,23 +102,19 @@ def explanations(
         study: the readings.
         fit: where to linearise; candidates that are part of its model are linearised as fitted.
         candidates: effects in the shapes to try, by id.
+        kept: ids of those that explain nothing more: the null hypothesis has them.
     """
     model = fit.model
-    covariates = {
-        c.name: (c.values - c.values.mean()) / c.values.std()
-        for c in study.covariates(model)
-        if c.varies
-    }
+    covariates = _covariates(study, model)
     roots = {name: _root(values, LAW_LENGTH) for name, values in covariates.items()}
     found: list[Explanation] = []
-    for shapes in candidates.values():
-        found += _of_effect(study, fit, shapes, roots)
-    owned = {
-        name
-        for shapes in candidates.values()
-        for name in type(shapes[0]).covariates
-        if type(shapes[0]).free_law
-    }
+    for name, shapes in candidates.items():
+        if name not in kept:
+            found += _of_effect(study, fit, shapes, roots)
+    owned: dict[str, tuple[int, ...]] = {}
+    for effect in (type(shapes[0]) for shapes in candidates.values()):
+        for name, direction in effect.covariates.items() if effect.free_law else ():
+            owned[name] = (*owned.get(name, ()), direction)
     found += _shapeless(study, model, covariates, owned)
     basis = footprint_basis(study, model)
     kinds = [
@@ -124,7 +123,51 @@ def explanations(
         for among in footprint_kinds(basis)
     ]
     found += [of_random(FOOTPRINT, study, random, 1.0 / len(kinds)) for random in kinds]
-    return found
+    # A model has each learned law once.
+    known = {type(effect) for effect in model.effects}
+    return [
+        replace(e, random=None) if e.random and e.random.basis.law in known else e for e in found
+    ]
+
+
+def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
+    """(P, n) directions over the noise in which the laws of effects in a model may be off.
+
+    Args:
+        study: the readings.
+        fit: of the model.
+        kept: ids of the effects.
+    """
+    covariates = _covariates(study, fit.model)
+    film = study.forward.predict_um(fit.model)
+    found = [np.empty((len(study), 0))]
+    for effect in (e for e in fit.model.effects if e.id in kept):
+        others = tuple(e for e in fit.model.effects if e.id != effect.id)
+        without = fit.model.model_copy(update={'effects': others})
+        change = film - study.forward.predict_um(without)
+        own = [name for name in effect.covariates if name in covariates]
+        for name in own:
+            scale = LAW_ERROR / np.sqrt(len(own))
+            basis = None
+            if effect.free_law and name in CURVES:
+                basis = curve_basis(study, fit.model, name, effect.free_law)
+            if basis is None:
+                columns = scale * change[:, np.newaxis] * _root(covariates[name], LAW_LENGTH)
+            else:
+                relative = change if effect.free_law == 'addition' else change / film
+                size = scale * float(np.quantile(np.abs(relative), LARGEST))
+                columns = basis.random(size, LAW_LENGTH).change_um
+            found.append(columns / study.sigma_um[:, np.newaxis])
+    return np.hstack(found)
+
+
+def _covariates(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
+    """(P,) each, in standard deviations from its mean."""
+    return {
+        c.name: (c.values - c.values.mean()) / c.values.std()
+        for c in study.covariates(model)
+        if c.varies
+    }
 
 
 def of_random(
@@ -132,13 +175,13 @@ def of_random(
     study: Study,
     random: RandomLaw,
     share: float,
-    direction: int | None = None,
+    directions: tuple[int, ...] = (),
     description: str = '',
 ) -> Explanation:
     columns = random.change_um / study.sigma_um[:, np.newaxis]
     return Explanation(
         cause, columns, np.zeros(columns.shape[1]), share, random=random,
-        direction=direction, description=description,
+        directions=directions, description=description,
     )  # fmt: skip
 
 
@@ -166,7 +209,7 @@ def _of_effect(
         yield Explanation(effect.id, columns, sides, law_share / len(shapes), law)
     for random in free:
         direction = effect.covariates[random.basis.law.covariate]
-        yield of_random(effect.id, study, random, (1.0 - law_share) / len(free), direction)
+        yield of_random(effect.id, study, random, (1.0 - law_share) / len(free), (direction,))
 
 
 def _free_laws(study: Study, model: DepositionModel, effect: type[Effect]) -> list[RandomLaw]:
@@ -185,7 +228,7 @@ def _shapeless(
     study: Study,
     model: DepositionModel,
     covariates: dict[str, np.ndarray],
-    owned: set[str],
+    owned: Mapping[str, tuple[int, ...]],
 ) -> Iterator[Explanation]:
     """Random fields over the part, and over covariates, in proportion to the film."""
     film = FIELD_SHARE * study.forward.predict_um(model) / study.sigma_um
@@ -209,7 +252,7 @@ def _shapeless(
             yield _field(film[:, np.newaxis] * _root(values, length), share, name)
         else:
             random = basis.random(FIELD_SHARE, length)
-            yield of_random(UNKNOWN, study, random, share, description=name)
+            yield of_random(UNKNOWN, study, random, share, owned.get(name, ()), name)
 
 
 def _field(columns: np.ndarray, share: float, description: str) -> Explanation:

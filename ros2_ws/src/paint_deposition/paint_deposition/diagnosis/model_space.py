@@ -37,6 +37,8 @@ SURE = 0.8
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
 DRAWS = 2000
+# Effects that could stand in one place, most probable first, and the probability of one of them.
+Group = tuple[tuple[str, ...], float]
 # Log prior share of an explanation that contradicts physics.
 NEVER = -1e6
 # The error of a law is at most this large beside the law; a smaller one, in standard deviations
@@ -145,7 +147,7 @@ class ModelSpace:
         total = sum(found.values())
         return {name: value / total for name, value in sorted(found.items(), key=lambda i: -i[1])}
 
-    def group(self, cause: str) -> tuple[tuple[str, ...], float]:
+    def group(self, cause: str) -> Group:
         """The effects that could stand in the place of a cause, and how probable one of them is.
 
         The most probable ones that together have a chance of 95 % among all alternatives; what is
@@ -166,10 +168,9 @@ class ModelSpace:
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
         explanation = self.explanations[k]
-        if explanation.sensitivity is None and explanation.direction is None:
+        if explanation.sensitivity is None and not explanation.directions:
             return True
-        alone = Model((explanation.cause,), (k,), (size,), 0.0)
-        (amounts,) = self.amplitudes(alone)
+        (amounts,) = self.amplitudes(Model((), (k,), (size,)))
         if explanation.sensitivity is None:
             return explanation.goes_right(amounts)
         of_law = len(explanation.sensitivity.names)

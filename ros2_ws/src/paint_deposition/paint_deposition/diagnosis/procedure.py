@@ -3,22 +3,22 @@
 1. Fit the pattern; stop if the fit cannot be right.
 2. Compute the evidence of all sets of up to three causes around the fit, and test whether anything
    is missing at all.
-3. If so, refit with every effect of the best set that is probable enough, and repeat 2 around that
-   fit until the set stays as it is: a strong effect bends the line along which it was judged.
+3. If so, refit with every effect of the best set that is probable enough, and look beside it, its
+   law being allowed to be off, until nothing more is found. Test each effect by leaving it out.
 4. Learn what the accepted laws leave unexplained as laws of any form, if readings left out are
    predicted better.
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from paint_deposition.diagnosis.cross_validation import nested_rmse_um
+from paint_deposition.diagnosis.cross_validation import Stage, nested_rmse_um
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.diagnosis.learning import choose_laws
-from paint_deposition.diagnosis.model_space import Model, ModelSpace
+from paint_deposition.diagnosis.model_space import SURE, Group, Model, ModelSpace
 from paint_deposition.diagnosis.run import Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
 from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, percent
@@ -60,18 +60,20 @@ def diagnose(
     if p_value >= ALPHA:
         reason = 'The readings agree with the model to within the noise of the gauge.'
         return run.diagnosis(p_value, 'none_missing', reason)
-    for _ in range(ROUNDS):
-        effects = _started(space)
-        if {effect.id for effect in effects} == run.added:
-            break
-        progress('refitting with ' + (', '.join(e.id for e in effects) or 'the pattern alone'))
-        run.fit = run.fitted_with(effects)
+    stages: list[Stage] = []
+    while len(stages) < ROUNDS and (effects := _started(space)):
+        progress('refitting with ' + ', '.join(effect.id for effect in effects))
+        stages.append(Stage(space, frozenset(effect.id for effect in effects)))
+        run.fit = run.fitted_with([*run.taken, *effects])
         space = run.linearise()
-    patches, sigma_um = run.study.patches(), run.study.sigma_um
-    holdout_um = nested_rmse_um(space, patches, sigma_um, learn=False)
-    _accept(run, space, holdout_um)
+    groups = _tested(run)
+    if len(groups) < sum(len(stage.accepted) for stage in stages):
+        space = run.linearise()
+    stages.append(Stage(space, frozenset()))
+    holdout_um = nested_rmse_um(stages, run.study, learn=False)
+    _accept(run, groups, holdout_um)
     progress('learning what the laws leave unexplained')
-    _learn(run, space, holdout_um)
+    _learn(run, stages, holdout_um)
     return _conclude(run, space, p_value)
 
 
@@ -97,10 +99,26 @@ def _started(space: ModelSpace) -> list[Effect]:
     return effects
 
 
-def _accept(run: Run, space: ModelSpace, holdout_um: float) -> None:
+def _tested(run: Run) -> dict[str, Group]:
+    """What could stand in the place of each added effect, all others as they are.
+
+    An effect that does not stand this test is taken out again, the least probable first.
+    """
+    while True:
+        groups = {}
+        for name in run.added:
+            space = run.linearise(frozenset({name}))
+            groups[name] = space.group(name)
+        if len(groups) == 0 or min(p for _, p in groups.values()) > SURE:
+            return groups
+        weakest = min(groups, key=lambda name: groups[name][1])
+        run.fit = run.fitted_with([e for e in run.taken if e.id != weakest])
+
+
+def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
     """Accept the effects of the newest fit, strongest first, each as a step of the history."""
     final = run.fit
-    effects = {e.id: e for e in final.model.effects if e.id in run.candidates}
+    effects = {effect.id: effect for effect in run.taken}
     left = list(effects)
     taken: list[Effect] = []
     while left:
@@ -109,25 +127,28 @@ def _accept(run: Run, space: ModelSpace, holdout_um: float) -> None:
         left.remove(name)
         taken.append(effects[name])
         before, fit = run.history[-1], trials[name] if left else final
-        members, probability = space.group(name)
+        members, probability = groups[name]
         members = (name, *(m for m in members if m not in effects))
         run.record(name, fit, None if left else holdout_um)
         run.accepted.append(run.described(members, probability, before))
 
 
-def _learn(run: Run, space: ModelSpace, without_um: float) -> None:
+def _learn(run: Run, stages: Sequence[Stage], without_um: float) -> None:
     """Add laws of any form if they improve the prediction of points left out."""
     null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
+    space = stages[-1].space
     chosen = choose_laws(null, space.explanations, space.freedom)
     if not chosen:
         return
-    with_um = nested_rmse_um(space, run.study.patches(), run.study.sigma_um, learn=True)
+    with_um = nested_rmse_um(stages, run.study, learn=True)
     if with_um > (1.0 - LEAST_GAIN) * without_um:
         return
     fit = run.learned([(space.explanations[k], size) for k, size in chosen])
     if fit.objective > run.fit.objective:
         return
-    laws = [e.id for e in fit.model.effects if e.family == 'learned']
+    laws = [
+        e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
+    ]
     before = run.history[-1]
     run.record(' and '.join(laws), fit, with_um)
     run.accepted += [run.described((law,), 1.0, before) for law in laws]

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.stats import f as f_ratio
 
 from paint_deposition.diagnosis.evidence import NullModel
-from paint_deposition.diagnosis.explanations import Explanation, explanations
+from paint_deposition.diagnosis.explanations import Explanation, explanations, law_errors
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.diagnosis.testability import Testability, testability
@@ -50,6 +50,7 @@ class Run:
 
     Attributes:
         study: the readings.
+        start: the model that the run started from.
         fit: of the newest model.
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
@@ -74,6 +75,7 @@ class Run:
         self.study = Study.of(campaign, (*start.effects, *neutral))
         self.seed = seed
         progress('fitting the model')
+        self.start = start
         parameters = FreeParameters.of(start, *start.effects)
         self.fit = self.study.fit(parameters, STARTS, seed, self.study.nuisance)
         self.history = [Step.of(self.study, '', self.fit)]
@@ -86,10 +88,16 @@ class Run:
         """Ids of the candidates that the newest model has."""
         return frozenset(effect.id for effect in self.taken)
 
-    def linearise(self) -> ModelSpace:
-        """The space of models around the newest fit; what was added may be missing again."""
-        null = NullModel.around(self.fit, self.added, self.study.nuisance)
-        found = explanations(self.study, self.fit, self.candidates)
+    def linearise(self, apart: frozenset[str] = frozenset()) -> ModelSpace:
+        """The space of what may be missing beside the newest model, whose laws may be off.
+
+        Args:
+            apart: ids of added effects that may be missing again.
+        """
+        kept = self.added - apart
+        free = np.hstack([self.study.nuisance, law_errors(self.study, self.fit, kept)])
+        null = NullModel.around(self.fit, apart, free)
+        found = explanations(self.study, self.fit, self.candidates, kept)
         if self.testable is None:
             self.testable = testability(null, found)
         return ModelSpace(null, found, self.study.noise.degrees_of_freedom)

@@ -20,7 +20,7 @@ class FlowDrift(Effect):
 
     id = 'flow_drift'
     family = 'order'
-    covariates = MappingProxyType({'time_s': 0})
+    covariates = MappingProxyType({'time_s': 0, 'spray_pass': 0})
     free_law = 'factor'
     signature = 'level changes in the order of the passes; reversed if their order is'
     rivals = ('fog_gradient',)
