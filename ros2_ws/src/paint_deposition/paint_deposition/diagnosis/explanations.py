@@ -94,22 +94,21 @@ class Explanation:
 
 
 def explanations(
-    study: Study, fit: Fit, candidates: Mapping[str, list[Effect]], kept: frozenset[str]
+    study: Study, fit: Fit, candidates: Mapping[str, list[Effect]]
 ) -> list[Explanation]:
     """All explanations at a fitted model.
 
     Args:
         study: the readings.
-        fit: where to linearise; candidates that are part of its model are linearised as fitted.
+        fit: where to linearise; effects that are part of its model explain nothing more.
         candidates: effects in the shapes to try, by id.
-        kept: ids of those that explain nothing more: the null hypothesis has them.
     """
     model = fit.model
     covariates = _covariates(study, model)
     roots = {name: _root(values, LAW_LENGTH) for name, values in covariates.items()}
     found: list[Explanation] = []
     for name, shapes in candidates.items():
-        if name not in kept:
+        if model.effect(name) is None:
             found += _of_effect(study, fit, shapes, roots)
     owned: dict[str, tuple[int, ...]] = {}
     for effect in (type(shapes[0]) for shapes in candidates.values()):
@@ -193,10 +192,6 @@ def _of_effect(
     own = [name for name in effect.covariates if name in roots]
     free = _free_laws(study, fit.model, effect) if effect.free_law else []
     law_share = LAW_SHARE if free else 1.0
-    fitted = fit.model.effect(effect.id)
-    if fitted is not None:
-        amplitudes = {name: getattr(fitted, name) for name in effect.amplitudes()}
-        shapes = [shape.model_copy(update=amplitudes) for shape in shapes] + [fitted]
     for shape in shapes:
         law = sensitivity(study.forward, fit, shape, study.sigma_um)
         errors = [

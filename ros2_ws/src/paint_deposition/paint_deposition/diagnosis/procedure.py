@@ -105,14 +105,15 @@ def _tested(run: Run) -> dict[str, Group]:
     An effect that does not stand this test is taken out again, the least probable first.
     """
     while True:
+        effects = {effect.id: effect for effect in run.taken}
         groups = {}
-        for name in run.added:
-            space = run.linearise(frozenset({name}))
-            groups[name] = space.group(name)
-        if len(groups) == 0 or min(p for _, p in groups.values()) > SURE:
+        for name in effects:
+            fit = run.fitted_with([e for e in effects.values() if e.id != name])
+            groups[name] = run.linearise(fit).group(name)
+        if not groups or min(p for _, p in groups.values()) > SURE:
             return groups
         weakest = min(groups, key=lambda name: groups[name][1])
-        run.fit = run.fitted_with([e for e in run.taken if e.id != weakest])
+        run.fit = run.fitted_with([e for e in effects.values() if e.id != weakest])
 
 
 def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
@@ -135,7 +136,7 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
 
 def _learn(run: Run, stages: Sequence[Stage], without_um: float) -> None:
     """Add laws of any form if they improve the prediction of points left out."""
-    null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
+    null = NullModel.around(run.fit, run.study.nuisance)
     space = stages[-1].space
     chosen = choose_laws(null, space.explanations, space.freedom)
     if not chosen:

@@ -94,7 +94,7 @@ def refit(
 def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence."""
     options = _options(run, law)
-    null = NullModel.around(run.fit, frozenset(), run.study.nuisance)
+    null = NullModel.around(run.fit, run.study.nuisance)
     freedom = run.study.noise.degrees_of_freedom
     weights = _log_bayes_factors(null, options, freedom)
     probability = float(expit(logsumexp(weights) - np.log(len(weights))))

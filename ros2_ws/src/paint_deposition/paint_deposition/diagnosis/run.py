@@ -88,16 +88,17 @@ class Run:
         """Ids of the candidates that the newest model has."""
         return frozenset(effect.id for effect in self.taken)
 
-    def linearise(self, apart: frozenset[str] = frozenset()) -> ModelSpace:
-        """The space of what may be missing beside the newest model, whose laws may be off.
+    def linearise(self, fit: Fit | None = None) -> ModelSpace:
+        """The space of what may be missing beside a model, whose effects' laws may be off.
 
         Args:
-            apart: ids of added effects that may be missing again.
+            fit: of the model; default the newest.
         """
-        kept = self.added - apart
-        free = np.hstack([self.study.nuisance, law_errors(self.study, self.fit, kept)])
-        null = NullModel.around(self.fit, apart, free)
-        found = explanations(self.study, self.fit, self.candidates, kept)
+        fit = fit or self.fit
+        kept = frozenset(effect.id for effect in self._candidates_in(fit))
+        free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
+        null = NullModel.around(fit, free)
+        found = explanations(self.study, fit, self.candidates)
         if self.testable is None:
             self.testable = testability(null, found)
         return ModelSpace(null, found, self.study.noise.degrees_of_freedom)

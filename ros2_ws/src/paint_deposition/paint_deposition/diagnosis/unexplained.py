@@ -25,7 +25,7 @@ def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Un
         footprint: whether the pattern itself is suspected.
         seed: of the simulated deviations.
     """
-    null = NullModel.around(fit, frozenset(), study.nuisance)
+    null = NullModel.around(fit, study.nuisance)
     draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
     found, by_chance = [], np.zeros(DRAWS)
     for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
