@@ -126,13 +126,12 @@ def fit_readings(
         nuisance = np.empty((len(measured_um), 0))
     problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance)
     first = problem.scaled_to_mean(parameters.encode(parameters.start))
+    candidates = [first]
     if starts > 1:
-        candidates = [first, *_promising(problem, first, starts - 1, seed)]
+        candidates += _promising(problem, first, starts - 1, seed)
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
         rough.sort(key=lambda result: result.cost)
         candidates = [result.x for result in rough[:FINISHED]]
-    else:
-        candidates = [first]
     found = [problem.search(start, MOST_STEPS) for start in candidates]
     best = min(found, key=lambda result: result.cost)
     model = parameters.decode(best.x)
