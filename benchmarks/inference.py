@@ -25,7 +25,6 @@ sys.path.insert(0, str(ROOT))
 # One for all of linear algebra: its matrices are small.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-from paint_deposition.diagnosis.cross_validation import nested_rmse_um  # noqa: E402
 from paint_deposition.diagnosis.procedure import diagnose  # noqa: E402
 from paint_deposition.diagnosis.run import Run  # noqa: E402
 from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
@@ -106,11 +105,6 @@ def stages(campaign: Campaign, rounds: int) -> None:
         space = timed('sensitivities and explanations', lambda run=run: run.linearise())
         timed('p-value', lambda space=space: space.p_value(0))
         timed('evidence of all models', lambda space=space: space.models)
-        patches, sigma_um = run.study.patches(), run.study.sigma_um
-        timed(
-            'nested cross-validation',
-            lambda s=space, p=patches, u=sigma_um: nested_rmse_um(s, p, u, learn=False),
-        )
         diagnosis = timed('the whole diagnosis', lambda: diagnose(campaign, MODEL, EFFECTS))
     print(f'\n{"stage, once":53}{"wall":>9}{"processor":>11}')
     for name, stage in table.items():
