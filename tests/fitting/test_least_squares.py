@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from fitting.panels import PANEL, painted_by, passes
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.overspray_fog import OversprayFog
@@ -15,6 +16,7 @@ from paint_deposition.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 from paint_deposition.fitting.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
 from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import Readings
@@ -90,7 +92,22 @@ def test_derivatives_are_those_of_the_prediction(forward, exact):
             moved[k] += step
             ends.append(forward.predict_um(parameters.decode(moved)))
         slope = (ends[1] - ends[0]) / 2e-4 / SIGMA_UM
-        assert found[:, k] == pytest.approx(slope, abs=0.01 * np.abs(slope).max()), k
+        assert found[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max()), k
+
+
+def test_an_asymmetry_beyond_the_physical_moves_the_prediction_by_its_phase_alone(forward, exact):
+    parameters = FreeParameters.of(TRUTH)
+    vector = parameters.encode(TRUTH)
+    vector[2:4] = 0.9, 0.8
+    found = derivatives(forward, parameters, vector, np.ones(len(exact)))[:, 2:4]
+    for k in range(2):
+        ends = [
+            forward.predict_um(parameters.decode(vector + step * np.eye(7)[2 + k]))
+            for step in (-1e-4, 1e-4)
+        ]
+        slope = (ends[1] - ends[0]) / 2e-4
+        assert found[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max())
+    assert np.abs(found @ [0.9, 0.8]).max() < 1e-9 * np.abs(found).max()
 
 
 @pytest.mark.slow
@@ -186,6 +203,19 @@ def test_points_at_few_places_are_patches_by_place(spotted):
     patches = Study.of(Campaign((experiment,))).patches()
     assert len(np.unique(patches)) == 3
     assert (patches.reshape(3, 10) == patches.reshape(3, 10)[:, :1]).all()
+
+
+def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
+    """Films and prepared paths are kept, but for models of the same path and flux only."""
+    effects = [EFFECTS[name].typical() for name in ('tcp_tilt', 'overspray_fog', 'occlusion')]
+    models = [TRUTH.with_effect(effect) for effect in effects]
+    models += [TRUTH.with_effect(AirDrift(shift_down_m=0.002 * k)) for k in range(12)]
+    models += [TRUTH.model_copy(update={'projection': Projection(model_plane_m=0.3)}), TRUTH]
+    alone = [Forward(forward.campaign).predict_um(model) for model in models]
+    assert len({film.tobytes() for film in alone}) == len(models) - 2  # no drift; no shadow
+    for _ in range(2):
+        for model, expected in zip(models, alone, strict=True):
+            assert np.array_equal(forward.predict_um(model), expected)
 
 
 def test_absent_effects_change_no_prediction(forward, exact):

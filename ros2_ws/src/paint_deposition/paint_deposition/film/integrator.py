@@ -2,17 +2,23 @@
 
 import copy
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numba
 import numpy as np
 
-from paint_deposition.effects.base import PathContext
+from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.layout import emission_points_m, model_constants, step_rows
-from paint_deposition.kernel.accumulation import compile_kernel
+from paint_deposition.film.layout import (
+    emission_points_m,
+    model_constants,
+    step_rows,
+    term_constants,
+)
+from paint_deposition.kernel.accumulation import TERMS, compile_kernel
 from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -40,6 +46,24 @@ def _threads(rays: int) -> Iterator[None]:
         numba.set_num_threads(threads)
 
 
+@dataclass(frozen=True)
+class Steps:
+    """What the kernel reads of a path.
+
+    Attributes:
+        rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
+        visible: (S, V) uint8, which points are seen, one row a tracing.
+        sight: (M,) row of ``visible`` that holds on each sub-step.
+    """
+
+    rows: np.ndarray
+    visible: np.ndarray
+    sight: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+
 class FilmIntegrator:
     """Accumulates the film on surface points as the path comes in.
 
@@ -52,6 +76,7 @@ class FilmIntegrator:
         occluder: traces lines of sight; None where nothing can stand in the way.
         keep_absent_laws: compile the laws of absent effects too, so that a fit which varies them
             needs one kernel only; else an absent effect costs nothing.
+        parallel: whether threads share the points; without, several integrators can paint at once.
     """
 
     def __init__(
@@ -61,8 +86,10 @@ class FilmIntegrator:
         precision: Precision = 'single',
         occluder: Occluder | None = None,
         keep_absent_laws: bool = False,
+        parallel: bool = True,
     ) -> None:
         self.points = points
+        self._parallel = parallel
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
         self._keep_absent_laws = keep_absent_laws
@@ -85,10 +112,8 @@ class FilmIntegrator:
             chosen = [e for e in compiled if getattr(type(e), kind) is not None]
             laws.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
             values += [value for e in chosen for value in e.values()]
-        self._kernel: Any = compile_kernel(laws[0], laws[1], self._shadowed, self._real)
-        self._compiled = False
+        self._variant = (*laws, self._shadowed, self._real)
         self._parameters = np.array(values or [0.0], dtype=self._real)
-        self._constants = model_constants(model).astype(self._real)
 
     def reset(self) -> None:
         """Back to bare metal."""
@@ -107,40 +132,84 @@ class FilmIntegrator:
 
     def add(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along the path; ``progress`` is called with the sub-steps done so far."""
-        for effect in self._effects:
-            path = effect.on_path(path, self._context)
-        path = path.select(path.flow * path.dwell_s != 0.0)
+        path = self._sprayed(path)
         self.emitted_cm3 += self.model.planar.K1_cm3_per_s * path.spraying_time_s
         for start in range(0, len(path), BATCH):
-            self._add_batch(path.select(slice(start, start + BATCH)))
+            self.paint(self._steps(path.select(slice(start, start + BATCH))))
             if progress:
                 progress(min(start + BATCH, len(path)))
 
-    def _add_batch(self, path: SprayPath) -> None:
-        steps = step_rows(self.model, path, self._blocks.origin_m)
+    def steps(self, path: SprayPath) -> Steps:
+        """A path prepared for this model's effects and projection, to be painted repeatedly."""
+        return self._steps(self._sprayed(path))
+
+    def paint(self, steps: Steps) -> None:
+        """Paint along a path that was prepared for the effects and projection of the model."""
+        constants = model_constants(self.model)
+        self._run(False, steps, constants, self._film, self._recent, np.empty((TERMS, 0)))
+        self._done += len(steps)
+
+    def terms(self, steps: Steps) -> np.ndarray:
+        """(7, V) what the film of these sub-steps alone is made of; see ``layout.term_weights``.
+
+        They depend on r, sigma1 and sigma2, and where the asymmetry is spread over the ring, but
+        not on K1 and K2.
+        """
+        terms = np.zeros((TERMS, len(self._film)))
+        none = np.empty(0)
+        self._run(True, steps, term_constants(self.model), none, none, terms)
+        return self._in_order(terms)
+
+    def _sprayed(self, path: SprayPath) -> SprayPath:
+        for effect in self._effects:
+            path = effect.on_path(path, self._context)
+        return path.select(path.flow * path.dwell_s != 0.0)
+
+    def _steps(self, path: SprayPath) -> Steps:
         visible, sight = self._lines_of_sight(emission_points_m(self.model, path))
+        rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
+        return Steps(rows, visible, sight)
+
+    def _run(
+        self,
+        apart: bool,
+        steps: Steps,
+        constants: np.ndarray,
+        film: np.ndarray,
+        recent: np.ndarray,
+        terms: np.ndarray,
+    ) -> None:
         blocks = self._blocks
         arguments = (
             blocks.points,
             blocks.normals,
-            visible,
-            self._film,
-            self._recent,
+            steps.visible,
+            film,
+            recent,
+            terms,
             self._done,
             blocks.spheres,
             blocks.bounds,
-            steps.astype(self._real),
-            sight,
-            self._constants,
+            steps.rows,
+            steps.sight,
+            constants.astype(self._real),
             self._parameters,
         )
-        if not self._compiled:
+        kernel: Any = compile_kernel(*self._variant, apart, self._parallel)
+        if not kernel.signatures:
             # Before the lock is taken: it may last seconds, and others paint meanwhile.
-            self._kernel.compile(tuple(map(numba.typeof, arguments)))
-            self._compiled = True
-        with _KERNEL_LOCK, _threads(len(path) * len(self._film)):
-            self._kernel(*arguments)
-        self._done += len(path)
+            kernel.compile(tuple(map(numba.typeof, arguments)))
+        if self._parallel:
+            with _KERNEL_LOCK, _threads(len(steps) * len(self._film)):
+                kernel(*arguments)
+        else:
+            kernel(*arguments)
+
+    def _in_order(self, values: np.ndarray) -> np.ndarray:
+        """Values (..., V) of the sorted points in the order of the caller's."""
+        sorted_back = np.empty(values.shape)
+        sorted_back[..., self._blocks.order] = values
+        return sorted_back
 
     def _lines_of_sight(self, origins_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Trace from the first origin and then after every SIGHT_STEP_M of travel.
@@ -170,22 +239,29 @@ class FilmIntegrator:
     @property
     def raw_um(self) -> np.ndarray:
         """(V,) film as it arrived, before effects on the film [um]."""
-        film = np.empty(len(self._film))
-        film[self._blocks.order] = self._film + self._recent
-        return film
+        return self._in_order(self._film + self._recent)
 
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        film = self.raw_um
-        for effect in self._effects:
-            film = effect.on_film(film, self.points)
-        return film
+        return settled_um(self.raw_um, self._effects, self.points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        film = self.film_um
-        for effect in self._effects:
-            film = effect.on_gauge(film, self.points)
-        return film
+        return shown_um(self.raw_um, self._effects, self.points)
+
+
+def settled_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:
+    """(V,) film that is there in the end [um] where (V,) arrived [um]."""
+    for effect in effects:
+        raw_um = effect.on_film(raw_um, points)
+    return raw_um
+
+
+def shown_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:
+    """(V,) what a gauge shows [um] where (V,) arrived [um]."""
+    shown = settled_um(raw_um, effects, points)
+    for effect in effects:
+        shown = effect.on_gauge(shown, points)
+    return shown

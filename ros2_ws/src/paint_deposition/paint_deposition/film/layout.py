@@ -1,9 +1,12 @@
 """What the kernel reads: a row of numbers for each sub-step, and the constants of the model."""
 
+import math
+
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import accumulation as kernel
+from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 
 # Stands for a gain of nothing, which has no logarithm [um/s].
@@ -27,6 +30,46 @@ def model_constants(model: DepositionModel) -> np.ndarray:
     c[kernel.REACH] = model.reach_m
     c[kernel.SHADOW] = model.shadow
     return c
+
+
+def term_constants(model: DepositionModel) -> np.ndarray:
+    """(11,) constants with which the kernel keeps the film's terms apart, whatever their gains."""
+    even = model.planar.model_copy(update={'K1_cm3_per_s': 1.0, 'K2': 0.5})
+    c = model_constants(model.model_copy(update={'planar': even}))
+    c[[kernel.RING, kernel.CENTRE]] += 1.0
+    return c
+
+
+def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:
+    """How the film's terms add up.
+
+    Returns:
+        (7,) weights of the terms in the film, and (7, 7) in its derivatives by log K1, K2,
+        K3 cos(phi), K3 sin(phi), r [m], log sigma1 and log sigma2, one row each.
+    """
+    p = planar
+    ring, centre = p.K1_cm3_per_s * (1.0 - p.K2), p.K1_cm3_per_s * p.K2
+    whole_ring = np.zeros(kernel.TERMS)
+    whole_ring[[kernel.EVEN, kernel.BY_COS, kernel.BY_SIN]] = (
+        1.0, p.K3 * math.cos(p.phi_rad), p.K3 * math.sin(p.phi_rad),
+    )  # fmt: skip
+    centred, outward, spread1, spread2 = np.eye(kernel.TERMS)[
+        [kernel.CENTRED, kernel.OUTWARD, kernel.SPREAD1, kernel.SPREAD2]
+    ]
+    film = ring * whole_ring + centre * centred
+    # The normalisation gamma is a square of lengths: r d/dr + sigma1 d/dsigma1 doubles it.
+    log_gamma_by_r = p.gamma_by_r_m / p.gamma_m2
+    log_gamma_by_sigma = 2.0 - p.r_m * log_gamma_by_r
+    by_cos, by_sin = ring * np.eye(kernel.TERMS)[[kernel.BY_COS, kernel.BY_SIN]]
+    return film, np.stack([
+        film,
+        p.K1_cm3_per_s * (centred - whole_ring),
+        by_cos,
+        by_sin,
+        ring * (outward / p.sigma1_m**2 - log_gamma_by_r * whole_ring),
+        ring * (spread1 / p.sigma1_m**2 - log_gamma_by_sigma * whole_ring),
+        centre * (spread2 / p.sigma2_m**2 - 2.0 * centred),
+    ])  # fmt: skip
 
 
 def emission_points_m(model: DepositionModel, path: SprayPath) -> np.ndarray:

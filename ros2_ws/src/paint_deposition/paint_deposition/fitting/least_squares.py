@@ -9,11 +9,14 @@ from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 from scipy.stats import norm, qmc
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.fitting.forward import Forward
+from paint_deposition.fitting.forward import Forward, Terms
 from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
 
-# Steps of the finite differences, in the vector's units.
+# Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
+# Entries of the vector for the asymmetry.
+ASYMMETRY = slice(2, 4)
 SPREAD_OF_STARTS = 0.8
 # Shapes that are tried for each start that is kept.
 TRIED_A_START = 8
@@ -123,13 +126,12 @@ def fit_readings(
         nuisance = np.empty((len(measured_um), 0))
     problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance)
     first = problem.scaled_to_mean(parameters.encode(parameters.start))
+    candidates = [first]
     if starts > 1:
-        candidates = [first, *_promising(problem, first, starts - 1, seed)]
+        candidates += _promising(problem, first, starts - 1, seed)
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
         rough.sort(key=lambda result: result.cost)
         candidates = [result.x for result in rough[:FINISHED]]
-    else:
-        candidates = [first]
     found = [problem.search(start, MOST_STEPS) for start in candidates]
     best = min(found, key=lambda result: result.cost)
     model = parameters.decode(best.x)
@@ -140,7 +142,7 @@ def fit_readings(
         model,
         predicted,
         (measured_um - predicted) / sigma_um,
-        derivatives(forward, parameters, best.x, sigma_um, predicted),
+        derivatives(forward, parameters, best.x, sigma_um),
         bool(best.status > 0),
         nuisance,
     )
@@ -164,29 +166,45 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
     for away in spread:
         vector = first.copy()
         vector[shape] += SPREAD_OF_STARTS * width[shape] * away
-        tried.append(problem.with_best_gains(np.clip(vector, problem.low, problem.high)))
-    return sorted(tried, key=problem.cost)[:count]
+        shaped = np.clip(vector, problem.low, problem.high)
+        vector = problem.with_best_gains(shaped)
+        tried.append((problem.cost(vector, problem.terms(shaped)), vector))
+    return [vector for _, vector in sorted(tried, key=lambda pair: pair[0])[:count]]
 
 
 def derivatives(
-    forward: Forward,
-    parameters: FreeParameters,
-    vector: np.ndarray,
-    sigma_um: np.ndarray,
-    predicted_um: np.ndarray | None = None,
+    forward: Forward, parameters: FreeParameters, vector: np.ndarray, sigma_um: np.ndarray
 ) -> np.ndarray:
-    """(P, k) derivative of the predictions by the vector, over the standard deviation."""
-    if predicted_um is None:
-        predicted_um = forward.predict_um(parameters.decode(vector))
+    """(P, k) derivative of the predictions by the vector, over the standard deviation.
+
+    Exact by the pattern; by effects it is the difference of two predictions.
+    """
+    terms = forward.terms(parameters.decode(vector))
+    return _derivatives_um(forward, parameters, vector, terms) / sigma_um[:, np.newaxis]
+
+
+def _derivatives_um(
+    forward: Forward, parameters: FreeParameters, vector: np.ndarray, terms: Terms
+) -> np.ndarray:
+    by_pattern = terms.derivatives_um()
+    by_pattern[:, ASYMMETRY] = by_pattern[:, ASYMMETRY] @ _slopes_of_asymmetry(vector[ASYMMETRY])
+    columns = [by_pattern]
     _, high = parameters.bounds
-    columns = []
-    for k in range(len(vector)):
+    for k in range(len(PATTERN), len(vector)):
         step = STEP if vector[k] + STEP <= high[k] else -STEP
         moved = vector.copy()
         moved[k] += step
-        change = forward.predict_um(parameters.decode(moved)) - predicted_um
-        columns.append(change / step / sigma_um)
-    return np.column_stack(columns)
+        change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(terms.model)
+        columns.append(change[:, np.newaxis] / step)
+    return np.hstack(columns)
+
+
+def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:
+    """(2, 2) derivative of K3 cos(phi) and K3 sin(phi), where K3 <= 1, by the vector's entries."""
+    size = np.hypot(*entries)
+    if size <= 1.0:
+        return np.eye(2)
+    return (np.eye(2) - np.outer(entries, entries) / size**2) / size
 
 
 class _Problem:
@@ -206,26 +224,33 @@ class _Problem:
         self.lower = covariance_factor(nuisance) if nuisance.size else None
         self.centre, self.width = parameters.prior
         self.low, self.high = parameters.bounds
-        self._last: tuple[bytes, np.ndarray] | None = None
+        self._last: tuple[bytes, Terms] | None = None
 
-    def predict(self, vector: np.ndarray) -> np.ndarray:
+    def terms(self, vector: np.ndarray) -> Terms:
         key = vector.tobytes()
         if self._last is None or self._last[0] != key:
-            self._last = (key, self.forward.predict_um(self.parameters.decode(vector)))
+            self._last = (key, self.forward.terms(self.parameters.decode(vector)))
         return self._last[1]
+
+    def predict(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
+        """(P,) readings [um]; ``terms`` are those of a vector that differs in gains only."""
+        if terms is None:
+            terms = self.terms(vector)
+        return terms.with_gains_um(self.parameters.decode(vector).planar)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         if self.lower is None:
             return columns
         return solve_triangular(self.lower, columns, lower=True)
 
-    def residuals(self, vector: np.ndarray) -> np.ndarray:
-        misfit = self.whitened((self.predict(vector) - self.measured) / self.sigma)
+    def residuals(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
+        misfit = self.whitened((self.predict(vector, terms) - self.measured) / self.sigma)
         return np.concatenate([misfit, (vector - self.centre) / self.width])
 
     def jacobian(self, vector: np.ndarray) -> np.ndarray:
-        data = derivatives(self.forward, self.parameters, vector, self.sigma, self.predict(vector))
-        return np.vstack([self.whitened(data), np.diag(1.0 / self.width)])
+        slopes = _derivatives_um(self.forward, self.parameters, vector, self.terms(vector))
+        data = self.whitened(slopes / self.sigma[:, np.newaxis])
+        return np.vstack([data, np.diag(1.0 / self.width)])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
         """The same with K1 such that the mean film is right: the rest is then close enough."""
@@ -239,12 +264,11 @@ class _Problem:
 
     def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
         """The same with the best K1, K2, K3 and phi, as far as other effects are linear."""
-        parts = np.tile(vector, (4, 1))
-        parts[:, 0] = 0.0
         # Ring alone, centre alone, and the ring lopsided along x and along y.
-        parts[:, 1:4] = [[0, 0, 0], [1, 0, 0], [0, 0.9, 0], [0, 0, 0.9]]
-        films = np.stack([self.predict(part) for part in parts]) / self.sigma
-        films[2:] = (films[2:] - films[0]) / 0.9
+        parts = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
+        parts[2:] += parts[0]
+        films = np.stack([self.terms(vector).predict_um(part) for part in parts]) / self.sigma
+        films[2:] -= films[0]
         even = EVENNESS * np.linalg.norm(films[0])
         solved = lsq_linear(
             np.vstack([films.T, np.diag([0.0, 0.0, even, even])[2:]]),
@@ -257,8 +281,8 @@ class _Problem:
         gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
         return np.clip([*gains, *vector[4:]], self.low, self.high)
 
-    def cost(self, vector: np.ndarray) -> float:
-        return float(np.sum(self.residuals(vector) ** 2))
+    def cost(self, vector: np.ndarray, terms: Terms) -> float:
+        return float(np.sum(self.residuals(vector, terms) ** 2))
 
     def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
         margin = 1e-9 * (self.high - self.low)

@@ -18,6 +18,7 @@ import numpy as np
 from numba import njit, prange
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
+from paint_deposition.kernel.blocks import LARGEST_BLOCK
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.fast_math import exp2
 from paint_deposition.kernel.laws import Law, product
@@ -32,6 +33,11 @@ STEP_COLUMNS = 16
 # on the model plane; share stopped by shadows.
 OMEGA, RING, CENTRE, RADIUS, NARROW1, NARROW2, COS, SIN, NEAREST, REACH, SHADOW = range(11)
 MODEL_CONSTANTS = 11
+# What the film is made of when it is kept apart, each at its gain: the even ring, what the
+# asymmetry along x and y adds to it, the centred Gaussian, and the moments of both Gaussians from
+# which the film's derivatives by r, sigma1 and sigma2 follow.
+EVEN, BY_COS, BY_SIN, CENTRED, OUTWARD, SPREAD1, SPREAD2 = range(7)
+TERMS = 7
 # Sub-steps, a power of two, summed in the points' precision before they join the film.
 FLUSH = 32
 
@@ -59,18 +65,19 @@ def within_reach(sphere, step, c):
 # What a variant is compiled with; ``compile_kernel`` puts the variant's own in their place.
 real: type = np.float32
 factor = scale = product([], real)
-moves_pattern = shadowed = False
+moves_pattern = shadowed = apart = False
 parameter_count = 0
 
 
 def paint_block(
-    block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters
+    block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c, parameters
 ):
     """Paint one block; arguments as those of ``accumulate``."""
     sphere, part = spheres[block], slice(bounds[block], bounds[block + 1])
     px, py, pz = p[0, part], p[1, part], p[2, part]
     nx, ny, nz = n[0, part], n[1, part], n[2, part]
     settled, newest = film[part], recent[part]
+    sums = np.zeros(TERMS * LARGEST_BLOCK if apart else 0)
     omega, ring, centre, r = c[OMEGA], c[RING], c[CENTRE], c[RADIUS]
     narrow1, narrow2, cos, sin = c[NARROW1], c[NARROW2], c[COS], c[SIN]
     nearest, shadow = c[NEAREST], c[SHADOW]
@@ -91,7 +98,7 @@ def paint_block(
         shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
         weight = step[WEIGHT]
         seen = visible[sight[m], part]
-        for i in range(len(newest)):
+        for i in range(len(px)):
             dx, dy, dz = px[i] - ox, py[i] - oy, pz[i] - oz
             along = dx * zx + dy * zy + dz * zz
             facing = -(dx * nx[i] + dy * ny[i] + dz * nz[i])
@@ -110,15 +117,37 @@ def paint_block(
             per_rho = one / np.sqrt(rho2)
             rho = rho2 * per_rho
             f = one + (y * cos - x * sin) * per_rho
-            g1 = exp2(ring - narrow1 * (rho - r) ** 2) + exp2(ring - narrow1 * (rho + r) ** 2)
+            near, far = rho - r, rho + r
+            g_near, g_far = exp2(ring - narrow1 * near**2), exp2(ring - narrow1 * far**2)
+            g1 = g_near + g_far
             g2 = exp2(centre - narrow2 * rho2)
-            flux = (f * g1 + g2) * weight * magnification * factor(ray, law)
-            if shadowed:
-                flux *= one - shadow * (one - seen[i])
-            newest[i] += flux if lit else zero
+            if apart:
+                share = weight * magnification * factor(ray, law)
+                if shadowed:
+                    share *= one - shadow * (one - seen[i])
+                share = share if lit else zero
+                sums[EVEN * LARGEST_BLOCK + i] += share * g1
+                sums[BY_COS * LARGEST_BLOCK + i] += share * g1 * y * per_rho
+                sums[BY_SIN * LARGEST_BLOCK + i] -= share * g1 * x * per_rho
+                sums[CENTRED * LARGEST_BLOCK + i] += share * g2
+                inner, outer = share * f * g_near * near, share * f * g_far * far
+                sums[OUTWARD * LARGEST_BLOCK + i] += inner - outer
+                sums[SPREAD1 * LARGEST_BLOCK + i] += inner * near + outer * far
+                sums[SPREAD2 * LARGEST_BLOCK + i] += share * g2 * rho2
+            else:
+                flux = (f * g1 + g2) * weight * magnification * factor(ray, law)
+                if shadowed:
+                    flux *= one - shadow * (one - seen[i])
+                newest[i] += flux if lit else zero
+    if apart:
+        for k in range(TERMS):
+            for i in range(len(px)):
+                terms[k, bounds[block] + i] = sums[k * LARGEST_BLOCK + i]
 
 
-def accumulate(p, n, visible, film, recent, done, spheres, bounds, steps, sight, c, parameters):
+def accumulate(
+    p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c, parameters
+):
     """Add the path's film to ``film``.
 
     The newest contributions stay in ``recent``, in the points' precision, and move into
@@ -129,6 +158,8 @@ def accumulate(p, n, visible, film, recent, done, spheres, bounds, steps, sight,
         visible: (S, V) uint8 lines of sight, points in blocks.
         film: (V,) float64 [um], updated in place.
         recent: (V,) [um], updated in place; the film is the sum of both.
+        terms: (7, V) [um], written where they are kept apart, then of this path alone; film and
+            recent are empty then.
         done: sub-steps of the path in earlier calls.
         spheres: (B, 4) centre and radius of each block [m].
         bounds: (B + 1,) first point of each block.
@@ -139,7 +170,7 @@ def accumulate(p, n, visible, film, recent, done, spheres, bounds, steps, sight,
     """
     for block in prange(len(spheres)):
         paint_block(
-            block, p, n, visible, film, recent, done, spheres, bounds, steps, sight, c,
+            block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c,
             parameters,
         )  # fmt: skip
 
@@ -150,6 +181,8 @@ def compile_kernel(
     pattern_scales: tuple[tuple[Law, int], ...],
     shadowed: bool,
     real: type,
+    apart: bool = False,
+    parallel: bool = True,
 ) -> Callable[..., None]:
     """The kernel with these laws inlined.
 
@@ -158,6 +191,8 @@ def compile_kernel(
             passed in one flat array, those of the flux factors first.
         shadowed: whether the visibility table is used.
         real: precision of the points, np.float32 or np.float64.
+        apart: whether the film's terms are kept apart instead of summed.
+        parallel: whether blocks are shared among threads.
     """
     first_scale = sum(count for _, count in flux_factors)
     names = {
@@ -166,15 +201,17 @@ def compile_kernel(
         'scale': product(pattern_scales, real, first_scale),
         'moves_pattern': bool(pattern_scales),
         'shadowed': shadowed,
+        'apart': apart,
         'parameter_count': first_scale + sum(count for _, count in pattern_scales),
     }
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
-    block = named_for_its_code(_variant(paint_block, names), laws, counts, shadowed, real.__name__)
+    variant = counts, shadowed, real.__name__, apart, parallel
+    block = named_for_its_code(_variant(paint_block, names), laws, *variant)
     block = njit(fastmath=True, error_model='numpy')(block)
     whole = _variant(accumulate, names | {'paint_block': block})
-    whole = named_for_its_code(whole, laws, counts, shadowed, real.__name__)
-    options = {'parallel': True, 'nogil': True, 'fastmath': True, 'error_model': 'numpy'}
+    whole = named_for_its_code(whole, laws, *variant)
+    options = {'parallel': parallel, 'nogil': True, 'fastmath': True, 'error_model': 'numpy'}
     return njit(cache=True, **options)(whole)
 
 

@@ -42,6 +42,12 @@ class PlanarPattern(BaseModel):
         ring = r * s * math.sqrt(2.0 * math.pi) * math.erf(r / (math.sqrt(2.0) * s))
         return 2.0 * math.pi * (gaussian + ring)
 
+    @property
+    def gamma_by_r_m(self) -> float:
+        """Derivative of the normalisation by r [m]."""
+        r, s = self.r_m, self.sigma1_m
+        return (2.0 * math.pi) ** 1.5 * s * math.erf(r / (math.sqrt(2.0) * s))
+
     def f(self, x_m: ArrayLike, y_m: ArrayLike) -> np.ndarray:
         """Asymmetry 1 + K3 sin(atan2(y, x) - phi), dimensionless; arrays broadcast."""
         return 1.0 + self.K3 * np.sin(np.arctan2(y_m, x_m) - self.phi_rad)
