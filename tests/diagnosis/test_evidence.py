@@ -68,10 +68,10 @@ def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart():
     parameters = FreeParameters.of(DepositionModel(), CornerSlowdown())
     names = parameters.names[len(PATTERN) :]
     assert set(names) == {'corner_slowdown.gain', 'corner_slowdown.length_m'}
-    centre, width = parameters.prior
-    jacobian = random.normal(size=(READINGS, len(centre))) / width
+    prior = parameters.prior
+    jacobian = random.normal(size=(READINGS, len(parameters))) @ prior.whitening
     jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
-    data = jacobian @ (centre + width * random.normal(size=len(width)))
+    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(parameters)))
     fit = fit_linear(jacobian, data, parameters)
     apart = NullModel.around(fit, frozenset(['corner_slowdown']), fit.nuisance)
     without = fit_linear(jacobian[:, : len(PATTERN)], data, PARAMETERS)

@@ -54,16 +54,17 @@ class NullModel:
                 contribute to the film counts as deviation.
             nuisance: directions that carry no meaning.
         """
-        centre, width = fit.parameters.prior
+        prior = fit.parameters.prior
         entries = fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)
         kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
         # The shape of an effect that is not there contributes nothing; its amplitude does.
         shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
         counted = kept | ~shape
-        raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - centre)[counted]
-        columns = np.hstack([(fit.jacobian * width)[:, kept], nuisance])
-        return NullModel.of(columns, raw, nuisance.shape[1])
+        raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
+        # What is apart comes last, so that its rows of the factor are those of no other entry.
+        directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
+        return NullModel.of(np.hstack([directions, nuisance]), raw, nuisance.shape[1])
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""

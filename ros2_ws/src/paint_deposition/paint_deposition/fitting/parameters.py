@@ -12,6 +12,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.fitting.prior import Prior
 from paint_deposition.model.pattern import PlanarPattern
 
 # The range that is physical for a shape parameter is this many standard deviations of its prior.
@@ -134,11 +135,11 @@ class FreeParameters:
         return np.array(low), np.array(high)
 
     @property
-    def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Centre and standard deviation of the vector's independent normal priors."""
+    def prior(self) -> Prior:
+        """Of the vector: independent and weak."""
         centre = [c.centre for c in PATTERN] + [0.0] * len(self.varied)
         width = [c.width for c in PATTERN] + [1.0] * len(self.varied)
-        return np.array(centre), np.array(width)
+        return Prior(np.array(centre), np.diag(width))
 
     def encode(self, model: DepositionModel) -> np.ndarray:
         """The vector of a model that has the varied effects, kept inside the bounds."""
