@@ -13,7 +13,8 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.fitting.parameters import PATTERN, FreeParameters
-from paint_deposition.fitting.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
+from paint_deposition.fitting.random_effects import LEVEL_SHARE, SESSION_UM
+from paint_deposition.fitting.study import TEXTURE_SHARE, Study
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.readings.campaign import Campaign, Experiment

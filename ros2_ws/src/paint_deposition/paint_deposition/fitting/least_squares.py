@@ -10,7 +10,8 @@ from scipy.stats import norm, qmc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward
-from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.model.coordinates import PATTERN
 
 # Steps of the finite differences, in the vector's units.
 STEP = 1e-3
