@@ -1,13 +1,33 @@
 """Fits of models that are exactly linear, to compare closed forms with direct ones."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
 
 PARAMETERS = FreeParameters.of(DepositionModel())
+
+
+def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
+    """A posterior narrower than the weak prior, in which every coordinate goes with all others."""
+    prior, random = parameters.weak_prior, np.random.default_rng(seed)
+    root = random.normal(size=(len(parameters), len(parameters))) / 5.0
+    covariance = np.outer(prior.width, prior.width) * (root @ root.T)
+    covariance *= np.outer(parameters.scale, parameters.scale)
+    centre = parameters.offset + parameters.scale * (prior.centre + 0.1 * prior.width)
+    return Posterior(
+        mean=dict(zip(parameters.coordinates, centre.tolist(), strict=True)),
+        covariance=dict(zip(parameters.coordinates, covariance.tolist(), strict=True)),
+    )
+
+
+# The same parameters after another job.
+KNOWN = replace(PARAMETERS, known=correlated(PARAMETERS))
 
 
 def linear_fit(

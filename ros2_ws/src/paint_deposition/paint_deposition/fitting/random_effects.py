@@ -76,28 +76,23 @@ def random_effects(
             of their own.
         measured_um, sigma_um: (P,) the points and their standard deviations [um].
     """
-    experiments = campaign.experiments
-    parts = campaign.experiment_of[:, np.newaxis] == np.arange(len(experiments))
-    sessions, session = np.unique(campaign.readings.session, return_inverse=True)
-    shares = np.zeros((len(measured_um), len(sessions)))
-    np.add.at(shares, (campaign.means.owner, session), 1.0)
-    shares /= campaign.means.repeats[:, np.newaxis]
-    found = [
-        RandomEffects(
-            kind, unit, names, size, _contrasts(design) * (one_um / sigma_um)[:, np.newaxis]
-        )
-        for kind, unit, names, size, one_um, design in (
-            (
-                'part level', '%', tuple(e.name for e in experiments), 100.0 * LEVEL_SHARE,
-                LEVEL_SHARE * measured_um, 1.0 * parts,
-            ),
-            (
-                'gauge zero', 'µm', tuple(map(str, sessions)), SESSION_UM,
-                np.full(len(measured_um), SESSION_UM), shares,
-            ),
-        )
-    ]  # fmt: skip
-    return tuple(effects for effects in found if len(effects.names) > 1)
+    names = tuple(experiment.name for experiment in campaign.experiments)
+    part_of = campaign.experiment_of[:, np.newaxis] == np.arange(len(names))
+    level = RandomEffects(
+        'part level', '%', names, 100.0 * LEVEL_SHARE,
+        _contrasts(part_of) * (LEVEL_SHARE * measured_um / sigma_um)[:, np.newaxis],
+    )  # fmt: skip
+    means, labels = campaign.means, campaign.readings.session
+    sessions = tuple(dict.fromkeys(labels.tolist()))
+    # Repeats at one point may belong to several sessions.
+    shares = np.column_stack(
+        [np.bincount(means.owner, labels == session) / means.repeats for session in sessions]
+    )
+    zero = RandomEffects(
+        'gauge zero', 'µm', sessions, SESSION_UM,
+        _contrasts(shares) * (SESSION_UM / sigma_um)[:, np.newaxis],
+    )  # fmt: skip
+    return tuple(effects for effects in (level, zero) if len(effects.names) > 1)
 
 
 def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
