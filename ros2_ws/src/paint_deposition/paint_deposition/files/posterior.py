@@ -63,7 +63,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
                     'each coordinate of the mean'
                 )
         matrix = self.matrix
-        scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)).clip(0.0))
+        scale = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
         skew = np.abs(matrix - matrix.T) > SAME * scale
         if skew.any():
             i, j = np.argwhere(skew)[0]
