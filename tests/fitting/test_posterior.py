@@ -90,3 +90,20 @@ def test_no_reading_counts_twice(campaign):
     assert usable(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
     assert posterior_of(later, other).readings == (*posterior.readings, *fingerprints(other))
+
+
+def test_other_settings_of_the_process_are_told(campaign):
+    def at(**settings) -> Campaign:
+        (panel,) = campaign.experiments
+        other = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
+        return Campaign((replace(panel, taken=other, settings=settings),))
+
+    (panel,) = campaign.experiments
+    calibrated = Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
+    posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
+    assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
+    known, (remark,) = usable(posterior, at(voltage_kv=0.0, flow=1.01))
+    assert known == posterior
+    assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
+    assert usable(posterior, at(voltage_kv=61.0)) == (posterior, ())
+    assert usable(posterior, at()) == (posterior, ())

@@ -7,6 +7,9 @@ from paint_deposition.fitting.estimates import scaled_covariance
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.readings.campaign import Campaign
 
+# Settings that differ by a larger share than this are others.
+OTHER_SETTING = 0.05
+
 
 def posterior_of(fit: Fit, campaign: Campaign) -> Posterior:
     """The posterior of a fit to a campaign, widened where residuals exceed the noise."""
@@ -20,6 +23,7 @@ def posterior_of(fit: Fit, campaign: Campaign) -> Posterior:
         mean=dict(zip(names, map(float, mean), strict=True)),
         covariance=dict(zip(names, rows.tolist(), strict=True)),
         readings=(*known, *fingerprints(campaign)),
+        process=campaign.settings,
     )
 
 
@@ -34,11 +38,18 @@ def usable(
         return None, ()
     behind = set(known.readings)
     twice = [e.name for e in campaign.experiments if e.taken.fingerprint in behind]
-    if not twice:
-        return known, ()
-    return None, (
-        f'What the model file knows of the pattern rests on readings of {", ".join(twice)} '
-        'themselves and is not used; give the model that was calibrated without them.',
+    if twice:
+        return None, (
+            f'What the model file knows of the pattern rests on the readings of '
+            f'{", ".join(twice)} themselves and is not used; give the model that was calibrated '
+            'without them.',
+        )
+    return known, tuple(
+        f'The model was calibrated at {name} {then:g}, this job was painted at {now:g}: its '
+        'pattern may differ by more than jobs do.'
+        for name, then in known.process.items()
+        for now in [campaign.settings.get(name, then)]
+        if abs(now - then) > OTHER_SETTING * abs(then)
     )
 
 
