@@ -30,12 +30,12 @@ def folder(tmp_path_factory) -> Path:
 
 
 def refitted(folder: Path, campaign: str, model: str, output: Path):
-    """What a refit with nothing added prints, and its figures."""
+    """What a refit with nothing added prints, warnings included, and its figures."""
     done = paint(
         'refit', folder / campaign, '--add', 'none', '--model', folder / model, '-o', output
     )
     assert done.returncode == 0, done.stderr
-    return done.stdout, json.loads((output / 'diagnosis.json').read_text())
+    return done.stdout + done.stderr, json.loads((output / 'diagnosis.json').read_text())
 
 
 def test_the_calibration_is_the_prior_of_the_next_job(folder: Path, tmp_path: Path):
@@ -67,7 +67,7 @@ def test_the_readings_behind_a_calibration_do_not_count_twice(folder: Path, tmp_
     assert figures['pattern_shift'] is None
     (note,) = (note for note in figures['notes'] if 'is not used' in note)
     assert 'rests on the readings of panel themselves' in note
-    assert f'note: {note}' in text
+    assert f'warning: {note}\n' in text
     assert note in (tmp_path / 'report.html').read_text()
     kinds = {(found['kind'], found['of']) for found in figures['random_effects']}
     parts = ('panel', 'door')

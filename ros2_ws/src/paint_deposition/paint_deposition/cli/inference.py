@@ -16,6 +16,7 @@ from paint_deposition.cli.options import (
     model_option,
     output_option,
     read_inputs,
+    say_all,
     say_results,
     seed_option,
     write_results,
@@ -104,6 +105,7 @@ def diagnose_command(
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
@@ -140,6 +142,7 @@ def refit_command(
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
@@ -192,7 +195,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         )
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
-    for note in diagnosis.notes:
+    for note in diagnosis.study.notes:
         yield f'note: {note}'
     yield f'model: {output / "model.yaml"}'
     yield f'report: {output / "report.html"}'

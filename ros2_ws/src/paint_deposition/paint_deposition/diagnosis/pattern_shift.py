@@ -62,9 +62,7 @@ class PatternShift:
 
     @property
     def warning(self) -> str:
-        """What to do about it, '' where it is usual."""
-        if not self.is_alarming:
-            return ''
+        """What to do about one that is alarming."""
         return (
             f'The pattern moved {self}: far more than jobs differ. Check that bell, settings and '
             'part frame are those of the calibration, or calibrate anew.'

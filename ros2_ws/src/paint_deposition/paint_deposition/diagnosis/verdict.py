@@ -123,7 +123,7 @@ class Diagnosis:
         not_testable: ids that these readings cannot see at typical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that further experiments may be proposed for, by id.
-        remarks: on how it was made, a sentence each.
+        remarks: on what was known before, a sentence each.
     """
 
     study: Study
@@ -146,10 +146,14 @@ class Diagnosis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks for the user."""
+        """Remarks for the user, warnings first."""
+        return (*self.warnings, *self.study.notes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why what was known before does not suit this job, a sentence each."""
         shift = self.pattern_shift
-        warnings = (shift.warning,) if shift and shift.warning else ()
-        return (*warnings, *self.remarks, *self.study.notes)
+        return (shift.warning, *self.remarks) if shift and shift.is_alarming else self.remarks
 
     @cached_property
     def pattern_shift(self) -> PatternShift | None:
