@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from diagnosis.linear import PARAMETERS, bounds, fit_linear, linear_fit, null_of
+from diagnosis.linear import KNOWN, PARAMETERS, bounds, fit_linear, linear_fit, null_of
 from paint_deposition.diagnosis import cross_validation
 from paint_deposition.diagnosis.cross_validation import hold_out, nested_rmse_um
 from paint_deposition.diagnosis.evidence import NullModel
@@ -20,9 +20,9 @@ READINGS = 24
 BLOCKS = np.arange(READINGS) % 5
 
 
-@pytest.fixture
-def fit():
-    return linear_fit(np.random.default_rng(8), READINGS)
+@pytest.fixture(params=[PARAMETERS, KNOWN], ids=['weak', 'known'])
+def fit(request):
+    return linear_fit(np.random.default_rng(8), READINGS, parameters=request.param)
 
 
 def test_the_linear_update_is_a_refit(fit):
@@ -30,7 +30,7 @@ def test_the_linear_update_is_a_refit(fit):
     expected, score = np.empty(READINGS), 0.0
     for block in range(5):
         out = block == BLOCKS
-        kept = fit_linear(fit.jacobian[~out], data[~out])
+        kept = fit_linear(fit.jacobian[~out], data[~out], fit.parameters)
         expected[out] = data[out] - fit.jacobian[out] @ kept.vector
         spread = np.eye(out.sum()) + fit.jacobian[out] @ kept.covariance @ fit.jacobian[out].T
         score += multivariate_normal.logpdf(expected[out], cov=spread)
@@ -40,12 +40,14 @@ def test_the_linear_update_is_a_refit(fit):
 
 
 def test_everything_left_out_is_predicted_by_the_priors(fit):
-    centre, width = PARAMETERS.prior
+    prior = fit.parameters.prior
     data = fit.predicted_um + fit.residual
     left_out = hold_out(fit, np.zeros(READINGS))
-    scaled = fit.jacobian * width
-    density = multivariate_normal(fit.jacobian @ centre, np.eye(READINGS) + scaled @ scaled.T)
-    assert left_out.deviation == pytest.approx(data - fit.jacobian @ centre)
+    scaled = fit.jacobian @ prior.factor
+    density = multivariate_normal(
+        fit.jacobian @ prior.centre, np.eye(READINGS) + scaled @ scaled.T
+    )
+    assert left_out.deviation == pytest.approx(data - fit.jacobian @ prior.centre)
     assert left_out.log_score == pytest.approx(density.logpdf(data) / READINGS)
 
 

@@ -6,7 +6,7 @@ from scipy.integrate import dblquad, quad
 from scipy.special import log_ndtr
 from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
-from diagnosis.linear import PARAMETERS, deviation, fit_linear, linear_fit, null_of
+from diagnosis.linear import KNOWN, PARAMETERS, deviation, fit_linear, linear_fit, null_of
 from diagnosis.linear import prior_covariance as covariance_of
 from paint_deposition.diagnosis.evidence import (
     KNOWN_NOISE,
@@ -23,9 +23,9 @@ from paint_deposition.fitting.parameters import PATTERN, FreeParameters
 READINGS = 30
 
 
-@pytest.fixture
-def fit():
-    return linear_fit(np.random.default_rng(3), READINGS)
+@pytest.fixture(params=[PARAMETERS, KNOWN], ids=['weak', 'known'])
+def fit(request):
+    return linear_fit(np.random.default_rng(3), READINGS, parameters=request.param)
 
 
 @pytest.fixture
@@ -62,19 +62,21 @@ def test_some_of_the_readings_have_the_covariance_among_them(fit, columns):
     assert part.lower @ part.deviation == pytest.approx(null.raw[rows])
 
 
-def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart():
+@pytest.mark.parametrize('of_the_pattern', [PARAMETERS, KNOWN], ids=['weak', 'known'])
+def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart(of_the_pattern):
     """Its directions are no longer the null's, and the data are compared with those without it."""
     random = np.random.default_rng(5)
-    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown())
+    known = of_the_pattern.known
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(), known=known)
     names = parameters.names[len(PATTERN) :]
     assert set(names) == {'corner_slowdown.gain', 'corner_slowdown.length_m'}
-    centre, width = parameters.prior
-    jacobian = random.normal(size=(READINGS, len(centre))) / width
+    prior = parameters.prior
+    jacobian = random.normal(size=(READINGS, len(parameters))) @ prior.whitening
     jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
-    data = jacobian @ (centre + width * random.normal(size=len(width)))
+    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(parameters)))
     fit = fit_linear(jacobian, data, parameters)
     apart = NullModel.around(fit, frozenset(['corner_slowdown']), fit.nuisance)
-    without = fit_linear(jacobian[:, : len(PATTERN)], data, PARAMETERS)
+    without = fit_linear(jacobian[:, : len(PATTERN)], data, of_the_pattern)
     assert apart.raw == pytest.approx(deviation(without))
     assert apart.lower @ apart.lower.T == pytest.approx(covariance_of(without))
     kept = NullModel.around(fit, frozenset(), fit.nuisance)

@@ -68,9 +68,9 @@ class Messages:
     def trigger(self, value: bool):
         return self.store.types[BOOL](value)
 
-    def state(self, stamp_ns: int, spraying: bool, flow: float):
+    def state(self, stamp_ns: int, spraying: bool, flow: float, voltage_kv: float = 0.0):
         state = self.store.types['paint_msgs/msg/AtomizerState']
-        return state(self.header(stamp_ns), spraying, flow, 0.0, 0.0, 0.0)
+        return state(self.header(stamp_ns), spraying, flow, 0.0, 0.0, voltage_kv)
 
     def serialised(self, message) -> bytes:
         kind = message.__msgtype__

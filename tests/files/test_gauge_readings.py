@@ -23,15 +23,16 @@ def table(tmp_path):
 
 def test_every_column_arrives_where_it_belongs(table):
     path = table(
-        f'point,{HEADER},operator,group,sigma_um,nx,ny,nz',
-        'A1,0.1,0.2,0.3,21.5,Kim,left,0.8,0,-2,0',
-        'A2,0.4,0.5,0.6,22.5,Kim,right,,0,0,3',
+        f'point,{HEADER},operator,group,sigma_um,nx,ny,nz,session',
+        'A1,0.1,0.2,0.3,21.5,Kim,left,0.8,0,-2,0,morning',
+        'A2,0.4,0.5,0.6,22.5,Kim,right,,0,0,3,',
     )
     readings = read_readings(path)
     assert readings.positions_m == pytest.approx(np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]))
     assert readings.thickness_um.tolist() == [21.5, 22.5]
     assert readings.point.tolist() == ['A1', 'A2']
     assert readings.group.tolist() == ['left', 'right']
+    assert readings.session.tolist() == ['morning', '']
     assert readings.sigma_um[0] == 0.8
     assert np.isnan(readings.sigma_um[1])
     assert readings.normals.tolist() == [[0, -1, 0], [0, 0, 1]]

@@ -14,7 +14,8 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.fitting.parameters import PATTERN, FreeParameters
-from paint_deposition.fitting.study import LEVEL_SHARE, SESSION_UM, TEXTURE_SHARE, Study
+from paint_deposition.fitting.random_effects import LEVEL_SHARE, SESSION_UM
+from paint_deposition.fitting.study import TEXTURE_SHARE, Study
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import spray_path
@@ -134,9 +135,9 @@ def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
 def test_readings_that_say_nothing_leave_the_priors(forward, exact):
     parameters = FreeParameters.of(DepositionModel())
     fit = fit_readings(forward, exact, np.full(len(exact), 1e9), parameters)
-    centre, width = parameters.prior
-    assert fit.vector == pytest.approx(centre, abs=1e-3)
-    assert np.sqrt(np.diag(fit.covariance)) == pytest.approx(width, rel=1e-3)
+    prior = parameters.prior
+    assert fit.vector == pytest.approx(prior.centre, abs=1e-3)
+    assert np.sqrt(np.diag(fit.covariance)) == pytest.approx(prior.width, rel=1e-3)
 
 
 def test_nuisance_directions_are_allowed_for(forward, exact):

@@ -117,10 +117,10 @@ def test_a_learned_law_has_nothing_to_vary():
 def test_bounds_and_prior_suit_every_effect(effect):
     parameters = FreeParameters.of(DepositionModel(), effect())
     low, high = parameters.bounds
-    centre, width = parameters.prior
-    assert (low <= centre).all()
-    assert (centre <= high).all()
-    assert (width > 0.0).all()
+    prior = parameters.prior
+    assert (low <= prior.centre).all()
+    assert (prior.centre <= high).all()
+    assert (prior.width > 0.0).all()
     for end in (low, high):
         decoded = parameters.decode(end)
         assert parameters.encode(decoded)[len(PATTERN) :] == pytest.approx(end[len(PATTERN) :])

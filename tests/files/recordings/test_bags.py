@@ -68,9 +68,11 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     entries += [('/gun', START_NS + 700, messages.trigger(True))]
     entries += [('/gun', START_NS + 900, messages.trigger(False))]
     # Logged late: only its own stamp says when the flow changed.
-    entries += [('/state', START_NS + 5_000, messages.state(START_NS + 70, True, 0.8))]
+    entries += [('/state', START_NS + 5_000, messages.state(START_NS + 70, True, 0.8, 60.0))]
     entries += [('/state', START_NS + 5_001, messages.state(START_NS + 90, False, 0.8))]
-    entries += [('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan')))]
+    entries += [
+        ('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan'), 64.0))
+    ]
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
     gun = read_trajectory(folder, None, 'gun')
     assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]
@@ -78,6 +80,10 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     state = read_trajectory(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
+    # While it sprayed; a flow that is not known is no setting.
+    assert state.settings == {
+        'flow': 0.8, 'shaping_air_l_per_min': 0.0, 'bell_speed_rpm': 0.0, 'voltage_kv': 62.0,
+    }  # fmt: skip
     unused = read_trajectory(folder)
     assert len(unused.trigger_stamps_ns) == 0
     assert unused.notes == (

@@ -13,7 +13,8 @@ from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.model_file import read_model
+from paint_deposition.files.model_file import read_model, read_model_file
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
 from paint_deposition.fitting.parameters import FreeParameters
@@ -73,6 +74,7 @@ def diagnose(
     campaign: Campaign,
     model: DepositionModel | None = None,
     *,
+    posterior: Posterior | None = None,
     own_effects: Iterable[type[Effect]] = (),
     seed: int = 0,
     progress: Progress = _silent,
@@ -82,13 +84,16 @@ def diagnose(
     Args:
         campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
+        posterior: what another job told of the model, as its file or its calibration has it:
+            the prior of the fit. Default: that of the campaign's model, if it is that.
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.
         progress: called with a line for each step.
     """
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
-    start = model or _model_of(campaign) or DepositionModel()
-    return replace(diagnosed(campaign, start, library, seed, progress), library=library)
+    start, known = _start(campaign, model, posterior)
+    found = diagnosed(campaign, start, library, seed, progress, known)
+    return replace(found, library=library)
 
 
 def refit(
@@ -96,6 +101,7 @@ def refit(
     added: str | type[Effect] | None,
     model: DepositionModel | None = None,
     *,
+    posterior: Posterior | None = None,
     seed: int = 0,
     progress: Progress = _silent,
 ) -> Diagnosis:
@@ -105,6 +111,7 @@ def refit(
         campaign: painted parts with readings.
         added: an effect or its id; None fits the model as it is.
         model: to start from; default: the campaign's, else a 50 mm bell.
+        posterior: as for ``diagnose``.
         seed: of the starts of the fits and of the simulated deviations.
         progress: called with a line for each step.
 
@@ -113,8 +120,18 @@ def refit(
     """
     if isinstance(added, str):
         added = effect_class(added)
-    start = model or _model_of(campaign) or DepositionModel()
-    return refitted(campaign, start, added, EFFECTS, seed, progress)
+    start, known = _start(campaign, model, posterior)
+    return refitted(campaign, start, added, EFFECTS, seed, progress, known)
+
+
+def _start(
+    campaign: Campaign, model: DepositionModel | None, posterior: Posterior | None
+) -> tuple[DepositionModel, Posterior | None]:
+    """The model to start from and what is known of it."""
+    if model is None and campaign.model_file:
+        file = read_model_file(campaign.model_file)
+        return file.model, posterior or file.posterior
+    return model or DepositionModel(), posterior
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:

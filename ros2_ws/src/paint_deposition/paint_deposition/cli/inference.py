@@ -16,6 +16,7 @@ from paint_deposition.cli.options import (
     model_option,
     output_option,
     read_inputs,
+    say_all,
     say_results,
     seed_option,
     write_results,
@@ -100,9 +101,11 @@ def diagnose_command(
     with Progress('diagnose') as tell:
         data, start = read_inputs(campaign, model_file, tell)
         diagnosis = pd.diagnose(
-            data, start.model if start else None, own_effects=own, seed=seed, progress=tell
-        )
+            data, start.model if start else None, posterior=start.posterior if start else None,
+            own_effects=own, seed=seed, progress=tell,
+        )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
@@ -134,8 +137,12 @@ def refit_command(
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     with Progress('refit') as tell:
         data, start = read_inputs(campaign, model_file, tell)
-        diagnosis = pd.refit(data, added, start.model if start else None, seed=seed, progress=tell)
+        diagnosis = pd.refit(
+            data, added, start.model if start else None,
+            posterior=start.posterior if start else None, seed=seed, progress=tell,
+        )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
@@ -174,6 +181,11 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         f'{before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on points left out; '
         f'gauge noise {diagnosis.noise_floor_um:.2f} µm'
     )
+    if diagnosis.pattern_shift:
+        yield f'pattern moved {diagnosis.pattern_shift}'
+    for amount in diagnosis.random_effects:
+        if amount.is_notable:
+            yield f'{amount}'
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
@@ -183,7 +195,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         )
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
-    for note in diagnosis.notes:
+    for note in diagnosis.study.notes:
         yield f'note: {note}'
     yield f'model: {output / "model.yaml"}'
     yield f'report: {output / "report.html"}'

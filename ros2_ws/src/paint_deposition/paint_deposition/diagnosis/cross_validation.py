@@ -30,25 +30,25 @@ class HeldOut:
 
 
 def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
-    """Leave out one block after the other and refit in the linear approximation, priors included.
+    """Leave out one block after the other and refit in the linear approximation, prior included.
 
     Args:
         fit: around which the model is linear.
         blocks: (P,) block of each point.
     """
-    centre, width = fit.parameters.prior
-    jacobian = fit.jacobian
-    target = fit.residual + jacobian @ (fit.vector - centre)
+    prior = fit.parameters.prior
+    target = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
+    directions = fit.jacobian @ prior.factor
     deviation = np.empty_like(target)
     score = 0.0
     for block in np.unique(blocks):
         out = blocks == block
-        kept = jacobian[~out]
-        precision = kept.T @ kept + np.diag(width**-2.0)
-        moved = np.linalg.solve(precision, kept.T @ target[~out])
-        deviation[out] = target[out] - jacobian[out] @ moved
-        spread = np.linalg.solve(precision, jacobian[out].T)
-        covariance = np.eye(out.sum()) + jacobian[out] @ spread
+        kept = directions[~out]
+        precision = np.eye(directions.shape[1]) + kept.T @ kept
+        amounts = np.linalg.solve(precision, kept.T @ target[~out])
+        deviation[out] = target[out] - directions[out] @ amounts
+        spread = np.linalg.solve(precision, directions[out].T)
+        covariance = np.eye(out.sum()) + directions[out] @ spread
         _, log_det = np.linalg.slogdet(2.0 * np.pi * covariance)
         solved = np.linalg.solve(covariance, deviation[out])
         score -= 0.5 * (log_det + deviation[out] @ solved)

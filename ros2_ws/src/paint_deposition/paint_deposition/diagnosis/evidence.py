@@ -47,9 +47,10 @@ class NullModel:
     @staticmethod
     def around(fit: Fit, nuisance: np.ndarray) -> 'NullModel':
         """Linear around a fit, with directions (P, n) over the noise that carry no meaning."""
-        centre, width = fit.parameters.prior
-        raw = fit.residual + fit.jacobian @ (fit.vector - centre)
-        return NullModel.of(np.hstack([fit.jacobian * width, nuisance]), raw, nuisance.shape[1])
+        prior = fit.parameters.prior
+        raw = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
+        columns = np.hstack([fit.jacobian @ prior.factor, nuisance])
+        return NullModel.of(columns, raw, nuisance.shape[1])
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""

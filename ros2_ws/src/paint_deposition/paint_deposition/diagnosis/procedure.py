@@ -24,6 +24,7 @@ from paint_deposition.diagnosis.unexplained import locate_unexplained
 from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.readings.campaign import Campaign
 
 # Significance level of the test that something is missing.
@@ -41,6 +42,7 @@ def diagnose(
     library: Mapping[str, type[Effect]],
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
+    known: Posterior | None = None,
 ) -> Diagnosis:
     """Find what is missing from a model.
 
@@ -50,8 +52,9 @@ def diagnose(
         library: effects to consider, by id.
         seed: of starts and simulated deviations.
         progress: called with a line for each step of the work.
+        known: what an earlier job told of the start's parameters: the prior.
     """
-    run = Run(campaign, start, library, seed, progress)
+    run = Run(campaign, start, library, seed, progress, known)
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     progress('computing the evidence of what may be missing')

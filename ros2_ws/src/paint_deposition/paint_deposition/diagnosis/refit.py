@@ -28,6 +28,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.residuals import root_mean_square
 
@@ -41,6 +42,7 @@ def refit(
     library: Mapping[str, type[Effect]] = MappingProxyType({}),
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
+    known: Posterior | None = None,
 ) -> Diagnosis:
     """Fit the model without and with an effect, and compare the evidence of the two.
 
@@ -51,6 +53,7 @@ def refit(
         library: effects to test for beside it, by id.
         seed: of starts and simulated deviations.
         progress: called with a line for each step of the work.
+        known: what an earlier job told of the start's parameters: the prior.
 
     Raises:
         ModelError: the model has the effect already, or its law cannot be learned here.
@@ -60,8 +63,8 @@ def refit(
         raise ModelError(
             f'{added.id} is in the model already; to fit it anew, add none, or take it out'
         )
-    known = dict(library) | ({added.id: added} if added and not law else {})
-    run = Run(campaign, start, known, seed, progress)
+    candidates = dict(library) | ({added.id: added} if added and not law else {})
+    run = Run(campaign, start, candidates, seed, progress, known)
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     space = run.linearise()

@@ -26,9 +26,11 @@ from paint_deposition.diagnosis.verdict import (
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.posterior import usable
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
@@ -65,6 +67,7 @@ class Run:
         library: Mapping[str, type[Effect]],
         seed: int,
         progress: Callable[[str], None],
+        known: Posterior | None = None,
     ) -> None:
         self.candidates = {
             key: neutral_shapes(effect)
@@ -76,12 +79,16 @@ class Run:
         self.seed = seed
         progress('fitting the model')
         self.start = start
-        parameters = FreeParameters.of(start, *start.effects)
-        self.fit = self.study.fit(parameters, STARTS, seed, self.study.nuisance)
+        self.known, self.remarks = usable(known, campaign)
+        self.fit = self.study.fit(self._free(start), STARTS, seed, self.study.nuisance)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
         self.trouble = trouble_with(self.study, self.fit)
+
+    def _free(self, start: DepositionModel) -> FreeParameters:
+        """All parameters of a model, with what is known of them."""
+        return FreeParameters.of(start, *start.effects, known=self.known)
 
     @property
     def added(self) -> frozenset[str]:
@@ -130,8 +137,7 @@ class Run:
         nuisance = self.study.nuisance
         if free is not None:
             nuisance = np.hstack([nuisance, free])
-        parameters = FreeParameters.of(start, *start.effects)
-        return self.study.fit(parameters, nuisance=nuisance)
+        return self.study.fit(self._free(start), nuisance=nuisance)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""
@@ -159,8 +165,7 @@ class Run:
                 )
             )
         start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
-        parameters = FreeParameters.of(start, *start.effects)
-        return self.study.fit(parameters, nuisance=self.study.nuisance)
+        return self.study.fit(self._free(start), nuisance=self.study.nuisance)
 
     def record(self, added: str, fit: Fit, holdout_um: float | None = None) -> None:
         """Take a fit as the newest model.
@@ -222,6 +227,7 @@ class Run:
             unknown,
             not_testable,
             detectable,
+            remarks=self.remarks,
         )
 
 

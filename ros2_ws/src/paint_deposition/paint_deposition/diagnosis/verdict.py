@@ -9,9 +9,13 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from paint_deposition.comparison.comparison import Comparison, compare
 from paint_deposition.diagnosis.cross_validation import hold_out
+from paint_deposition.diagnosis.pattern_shift import PatternShift
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.posterior import posterior_of
+from paint_deposition.fitting.random_effects import Amount, amounts
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.residuals import root_mean_square
 
@@ -119,6 +123,7 @@ class Diagnosis:
         not_testable: ids that these readings cannot see at typical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that further experiments may be proposed for, by id.
+        remarks: on what was known before, a sentence each.
     """
 
     study: Study
@@ -132,6 +137,7 @@ class Diagnosis:
     not_testable: tuple[str, ...] = ()
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
     library: Mapping[str, type[Effect]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         before, after = self.history[0].rmse_um, self.history[-1].rmse_um
@@ -140,8 +146,29 @@ class Diagnosis:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks for the user."""
-        return self.study.notes
+        """Remarks for the user, warnings first."""
+        return (*self.warnings, *self.study.notes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why what was known before does not suit this job, a sentence each."""
+        shift = self.pattern_shift
+        return (shift.warning, *self.remarks) if shift and shift.is_alarming else self.remarks
+
+    @cached_property
+    def pattern_shift(self) -> PatternShift | None:
+        """How far the pattern moved from what was known before; None if nothing was."""
+        return PatternShift.of(self.history[-1].fit)
+
+    @cached_property
+    def random_effects(self) -> tuple[Amount, ...]:
+        """Estimated levels of parts and zeros of gauge sessions."""
+        return amounts(self.history[-1].fit, self.study.random_effects)
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is known of the model with what was accepted: a prior for the next job."""
+        return posterior_of(self.history[-1].fit, self.study.campaign)
 
     @property
     def noise_floor_um(self) -> float:
@@ -190,6 +217,8 @@ class Diagnosis:
                 'measure': [place.to_dict() for place in places],
                 'spray': [spray.to_dict() for spray in sprays],
             },
+            'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
+            'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': {'sigma_um': self.study.noise.typical_um, 'source': self.study.noise.source},
             'notes': list(self.notes),
         }

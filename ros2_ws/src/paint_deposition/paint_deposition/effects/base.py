@@ -165,6 +165,14 @@ class Effect(BaseModel):
         """Names of the parameters that make the effect absent at their neutral value."""
         return tuple(n for n, p in cls.parameters().items() if p['role'] == 'amplitude')
 
+    @classmethod
+    def coordinates(cls) -> dict[str, str]:
+        """Each parameter's name where its uncertainty is about normal: shapes as logarithms."""
+        return {
+            name: name if info['role'] == 'amplitude' else f'log_{name}'
+            for name, info in cls.parameters().items()
+        }
+
     def values(self) -> tuple[float, ...]:
         """Parameter values in the order declared."""
         return tuple(float(getattr(self, name)) for name in type(self).model_fields)

@@ -96,4 +96,5 @@ def _read_experiment(
         progress(f'{name}: {note}')
     if counts.rejected:
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
-    return Experiment.of(name, surface, path, read_readings(files['measurements']), files)
+    readings = read_readings(files['measurements'])
+    return Experiment.of(name, surface, path, readings, files, trajectory.settings)

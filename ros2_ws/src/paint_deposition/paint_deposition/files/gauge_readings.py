@@ -63,8 +63,8 @@ def read_readings(path: str | Path) -> Readings:
 
     Args:
         path: CSV with ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
-            ``group`` and ``nx,ny,nz``; other columns are ignored. Without ``point``, readings
-            at exactly one place are repeats.
+            ``group``, ``session`` and ``nx,ny,nz``; other columns are ignored. Without
+            ``point``, readings at exactly one place are repeats.
 
     Raises:
         ReadingsError: the file, line and column at fault, and what to do.
@@ -79,8 +79,11 @@ def read_readings(path: str | Path) -> Readings:
     for row in np.flatnonzero(sigma_um <= 0.0):
         raise table.refusal(row, f'sigma_um is {sigma_um[row]:g}; expected above 0')
     points, groups = _points(table, positions), np.array(table.texts('group'))
+    sessions = np.array(table.texts('session'))
     normals = _normals(table)
-    readings = Readings(positions, thickness, points, groups, sigma_um, normals, str(path))
+    readings = Readings(
+        positions, thickness, points, groups, sigma_um, normals, str(path), sessions
+    )
     require_repeats_close(readings)
     return readings
 

@@ -16,13 +16,14 @@ from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_text import LEARNED_ID, model_text
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 
 WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
-KEYS = ('name', 'planar', 'projection', 'effects', 'uncertainty', 'history')
+KEYS = ('name', 'planar', 'projection', 'effects', 'uncertainty', 'posterior', 'history')
 
 LoadEffect = Callable[[Path], type[Effect]]
 
@@ -44,12 +45,14 @@ class ModelFile:
         name: what the user calls it, '' for nothing.
         uncertainty: standard deviations of parameters, in the sections of the model.
         history: what was added to it and why, oldest first.
+        posterior: what the fit behind it knows of its parameters, or None.
     """
 
     model: DepositionModel
     name: str = ''
     uncertainty: Mapping[str, Any] = field(default_factory=dict)
     history: Sequence[Mapping[str, Any]] = ()
+    posterior: Posterior | None = None
 
 
 def read_model(path: str | Path, load_effect: LoadEffect = load_effect_file) -> DepositionModel:
@@ -87,6 +90,7 @@ def write_model(
     history: Sequence[Mapping[str, Any]] | None = None,
     uncertainty: Mapping[str, Any] | None = None,
     name: str = '',
+    posterior: Posterior | None = None,
 ) -> None:
     """Write a model with what each number means; an older file is replaced at once.
 
@@ -94,10 +98,14 @@ def write_model(
         path: YAML; files of users' own effects are named relative to it.
         model: reading the file gives exactly this model.
         header_comment: lines to put at the top.
-        history, uncertainty, name: as in ``ModelFile``.
+        history, uncertainty, name, posterior: as in ``ModelFile``.
     """
     path = Path(path)
-    extras = {'uncertainty': uncertainty or {}, 'history': list(history or ())}
+    extras = {
+        'uncertainty': uncertainty or {},
+        'posterior': posterior.model_dump(exclude_defaults=True) if posterior else {},
+        'history': list(history or ()),
+    }
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 
@@ -118,12 +126,22 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
             raise ModelError('occlusion is given in projection and in effects; keep the effect')
         effects.append(Occlusion(strength=1.0))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
+    model = DepositionModel(planar=planar, projection=eq_2, effects=tuple(effects))
     return ModelFile(
-        DepositionModel(planar=planar, projection=eq_2, effects=tuple(effects)),
+        model,
         _given(str, 'name', content),
         _given(dict, 'uncertainty', content),
         list(_mappings('history', content).values()),
+        _posterior(content, model),
     )
+
+
+def _posterior(content: dict[str, Any], model: DepositionModel) -> Posterior | None:
+    if not _given(dict, 'posterior', content):
+        return None
+    posterior = _section(Posterior, 'posterior', content)
+    posterior.check_suits(model)
+    return posterior
 
 
 def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:

@@ -22,6 +22,7 @@ COMMENTS = {
     'planar': 'eq. (1): flux on the model plane',
     'projection': 'eq. (2): from the model plane to the surface',
     'uncertainty': 'standard deviations',
+    'posterior': 'what the fit knows: a prior for the next job',
     'history': 'what was added, oldest first',
 }
 
@@ -48,7 +49,7 @@ def model_text(
     text['planar'] = _fields(model.planar)
     text['projection'] = _fields(model.projection)
     text['effects'] = [_effect(effect, folder) for effect in model.effects]
-    text |= {key: plain(value) for key, value in extras.items() if value}
+    text |= {key: _with_rows(plain(value)) for key, value in extras.items() if value}
     for key, comment in COMMENTS.items():
         if key in text:
             text.yaml_add_eol_comment(comment, key, COMMENT_COLUMN)
@@ -60,11 +61,21 @@ def model_text(
     return stream.getvalue()
 
 
+def _with_rows(value: Any) -> Any:
+    """The same with lists of plain values on one line each."""
+    if isinstance(value, dict):
+        return {key: _with_rows(inner) for key, inner in value.items()}
+    if isinstance(value, list) and not any(isinstance(inner, dict) for inner in value):
+        row = CommentedSeq(value)
+        row.fa.set_flow_style()
+        return row
+    return value
+
+
 def _effect(effect: Effect, folder: Path) -> CommentedMap:
     if isinstance(effect, LearnedLaw):
         text = _fields(effect, id=LEARNED_ID, covariate=effect.covariate)
-        text['learned'] = CommentedSeq(effect.learned)
-        text['learned'].fa.set_flow_style()
+        text['learned'] = _with_rows(list(effect.learned))
         about = f'{effect.over} [{effect.unit}]'
         text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
         return text

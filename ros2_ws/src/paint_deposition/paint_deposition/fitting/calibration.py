@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.posterior import posterior_of
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.uniformity import sigma_n_closed_form
 from paint_deposition.readings.campaign import Campaign
@@ -122,6 +124,11 @@ class Calibration:
     def model(self) -> DepositionModel:
         """The calibrated model."""
         return self.fit.model
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is known of the model's parameters: a prior for other jobs."""
+        return posterior_of(self.fit, self.study.campaign)
 
     @property
     def chi_square_per_freedom(self) -> float:

@@ -11,7 +11,7 @@ TAILS = (0.025, 0.975)
 DRAWS = 4000
 # Place of phi among the pattern's parameters.
 PHASE = PATTERN_NAMES.index('phi_rad')
-# A parameter whose width has not fallen below this share of its prior's was not measured.
+# A parameter whose width has not fallen below this share of its weak prior's was not measured.
 LEARNED = 0.5
 # A standard deviation this large a share of a positive value leaves no digit of it.
 LARGEST_SHARE = 0.5
@@ -65,8 +65,7 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
     """
     covariance = scaled_covariance(fit)
     sigma = np.sqrt(np.diag(_spread(fit)))
-    _, prior = fit.parameters.prior
-    learned = np.sqrt(np.diag(covariance)) <= LEARNED * prior
+    learned = np.sqrt(np.diag(covariance)) <= LEARNED * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
     k3, sigma_k3 = values[2], sigma[2]
@@ -108,9 +107,8 @@ def scaled_covariance(fit: Fit) -> np.ndarray:
     """(k, k) covariance of the fit's vector, widened where residuals exceed the noise."""
     freedom = max(len(fit.residual) - len(fit.vector), 1)
     widening = max(fit.chi_square / freedom, 1.0)
-    _, prior = fit.parameters.prior
     data = fit.jacobian.T @ fit.jacobian / widening
-    return np.linalg.inv(data + np.diag(prior**-2.0))
+    return np.linalg.inv(data + fit.parameters.prior.precision)
 
 
 def _names(fit: Fit) -> tuple[str, ...]:

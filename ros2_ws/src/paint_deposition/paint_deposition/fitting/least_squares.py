@@ -10,8 +10,9 @@ from scipy.stats import norm, qmc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward, Terms
-from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
+from paint_deposition.model.coordinates import PATTERN
 
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
@@ -81,9 +82,8 @@ class Fit:
 
     @property
     def penalty(self) -> float:
-        """Sum of squared deviations from the priors, in their widths."""
-        centre, width = self.parameters.prior
-        return float(np.sum(((self.vector - centre) / width) ** 2))
+        """Sum of squared deviations from the prior, whitened."""
+        return float(np.sum(self.parameters.prior.whiten(self.vector) ** 2))
 
     @property
     def objective(self) -> float:
@@ -92,9 +92,8 @@ class Fit:
 
     @property
     def precision(self) -> np.ndarray:
-        """(k, k) inverse covariance of the vector, priors included."""
-        _, width = self.parameters.prior
-        return self.jacobian.T @ self.jacobian + np.diag(width**-2.0)
+        """(k, k) inverse covariance of the vector, prior included."""
+        return self.jacobian.T @ self.jacobian + self.parameters.prior.precision
 
     @property
     def covariance(self) -> np.ndarray:
@@ -160,7 +159,7 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
     so that only these three need be searched (variable projection, Golub and Pereyra 1973).
     """
     shape = [k for k, c in enumerate(PATTERN) if c.name in ('r_m', 'log_sigma1', 'log_sigma2')]
-    _, width = problem.parameters.prior
+    width = problem.prior.width
     spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
     tried = []
     for away in spread:
@@ -208,7 +207,7 @@ def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:
 
 
 class _Problem:
-    """Residuals and their derivatives for the optimiser; priors are further residuals."""
+    """Residuals and their derivatives for the optimiser; the prior gives further residuals."""
 
     def __init__(
         self,
@@ -222,7 +221,7 @@ class _Problem:
         self.parameters = parameters
         # None spares a solve in every step where there are no nuisance directions.
         self.lower = covariance_factor(nuisance) if nuisance.size else None
-        self.centre, self.width = parameters.prior
+        self.prior = parameters.prior
         self.low, self.high = parameters.bounds
         self._last: tuple[bytes, Terms] | None = None
 
@@ -245,12 +244,12 @@ class _Problem:
 
     def residuals(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
         misfit = self.whitened((self.predict(vector, terms) - self.measured) / self.sigma)
-        return np.concatenate([misfit, (vector - self.centre) / self.width])
+        return np.concatenate([misfit, self.prior.whiten(vector)])
 
     def jacobian(self, vector: np.ndarray) -> np.ndarray:
         slopes = _derivatives_um(self.forward, self.parameters, vector, self.terms(vector))
         data = self.whitened(slopes / self.sigma[:, np.newaxis])
-        return np.vstack([data, np.diag(1.0 / self.width)])
+        return np.vstack([data, self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
         """The same with K1 such that the mean film is right: the rest is then close enough."""
@@ -291,7 +290,7 @@ class _Problem:
             np.clip(start, self.low + margin, self.high - margin),
             jac=self.jacobian,
             bounds=(self.low, self.high),
-            x_scale=self.width,
+            x_scale=self.prior.width,
             max_nfev=most_steps,
             ftol=1e-6,
             xtol=1e-6,

@@ -1,8 +1,7 @@
 """The free parameters of a fit as one vector, and the model that a vector stands for.
 
-The vector holds smooth coordinates of the pattern: logarithms of what is positive, and the
-asymmetry as K3 cos(phi) and K3 sin(phi), so that phi is well-behaved when K3 vanishes. Amplitudes
-of effects are in units of their typical size, shapes logarithms of the ratio to their default.
+The vector holds the coordinates of the pattern, see ``model/coordinates.py``. Amplitudes of
+effects are in units of their typical size, shapes logarithms of the ratio to their default.
 """
 
 from dataclasses import dataclass
@@ -12,34 +11,15 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.posterior import Posterior
+from paint_deposition.fitting.prior import Prior
+from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
 from paint_deposition.model.pattern import PlanarPattern
 
 # The range that is physical for a shape parameter is this many standard deviations of its prior.
 SHAPE_DEVIATIONS = 4.0
 
 
-@dataclass(frozen=True)
-class Coordinate:
-    """One entry of the vector for the pattern: weak prior and bounds."""
-
-    name: str
-    centre: float
-    width: float
-    low: float
-    high: float
-
-
-# Weak priors: any bell's pattern lies well within two widths. They only keep finite what the
-# readings do not determine.
-PATTERN = (
-    Coordinate('log_K1', np.log(2.0), 2.0, np.log(1e-3), np.log(99.0)),
-    Coordinate('K2', 0.3, 0.4, 0.0, 1.0),
-    Coordinate('K3_cos_phi', 0.0, 0.4, -0.99, 0.99),
-    Coordinate('K3_sin_phi', 0.0, 0.4, -0.99, 0.99),
-    Coordinate('r_m', 0.2, 0.15, 0.0, 0.99),
-    Coordinate('log_sigma1', np.log(0.09), 0.7, np.log(0.006), np.log(0.9)),
-    Coordinate('log_sigma2', np.log(0.14), 0.7, np.log(0.006), np.log(0.9)),
-)
 PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigma2_m')
 
 
@@ -52,6 +32,7 @@ class EffectParameter:
         neutral, low, high: its neutral (for a shape: default) value and its bounds.
         unit: an amplitude's typical size; for a shape, the logarithm that counts as one.
         is_shape: whether it is a shape.
+        coordinate: its name in a posterior, where it is ``offset`` + ``unit`` times the entry.
     """
 
     effect: str
@@ -61,6 +42,7 @@ class EffectParameter:
     high: float
     unit: float
     is_shape: bool
+    coordinate: str
 
     @staticmethod
     def of(effect: Effect, name: str) -> 'EffectParameter':
@@ -69,7 +51,15 @@ class EffectParameter:
         is_shape = info['role'] == 'shape'
         low, high = info['low'], info['high']
         unit = np.log(high / low) / SHAPE_DEVIATIONS if is_shape else info['typical']
-        return EffectParameter(effect.id, name, info['neutral'], low, high, unit, is_shape)
+        coordinate = effect.coordinates()[name]
+        return EffectParameter(
+            effect.id, name, info['neutral'], low, high, unit, is_shape, coordinate
+        )
+
+    @property
+    def offset(self) -> float:
+        """Value of its coordinate where the entry is zero."""
+        return float(np.log(self.neutral)) if self.is_shape else self.neutral
 
     def encode(self, value: float) -> float:
         """The vector's entry for a value."""
@@ -95,24 +85,44 @@ class FreeParameters:
     Attributes:
         start: the model that fixes everything else, effects included.
         varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
+        known: what an earlier job told of them, or None.
     """
 
     start: DepositionModel
     varied: tuple[tuple[str, str], ...] = ()
+    known: Posterior | None = None
 
     @staticmethod
-    def of(start: DepositionModel, *effects: Effect) -> 'FreeParameters':
+    def of(
+        start: DepositionModel, *effects: Effect, known: Posterior | None = None
+    ) -> 'FreeParameters':
         """The pattern and all parameters of these effects; those the model lacks are added."""
         for effect in effects:
             if start.effect(effect.id) is None:
                 start = start.with_effect(effect)
         varied = [(e.id, name) for e in effects for name in e.parameters()]
-        return FreeParameters(start, tuple(varied))
+        return FreeParameters(start, tuple(varied), known)
 
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each entry."""
         return tuple(c.name for c in PATTERN) + tuple(f'{e}.{n}' for e, n in self.varied)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries in a posterior: there it is ``offset`` + ``scale`` times one."""
+        effects = (f'{e.effect}.{e.coordinate}' for e in self.of_effects)
+        return (*(c.name for c in PATTERN), *effects)
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(k,) values of a posterior's coordinates where the entries are zero."""
+        return np.array([0.0] * len(PATTERN) + [e.offset for e in self.of_effects])
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(k,) changes of a posterior's coordinates for one unit of the entries."""
+        return np.array([1.0] * len(PATTERN) + [e.unit for e in self.of_effects])
 
     def __len__(self) -> int:
         return len(PATTERN) + len(self.varied)
@@ -134,11 +144,36 @@ class FreeParameters:
         return np.array(low), np.array(high)
 
     @property
-    def prior(self) -> tuple[np.ndarray, np.ndarray]:
-        """Centre and standard deviation of the vector's independent normal priors."""
+    def weak_prior(self) -> Prior:
+        """Of the vector where nothing is known of this bell."""
         centre = [c.centre for c in PATTERN] + [0.0] * len(self.varied)
         width = [c.width for c in PATTERN] + [1.0] * len(self.varied)
-        return np.array(centre), np.array(width)
+        return Prior(np.array(centre), np.diag(width))
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of the vector: weak, but for what is known, widened by what differs between jobs."""
+        weak, known = self.weak_prior, self.known
+        if known is None:
+            return weak
+        names = self.coordinates
+        of_known = [k for k, name in enumerate(known.names) if name in names]
+        own = [names.index(known.names[k]) for k in of_known]
+        centre, covariance = weak.centre.copy(), np.diag(weak.width**2)
+        scale = self.scale[own]
+        centre[own] = (known.centre[of_known] - self.offset[own]) / scale
+        covariance[np.ix_(own, own)] = (
+            known.matrix[np.ix_(of_known, of_known)] / np.outer(scale, scale)
+            + np.diag(self._between_jobs[own] ** 2)
+        )  # fmt: skip
+        return Prior(centre, np.linalg.cholesky(covariance))
+
+    @property
+    def _between_jobs(self) -> np.ndarray:
+        """(k,) standard deviations of the entries between jobs."""
+        return np.array(
+            [c.between_jobs for c in PATTERN] + [EFFECT_BETWEEN_JOBS] * len(self.varied)
+        )
 
     def encode(self, model: DepositionModel) -> np.ndarray:
         """The vector of a model that has the varied effects, kept inside the bounds."""

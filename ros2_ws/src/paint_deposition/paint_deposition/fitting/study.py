@@ -11,6 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import Fit, fit_readings
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.random_effects import RandomEffects, random_effects
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.covariates import Covariate, Rays, along_rays, covariates
 from paint_deposition.readings.gauge_noise import GaugeNoise, gauge_noise
@@ -22,12 +23,6 @@ POINTS_A_PATCH, FEWEST_PATCHES = 8, 4
 # The film's texture: it varies from spot to spot by about this share for reasons that no model
 # follows, and repeats at one spot do not average it out.
 TEXTURE_SHARE = 0.01
-# Parts painted alike differ in their mean film by about this share: 4 % was found for clearcoat
-# on 40 panels, the gauge and the booth's day included.
-LEVEL_SHARE = 0.03
-# The gauge's zero shifts by about this much from session to session and from operator to operator;
-# 0.3 to 1 um are usual [um].
-SESSION_UM = 0.7
 
 
 @dataclass(frozen=True)
@@ -108,18 +103,15 @@ class Study:
         return root_mean_square(self.sigma_um)
 
     @cached_property
-    def nuisance(self) -> np.ndarray:
-        """(P, 2 E) nuisance directions over the noise: a film level and a gauge zero per part.
+    def random_effects(self) -> tuple[RandomEffects, ...]:
+        """By how much parts and gauge sessions differ; none with one part and one session."""
+        return random_effects(self.campaign, self.measured_um, self.sigma_um)
 
-        Only differences between parts count: what all parts have in common is for K1 and the
-        effects to explain. (P, 0) with one part.
-        """
-        parts = len(self.campaign.experiments)
-        if parts == 1:
-            return np.empty((len(self), 0))
-        own = (self.campaign.experiment_of[:, np.newaxis] == np.arange(parts)) - 1.0 / parts
-        sizes_um = LEVEL_SHARE * self.measured_um, np.full(len(self), SESSION_UM)
-        return np.hstack([own * (size / self.sigma_um)[:, np.newaxis] for size in sizes_um])
+    @cached_property
+    def nuisance(self) -> np.ndarray:
+        """(P, n) nuisance directions over the noise: those of the random effects."""
+        none = np.empty((len(self), 0))
+        return np.hstack([none, *(effects.columns for effects in self.random_effects)])
 
     def rays(self, model: DepositionModel) -> list[Rays]:
         """The rays of each experiment for a model's pattern and projection."""

@@ -1,5 +1,6 @@
 """A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -50,6 +51,7 @@ class Trajectory:
             Before the first of them the gun is off.
         notes: remarks on the recording for the user, a line each.
         source: the file it came from, for messages.
+        settings: of the process while the gun sprayed, by name; empty where not recorded.
 
     Raises:
         RecordingError: the arrays do not have these shapes.
@@ -63,6 +65,7 @@ class Trajectory:
     trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
     notes: tuple[str, ...] = ()
     source: str = 'trajectory'
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'

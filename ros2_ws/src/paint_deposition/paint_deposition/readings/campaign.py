@@ -1,5 +1,6 @@
 """A campaign: painted parts with their gauge readings, ready to be compared with the model."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -33,6 +34,7 @@ class Experiment:
             which the film's slope is taken.
         taken: all readings; used: (N,) which of them are used.
         files: where mesh, trajectory and readings came from, for reports.
+        settings: of the process, by name, where known.
     """
 
     name: str
@@ -44,6 +46,7 @@ class Experiment:
     taken: Readings
     used: np.ndarray
     files: dict[str, str] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
     def of(
@@ -52,6 +55,7 @@ class Experiment:
         path: SprayPath,
         readings: Readings,
         files: dict[str, str] | None = None,
+        settings: Mapping[str, float] | None = None,
     ) -> 'Experiment':
         """Match readings to the surface.
 
@@ -68,8 +72,9 @@ class Experiment:
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
-            name, surface, path, readings, means, points, readings, used, files or {}
-        )
+            name, surface, path, readings, means, points, readings, used, files or {},
+            settings or {},
+        )  # fmt: skip
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The same part without some of the readings (N,) that were used.
@@ -87,7 +92,7 @@ class Experiment:
         used = self.used.copy()
         used[used] = ~left_out
         kept = Experiment.of(
-            self.name, self.surface, self.path, self.taken.select(used), self.files
+            self.name, self.surface, self.path, self.taken.select(used), self.files, self.settings
         )
         return replace(kept, taken=self.taken, used=used)
 
@@ -157,6 +162,13 @@ class Campaign:
     def positions_m(self) -> np.ndarray:
         """(P, 3) measured points on the surfaces [m]."""
         return np.concatenate([e.measured_points.positions_m for e in self.experiments])
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Mean over the experiments of each setting of the process that is known."""
+        names = dict.fromkeys(name for e in self.experiments for name in e.settings)
+        told = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
+        return {name: float(np.mean(values)) for name, values in told.items()}
 
     def without(self, left_out: np.ndarray) -> 'Campaign':
         """The same campaign without some of its readings (N,).

@@ -1,7 +1,8 @@
 """Gauge readings of a painted part."""
 
+import hashlib
 from collections.abc import Mapping, Sized
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ class Readings:
         sigma_um: (N,) standard deviation of one reading [um], nan where not stated.
         normals: (N, 3) outward normals, or None.
         source: the file they came from, for messages.
+        session: (N,) labels of the gauge session; '' where none.
     """
 
     positions_m: np.ndarray
@@ -31,6 +33,11 @@ class Readings:
     sigma_um: np.ndarray
     normals: np.ndarray | None = None
     source: str = 'readings'
+    session: np.ndarray = field(default_factory=lambda: np.array(''))
+
+    def __post_init__(self) -> None:
+        sessions = np.broadcast_to(self.session, len(self.thickness_um))
+        object.__setattr__(self, 'session', sessions)
 
     def __repr__(self) -> str:
         return f'Readings({len(self)} from {self.source}, mean {self.thickness_um.mean():.1f} µm)'
@@ -57,12 +64,15 @@ class Readings:
     def joined(parts: Mapping[str, 'Readings']) -> 'Readings':
         """Readings of named parts, one part after the other; labels of points name the part.
 
-        The normals are left out.
+        So does the session where a part's readings have none. The normals are left out.
         """
         columns = ('positions_m', 'thickness_um', 'group', 'sigma_um')
         return Readings(
             point=np.array([f'{name}: {p}' for name, part in parts.items() for p in part.point]),
             source=', '.join(part.source for part in parts.values()),
+            session=np.concatenate(
+                [np.where(part.session == '', name, part.session) for name, part in parts.items()]
+            ),
             **{
                 column: np.concatenate([getattr(part, column) for part in parts.values()])
                 for column in columns
@@ -79,7 +89,14 @@ class Readings:
             self.sigma_um[rows],
             None if self.normals is None else self.normals[rows],
             self.source,
+            self.session[rows],
         )
+
+    @property
+    def fingerprint(self) -> str:
+        """Twelve hexadecimal digits that tell these readings from any others."""
+        table = np.column_stack([self.positions_m, self.thickness_um])
+        return hashlib.sha256(np.ascontiguousarray(table).tobytes()).hexdigest()[:12]
 
 
 @dataclass(frozen=True)

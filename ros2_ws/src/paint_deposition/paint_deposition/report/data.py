@@ -67,6 +67,11 @@ class ReportData:
         return self.comparisons[0].study
 
     @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the user."""
+        return self.diagnosis.notes if self.diagnosis else self.study.notes
+
+    @property
     def models(self) -> tuple[DepositionModel, ...]:
         """Base first, best last."""
         return tuple(comparison.model for comparison in self.comparisons)

@@ -11,9 +11,11 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import PATTERN_NAMES
+from paint_deposition.fitting.posterior import posterior_of
 from paint_deposition.fitting.study import Study
 
 # So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
@@ -46,7 +48,8 @@ def write_fitted(
     history = history_as_list(study, steps, start.history)
     uncertainty = _uncertainty(fit, start.uncertainty)
     fitted = _rounded(fit, steps[0].model.effects)
-    write_model(path, fitted, header_comment, history, uncertainty, start.name)
+    posterior = _short(posterior_of(fit, study.campaign))
+    write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
 
 
 def history_as_list(
@@ -104,6 +107,19 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
             values['learned'] = tuple(_few_digits(value) for value in effect.learned)
         model = model.with_effect(effect.model_copy(update=values))
     return model
+
+
+def _short(posterior: Posterior) -> Posterior:
+    """The same with few digits."""
+    return posterior.model_copy(
+        update={
+            'mean': {name: _few_digits(value) for name, value in posterior.mean.items()},
+            'covariance': {
+                name: [_few_digits(value) for value in row]
+                for name, row in posterior.covariance.items()
+            },
+        }
+    )
 
 
 def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:

@@ -1,7 +1,7 @@
 """A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,8 @@ STATE_TYPE = 'paint_msgs/msg/AtomizerState'
 BOOL_TYPE = 'std_msgs/msg/Bool'
 POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
+# What a state tells of the process while the gun sprays.
+SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 # A Bool has no stamp; the time it was logged at stands in for it as long as the poses show that
 # the recorder's clock is the robot's.
 MAX_CLOCK_OFFSET_S = 1.0
@@ -51,7 +53,7 @@ def read_trajectory(
         state = choose_state_topic(bag, state_topic) if state_topic else None
         notes = () if state else _unused_triggers(bag)
         trajectory, log_times_ns = _read_poses(bag, poses)
-        changes = sorted(_flow_changes(bag, state), key=lambda change: change[0]) if state else []
+        changes, settings = _read_states(bag, state) if state else ([], {})
         if state and state.type == BOOL_TYPE:
             offset_ns = float(np.median(log_times_ns - trajectory.stamps_ns))
             _refuse_other_clock(bag, state, poses, offset_ns * 1e-9)
@@ -60,6 +62,7 @@ def read_trajectory(
         trigger_stamps_ns=np.array([stamp for stamp, _ in changes], dtype=np.int64),
         trigger_flow=np.array([flow for _, flow in changes], dtype=float),
         notes=notes,
+        settings=settings,
     )
 
 
@@ -152,10 +155,13 @@ def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
     return trajectory, np.array(log_times, dtype=np.int64)
 
 
-def _flow_changes(bag: Bag, topic: BagTopic) -> Iterator[tuple[int, float]]:
+def _read_states(bag: Bag, topic: BagTopic) -> tuple[list[tuple[int, float]], dict[str, float]]:
+    """Times and flows of all changes, and the median of each setting that the states tell."""
+    changes: list[tuple[int, float]] = []
+    told: dict[str, list[float]] = {}
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
-            yield log_time_ns, relative_flow(bool(message.data))
+            changes.append((log_time_ns, relative_flow(bool(message.data))))
             continue
         stamp = stamp_ns(message.header)
         if stamp == 0:
@@ -163,7 +169,13 @@ def _flow_changes(bag: Bag, topic: BagTopic) -> Iterator[tuple[int, float]]:
                 f'{topic.name} in {bag.path} has a state without a stamp; '
                 'let the publisher stamp each state'
             )
-        yield stamp, relative_flow(message.spraying, message.flow)
+        changes.append((stamp, relative_flow(message.spraying, message.flow)))
+        for name in SETTINGS:
+            value = getattr(message, name, np.nan)
+            if message.spraying and np.isfinite(value):
+                told.setdefault(name, []).append(value)
+    changes.sort(key=lambda change: change[0])
+    return changes, {name: float(np.median(values)) for name, values in told.items()}
 
 
 def _refuse_other_clock(bag: Bag, state: BagTopic, poses: BagTopic, offset_s: float) -> None:

@@ -76,6 +76,7 @@ def report_html(data: ReportData) -> str:
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
         pattern=tables.pattern_rows(data),
+        knowledge=tables.knowledge_rows(data),
         blind=tables.blind_rows(data),
         misfits=tables.misfit_rows(data),
         places=places,

@@ -81,6 +81,19 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     return rows
 
 
+def knowledge_rows(data: ReportData) -> list[tuple[str, str]]:
+    """How far the pattern moved from the calibration, and how parts and sessions differ."""
+    diagnosis = data.diagnosis
+    if diagnosis is None:
+        return []
+    rows = []
+    if diagnosis.pattern_shift:
+        rows.append(('The pattern moved', str(diagnosis.pattern_shift)))
+    if diagnosis.random_effects:
+        rows.append(('Parts and gauge sessions', '; '.join(map(str, diagnosis.random_effects))))
+    return rows
+
+
 def effect_rows(data: ReportData) -> list[dict[str, Any]]:
     """Effects in the best model, what each does to the film, and its parameters."""
     known = {c.best: c.parameters for c in data.diagnosis.classes} if data.diagnosis else {}

@@ -1,0 +1,77 @@
+"""How far the pattern of a job lies from the one that was calibrated before."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.model.coordinates import PATTERN
+
+# Of jobs that differ as assumed this share lies nearer than what is told as usual, and this share
+# nearer than what is warned of.
+USUAL, ALARMING = 0.95, 0.999
+FREEDOM = len(PATTERN)
+
+
+@dataclass(frozen=True)
+class PatternShift:
+    """Distance between the fitted pattern and the calibrated one.
+
+    Attributes:
+        distance: Mahalanobis distance, in standard deviations of what was known before: the
+            calibration's posterior, widened by what differs between jobs.
+        by_coordinate: signed, of each coordinate alone.
+    """
+
+    distance: float
+    by_coordinate: dict[str, float]
+
+    @staticmethod
+    def of(fit: Fit) -> PatternShift | None:
+        """Of a fit; None where nothing was known before."""
+        if fit.parameters.known is None:
+            return None
+        prior = fit.parameters.prior
+        # The pattern comes first, and the factor is lower triangular: this is its marginal.
+        away = prior.whiten(fit.vector)[:FREEDOM]
+        single = ((fit.vector - prior.centre) / prior.width)[:FREEDOM]
+        names = (coordinate.name for coordinate in PATTERN)
+        return PatternShift(
+            float(np.linalg.norm(away)), dict(zip(names, map(float, single), strict=True))
+        )
+
+    @property
+    def usual(self) -> float:
+        """Distance that 95 % of jobs stay below if they differ as assumed."""
+        return float(np.sqrt(chi2.ppf(USUAL, FREEDOM)))
+
+    @property
+    def is_alarming(self) -> bool:
+        """Whether hardly any job differs as much."""
+        return bool(self.distance > np.sqrt(chi2.ppf(ALARMING, FREEDOM)))
+
+    def __str__(self) -> str:
+        name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))
+        return (
+            f'{self.distance:.1f} standard deviations from the calibration, most in {name} '
+            f'({most:+.1f}); 95 % of jobs stay below {self.usual:.1f}'
+        )
+
+    @property
+    def warning(self) -> str:
+        """What to do about one that is alarming."""
+        return (
+            f'The pattern moved {self}: far more than jobs differ. Check that bell, settings and '
+            'part frame are those of the calibration, or calibrate anew.'
+        )
+
+    def to_dict(self) -> dict[str, object]:
+        """As in ``diagnosis.json``."""
+        return {
+            'standard_deviations': self.distance,
+            'usual': self.usual,
+            'by_coordinate': self.by_coordinate,
+        }

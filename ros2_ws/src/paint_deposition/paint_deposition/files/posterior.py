@@ -1,0 +1,99 @@
+"""What a fit knows of a model's parameters, as a section of the model file."""
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import BaseModel, Field, model_validator
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ModelError, did_you_mean
+from paint_deposition.model.coordinates import PATTERN
+
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+# Largest relative difference between two entries that should be the same.
+SAME = 1e-6
+REMEDY = 'copy the whole section from the file that was written, or take it out'
+
+
+class Posterior(BaseModel, frozen=True, extra='forbid'):
+    """A normal distribution of a model's parameters, and what it rests on.
+
+    The pattern is in the coordinates of ``model/coordinates.py``; effects are in their own units,
+    their shapes as logarithms.
+    """
+
+    mean: dict[str, Number] = Field(description='a number for each coordinate')
+    covariance: dict[str, list[Number]] = Field(
+        description='a row of numbers for each coordinate of the mean, in its order'
+    )
+    readings: tuple[str, ...] = Field((), description='fingerprints of the readings behind it')
+    process: dict[str, Number] = Field({}, description='numbers by name')
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the k coordinates."""
+        return tuple(self.mean)
+
+    @property
+    def centre(self) -> np.ndarray:
+        """(k,) mean."""
+        return np.array(list(self.mean.values()))
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(k, k) covariance."""
+        return np.array(list(self.covariance.values()))
+
+    @model_validator(mode='after')
+    def _is_a_distribution(self) -> 'Posterior':
+        names = self.names
+        for pattern in PATTERN:
+            if pattern.name not in names:
+                raise ValueError(f'mean has no {pattern.name}; {REMEDY}')
+        if tuple(self.covariance) != names:
+            first = next((n for n in (*names, *self.covariance) if not self._in_place(n)), '')
+            raise ValueError(
+                f'mean and covariance differ in {first}: both need the same names in the same '
+                f'order; {REMEDY}'
+            )
+        for name, row in self.covariance.items():
+            if len(row) != len(names):
+                raise ValueError(
+                    f'covariance.{name} has {len(row)} numbers; expected {len(names)}, one for '
+                    'each coordinate of the mean'
+                )
+        matrix = self.matrix
+        scale = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
+        skew = np.abs(matrix - matrix.T) > SAME * scale
+        if skew.any():
+            i, j = np.argwhere(skew)[0]
+            raise ValueError(
+                f'covariance is not symmetric: {matrix[i, j]:g} in row {names[i]}, column '
+                f'{names[j]}, but {matrix[j, i]:g} the other way; {REMEDY}'
+            )
+        try:
+            np.linalg.cholesky(matrix)
+        except np.linalg.LinAlgError:
+            raise ValueError(f'covariance is not positive definite; {REMEDY}') from None
+        return self
+
+    def _in_place(self, name: str) -> bool:
+        places = [
+            list(named).index(name) for named in (self.mean, self.covariance) if name in named
+        ]
+        return len(places) == 2 and places[0] == places[1]
+
+    def check_suits(self, model: DepositionModel) -> None:
+        """Refuse coordinates that are none of the model's.
+
+        Raises:
+            ModelError: naming the first one.
+        """
+        known = [c.name for c in PATTERN]
+        known += [f'{e.id}.{name}' for e in model.effects for name in e.coordinates().values()]
+        for name in self.names:
+            if name not in known:
+                raise ModelError(
+                    f'posterior: {name} is no parameter of this model; '
+                    f'{did_you_mean(name, known, REMEDY)}'
+                )

@@ -1,0 +1,74 @@
+"""What a calibration tells, used by the commands that follow it."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+import yaml
+
+from booth import SAMPLES
+from cli.command import paint
+from paint_deposition.files.model_file import read_model_file
+from paint_deposition.model.coordinates import PATTERN
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory) -> Path:
+    """The sample's panel and door as campaigns of their own; the panel calibrated."""
+    folder = tmp_path_factory.mktemp('jobs')
+    shutil.copytree(SAMPLES / 'measured_door', folder, dirs_exist_ok=True)
+    both = yaml.safe_load((folder / 'campaign.yaml').read_text())['experiments']
+    for one in both:
+        text = yaml.safe_dump({'experiments': [one]})
+        (folder / f'{one["name"]}.yaml').write_text(text)
+    done = paint('calibrate', folder / 'panel.yaml', '-o', folder / 'calibration')
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def refitted(folder: Path, campaign: str, model: str, output: Path):
+    """What a refit with nothing added prints, warnings included, and its figures."""
+    done = paint(
+        'refit', folder / campaign, '--add', 'none', '--model', folder / model, '-o', output
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr, json.loads((output / 'diagnosis.json').read_text())
+
+
+def test_the_calibration_is_the_prior_of_the_next_job(folder: Path, tmp_path: Path):
+    known = read_model_file(folder / 'calibration/model.yaml').posterior
+    assert known is not None
+    assert known.names == tuple(coordinate.name for coordinate in PATTERN)
+    text, figures = refitted(folder, 'door.yaml', 'calibration/model.yaml', tmp_path)
+    shift = figures['pattern_shift']
+    assert set(shift) == {'standard_deviations', 'usual', 'by_coordinate'}
+    assert 0.0 < shift['standard_deviations'] < shift['usual']
+    assert f'pattern moved {shift["standard_deviations"]:.1f} standard deviations' in text
+    assert 'The pattern moved' in (tmp_path / 'report.html').read_text()
+    later = read_model_file(tmp_path / 'model.yaml').posterior
+    assert set(known.readings) < set(later.readings)
+    # Two jobs tell more of a width that one panel hardly shows.
+    without = tmp_path / 'without'
+    start = yaml.safe_load((folder / 'calibration/model.yaml').read_text())
+    del start['posterior']
+    (folder / 'start.yaml').write_text(yaml.safe_dump(start))
+    text, figures = refitted(folder, 'door.yaml', 'start.yaml', without)
+    assert figures['pattern_shift'] is None
+    assert 'pattern moved' not in text
+    alone = read_model_file(without / 'model.yaml').posterior
+    assert later.matrix.diagonal().sum() < alone.matrix.diagonal().sum()
+
+
+def test_the_readings_behind_a_calibration_do_not_count_twice(folder: Path, tmp_path: Path):
+    text, figures = refitted(folder, 'campaign.yaml', 'calibration/model.yaml', tmp_path)
+    assert figures['pattern_shift'] is None
+    (note,) = (note for note in figures['notes'] if 'is not used' in note)
+    assert 'rests on the readings of panel themselves' in note
+    assert f'warning: {note}\n' in text
+    assert note in (tmp_path / 'report.html').read_text()
+    kinds = {(found['kind'], found['of']) for found in figures['random_effects']}
+    parts = ('panel', 'door')
+    assert kinds == {(kind, part) for kind in ('part level', 'gauge zero') for part in parts}

@@ -1,0 +1,133 @@
+"""The posterior in a model file: what is written reads back, what is wrong is said in one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.errors import ModelError
+from paint_deposition.files.model_file import read_model, read_model_file, write_model
+from paint_deposition.files.posterior import Posterior
+from paint_deposition.model.coordinates import PATTERN
+
+MODEL = DepositionModel(effects=(CornerSlowdown(gain=0.5, length_m=0.2),))
+NAMES = [*(c.name for c in PATTERN), 'corner_slowdown.gain', 'corner_slowdown.log_length_m']
+
+
+def covariance() -> np.ndarray:
+    root = np.random.default_rng(0).normal(size=(len(NAMES), len(NAMES)))
+    return 1e-4 * root @ root.T
+
+
+@pytest.fixture
+def posterior() -> Posterior:
+    return Posterior(
+        mean={name: 0.1 * k for k, name in enumerate(NAMES)},
+        covariance=dict(zip(NAMES, covariance().tolist(), strict=True)),
+        readings=('0123456789ab',),
+        process={'voltage_kv': 60.0},
+    )
+
+
+@pytest.fixture
+def path(tmp_path: Path, posterior: Posterior) -> Path:
+    write_model(tmp_path / 'model.yaml', MODEL, posterior=posterior)
+    return tmp_path / 'model.yaml'
+
+
+def test_a_posterior_reads_back(path: Path, posterior: Posterior):
+    again = read_model_file(path).posterior
+    assert again == posterior
+    assert again.names == tuple(NAMES)
+    assert again.centre == pytest.approx(0.1 * np.arange(len(NAMES)))
+    assert again.matrix == pytest.approx(covariance())
+
+
+def test_each_row_stands_on_a_line_under_its_name(path: Path):
+    lines = [line.strip() for line in path.read_text().splitlines()]
+    for name in NAMES:
+        assert any(line.startswith(f'{name}: [') and line.endswith(']') for line in lines), name
+
+
+def test_a_file_without_one_has_none(tmp_path: Path):
+    write_model(tmp_path / 'model.yaml', MODEL)
+    assert 'posterior' not in (tmp_path / 'model.yaml').read_text()
+    assert read_model_file(tmp_path / 'model.yaml').posterior is None
+
+
+def spoilt(path: Path, change) -> str:
+    """What is said of the file when its posterior has been changed so."""
+    content = yaml.safe_load(path.read_text())
+    change(content['posterior'])
+    path.write_text(yaml.safe_dump(content, sort_keys=False))
+    with pytest.raises(ModelError) as refused:
+        read_model(path)
+    message = str(refused.value)
+    assert message.startswith(f'{path}: posterior')
+    assert '\n' not in message
+    return message
+
+
+def not_symmetric(section):
+    section['covariance']['K2'][0] += 1e-3
+
+
+def not_positive(section):
+    section['covariance']['log_K1'][0] = -1.0
+
+
+def too_short(section):
+    section['covariance']['r_m'].pop()
+
+
+def a_row_short(section):
+    del section['covariance']['corner_slowdown.gain']
+
+
+def without_a_coordinate(section):
+    del section['mean']['K2'], section['covariance']['K2']
+
+
+def of_another_effect(section):
+    for part in (section['mean'], section['covariance']):
+        part['corner_slowdown.dwell'] = part.pop('corner_slowdown.gain')
+    rows = section['covariance']
+    order = [NAMES.index(n) if n in NAMES else NAMES.index('corner_slowdown.gain') for n in rows]
+    section['covariance'] = {n: [row[k] for k in order] for n, row in rows.items()}
+
+
+def in_another_order(section):
+    section['covariance'] = dict(reversed(section['covariance'].items()))
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        (not_symmetric, ['covariance is not symmetric', 'log_K1', 'K2', 'or take it out']),
+        (not_positive, ['covariance is not positive definite', 'or take it out']),
+        (too_short, ['covariance.r_m has 8 numbers; expected 9']),
+        (a_row_short, ['mean and covariance differ in corner_slowdown.gain']),
+        (without_a_coordinate, ['mean has no K2']),
+        (of_another_effect, ['corner_slowdown.dwell is no parameter of this model']),
+        (in_another_order, ['mean and covariance differ in log_K1', 'the same order']),
+        (lambda s: s['mean'].update(K2='much'), ["mean.K2 is 'much'; expected a number"]),
+        (lambda s: s['mean'].update(K2=float('nan')), ['mean.K2 is nan; expected a number']),
+        (lambda s: s['mean'].update(K2=True), ['mean.K2 is True; expected a number']),
+        (lambda s: s.pop('covariance'), ["has no 'covariance'"]),
+        (lambda s: s.update(mean=3), ['mean is 3; expected a number for each']),
+        (lambda s: s.update(covarance={}), ["unknown key 'covarance'; did you mean 'covariance'"]),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(path: Path, change, words: list[str]):
+    message = spoilt(path, change)
+    for word in words:
+        assert word in message
+
+
+def test_a_section_that_is_no_mapping_is_refused(tmp_path: Path):
+    (tmp_path / 'model.yaml').write_text('posterior: [1]\n')
+    with pytest.raises(ModelError, match=r'posterior is \[1\]; expected a mapping'):
+        read_model(tmp_path / 'model.yaml')
