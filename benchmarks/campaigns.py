@@ -124,7 +124,15 @@ class PaintedCase:
 
     @cached_property
     def pattern_um(self) -> np.ndarray:
-        """(P, 7) change of the films with the pattern, each parameter within its prior."""
+        """(P, 7) change of the readings with the pattern, in standard deviations of its prior."""
+        return self._slopes_um(self.forward)
+
+    @cached_property
+    def unseen_pattern_um(self) -> np.ndarray:
+        """The same for the unseen readings."""
+        return self._slopes_um(self.unseen_forward)
+
+    def _slopes_um(self, forward: Forward) -> np.ndarray:
         values = self.truth['pattern']
         planar = PlanarPattern(**{k: values[k] for k in PlanarPattern.model_fields})
         projection = Projection(
@@ -132,10 +140,10 @@ class PaintedCase:
         )
         parameters = FreeParameters.of(DepositionModel(planar=planar, projection=projection))
         slopes = derivatives(
-            self.forward,
+            forward,
             parameters,
             parameters.encode(parameters.start),
-            np.ones(len(self.campaign)),
+            np.ones(len(forward.campaign)),
         )
         return slopes * parameters.prior[1]
 

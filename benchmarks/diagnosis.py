@@ -27,9 +27,10 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
 from benchmarks.amounts import true_amounts  # noqa: E402
-from benchmarks.campaigns import Draw, PaintedCase, name_of  # noqa: E402
+from benchmarks.campaigns import PaintedCase, name_of  # noqa: E402
 from benchmarks.rivals import Oracle, Points, stepwise_bic  # noqa: E402
 from benchmarks.scores import table  # noqa: E402
+from benchmarks.unseen import oracle_unseen_error, unseen_error  # noqa: E402
 from tests.virtual_paint_shop.cases import KINDS, PARCELS, Case, draw_case  # noqa: E402
 from tests.virtual_paint_shop.truths import library  # noqa: E402
 
@@ -145,6 +146,7 @@ def judged(painted: PaintedCase, number: int) -> dict:
             unseen_error(painted, draw, points, step.model)
             for step in (diagnosis.history[0], diagnosis.history[-1])
         ],
+        'unseen_oracle': oracle_unseen_error(painted, points),
         'amounts': amounts(painted, diagnosis),
     }
 
@@ -159,33 +161,6 @@ def said(diagnosis: Diagnosis) -> dict:
         'classes': [[list(c.members), c.probability] for c in diagnosis.classes],
         'unknown': diagnosis.unknown.kind if diagnosis.unknown else None,
     }
-
-
-def unseen_error(
-    painted: PaintedCase, draw: Draw, points: Points, model: DepositionModel
-) -> float:
-    """Expected error on readings that were never seen, over their noise.
-
-    The root mean square over the noise that fresh readings would have: the model's error is taken
-    at readings without noise, and the noise's variance added. Level and zero of each part are
-    those that the seen readings show beside the model (best linear prediction).
-    """
-    noise = painted.case.noise
-    rest = (points.mean_um - painted.forward.predict_um(model))[points.kept]
-    level = points.level_um[points.kept]
-    weighted = level / points.sigma_um[points.kept, None] ** 2
-    shown = np.linalg.solve(np.eye(level.shape[1]) + weighted.T @ level, weighted.T @ rest)
-    predicted = painted.unseen_forward.predict_um(model)
-    errors, variances, start, parts = [], [], 0, len(painted.unseen)
-    for k, (films, session) in enumerate(zip(painted.unseen, draw.sessions, strict=True)):
-        film = films.film_um
-        true = film * session.level + films.expected_um - film + session.offset_um
-        own = shown[k] * noise.level * film + shown[parts + k] * noise.session_offset_um
-        errors.append(true - own - predicted[start : start + len(film)])
-        variances.append(noise.sigma_um(films.expected_um) ** 2 + (noise.texture * film) ** 2)
-        start += len(film)
-    ratio = np.mean(np.concatenate(errors) ** 2) / np.mean(np.concatenate(variances))
-    return float(np.sqrt(1.0 + ratio))
 
 
 def amounts(painted: PaintedCase, diagnosis: Diagnosis) -> list[dict]:

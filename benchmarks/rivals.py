@@ -67,6 +67,20 @@ class Points:
         return Points(*(np.concatenate(columns) for columns in zip(*rows, strict=True)))
 
 
+def shown_amounts(
+    columns: np.ndarray, deviation_um: np.ndarray, sigma_um: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Best linear prediction of standard normal amounts and its covariance.
+
+    Args:
+        columns: (P, n) change of the readings with each amount [um].
+        deviation_um, sigma_um: (P,) of the readings [um].
+    """
+    weighted = columns / sigma_um[:, np.newaxis] ** 2
+    covariance = np.linalg.inv(np.eye(columns.shape[1]) + weighted.T @ columns)
+    return covariance @ (weighted.T @ deviation_um), covariance
+
+
 @dataclass(frozen=True)
 class Oracle:
     """Knows the noise, the pattern to within its prior, and how marks look; not how strong.

@@ -40,7 +40,7 @@ class Row:
             return f'{self.label:<{WIDTH}}none'
         campaigns = len({case for case, _ in self.values})
         if self.statistic is None:
-            low, high = interval(self.values, np.mean)
+            low, high = interval(self.values)
             share = 100.0 * np.mean([v for _, v in self.values])
             text = f'{share:5.1f} %  [{100 * low:.1f}, {100 * high:.1f}]'
         else:
@@ -51,8 +51,10 @@ class Row:
         return f'{self.label:<{WIDTH}}{text:<26}{count:<12}{self.aim}'.rstrip()
 
 
-def interval(values: Values, statistic: Callable[[np.ndarray], float]) -> tuple[float, float]:
-    """95 % bootstrap interval of a statistic, campaigns resampled.
+def interval(
+    values: Values, statistic: Callable[[np.ndarray], float] | None = None
+) -> tuple[float, float]:
+    """95 % bootstrap interval of a statistic, by default the mean, campaigns resampled.
 
     Where all values are 0 or all are 1 the bootstrap is blind; then that of as many independent
     trials as there are campaigns (Clopper and Pearson).
@@ -62,13 +64,18 @@ def interval(values: Values, statistic: Callable[[np.ndarray], float]) -> tuple[
         cases.setdefault(case, []).append(value)
     groups = [np.array(group, dtype=float) for group in cases.values()]
     every = np.concatenate(groups)
-    if np.all(every == 0.0):
+    if statistic is None and np.all(every == 0.0):
         return 0.0, float(beta.ppf(0.975, 1, len(groups)))
-    if np.all(every == 1.0):
+    if statistic is None and np.all(every == 1.0):
         return float(beta.ppf(0.025, len(groups), 1)), 1.0
     rng = np.random.default_rng(0)
     picks = rng.integers(len(groups), size=(RESAMPLED, len(groups)))
-    found = [statistic(np.concatenate([groups[k] for k in pick])) for pick in picks]
+    found: np.ndarray | list[float]
+    if statistic is None:
+        sums, counts = (np.array([of(group) for group in groups]) for of in (np.sum, np.size))
+        found = sums[picks].sum(axis=1) / counts[picks].sum(axis=1)
+    else:
+        found = [statistic(np.concatenate([groups[k] for k in pick])) for pick in picks]
     low, high = np.quantile(found, [0.025, 0.975])
     return float(low), float(high)
 
@@ -175,11 +182,16 @@ def errors_left(records: list[Record]) -> list[Row]:
     strong = [r for r in records if r['kind'] != 'clean' and r['strength'] >= STRONG]
     before, after = ([(r['case'], r['unseen'][k]) for r in strong] for k in (0, -1))
     low = [(case, ratio <= 1.15) for case, ratio in after]
+    known = [(r['case'], r['unseen_oracle']) for r in strong]
+    beside = [(r['case'], r['unseen'][-1] / r['unseen_oracle']) for r in strong]
     rows = [
         Row('error over noise <= 1.15 after, over 8 sd', low, '>= 90'),
         Row('  median before', before, '', np.median),
         Row('  median after', after, '', np.median),
         Row('  90 % after', after, '<= 1.15', lambda v: float(np.quantile(v, 0.9))),
+        Row('  the oracle: <= 1.15', [(case, ratio <= 1.15) for case, ratio in known]),
+        Row('  the oracle: median', known, '', np.median),
+        Row("  after over the oracle's, median", beside, '', np.median),
     ]
     for kind in ('effect', 'pair', 'unknown', 'footprint'):
         chosen = [(r['case'], r['unseen'][-1]) for r in strong if r['kind'] == kind]

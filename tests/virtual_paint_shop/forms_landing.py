@@ -159,7 +159,7 @@ class RecessSkyView(_Recess):
         for a in AROUND:
             tangent = (_rise(part, x, z, a, HORIZON_M) / HORIZON_M[:, None, None]).max(axis=0)
             hidden = hidden + tangent**2 / (1.0 + tangent**2) * (tangent > 0) / AROUND.size
-        return hidden / 0.05
+        return hidden / 0.036
 
 
 class ConvexRoot(ConvexAttraction):

@@ -130,7 +130,7 @@ def mistyped(reading_um: float, rng: np.random.Generator) -> float:
     elif kind == 'swapped' and digits[1] != '.':
         digits[0], digits[1] = digits[1], digits[0]
     else:
-        digits[0] = str((int(digits[0]) + int(rng.integers(1, 9))) % 10)
+        digits[0] = str((int(digits[0]) + int(rng.integers(1, 10))) % 10)
     return float(''.join(digits))
 
 
