@@ -132,13 +132,18 @@ class PaintedCase:
         """The same for the unseen readings."""
         return self._slopes_um(self.unseen_forward)
 
-    def _slopes_um(self, forward: Forward) -> np.ndarray:
+    @cached_property
+    def pattern(self) -> DepositionModel:
+        """The true pattern, and nothing else."""
         values = self.truth['pattern']
         planar = PlanarPattern(**{k: values[k] for k in PlanarPattern.model_fields})
         projection = Projection(
             model_plane_m=values['model_plane_m'], emission_offset_m=values['emission_offset_m']
         )
-        parameters = FreeParameters.of(DepositionModel(planar=planar, projection=projection))
+        return DepositionModel(planar=planar, projection=projection)
+
+    def _slopes_um(self, forward: Forward) -> np.ndarray:
+        parameters = FreeParameters.of(self.pattern)
         slopes = derivatives(
             forward,
             parameters,

@@ -28,7 +28,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.amounts import true_amounts  # noqa: E402
 from benchmarks.campaigns import PaintedCase, name_of  # noqa: E402
-from benchmarks.rivals import Oracle, Points, stepwise_bic  # noqa: E402
+from benchmarks.rivals import Oracle, Points, stepwise_bic, visible_strength  # noqa: E402
 from benchmarks.scores import table  # noqa: E402
 from benchmarks.unseen import oracle_unseen_error, unseen_error  # noqa: E402
 from tests.virtual_paint_shop.cases import KINDS, PARCELS, Case, draw_case  # noqa: E402
@@ -92,6 +92,17 @@ def painted_case(case: Case, parcels: int) -> PaintedCase:
     return PaintedCase.of(case, FILMS, parcels)
 
 
+@lru_cache(maxsize=1)
+def strengths(case: Case, parcels: int) -> dict:
+    """How visible each hidden effect is, and all together, in standard deviations."""
+    painted = painted_case(case, parcels)
+    points = Points.of(painted, painted.draw(0))
+    together = visible_strength(painted, points, points.expected_um - points.clean_um)
+    marks = points.marks_um.T
+    each = [visible_strength(painted, points, mark) for mark in marks] if len(marks) > 1 else None
+    return {'strength': together, 'strengths': [together] * len(marks) if each is None else each}
+
+
 def run(task: Task) -> list[dict]:
     """Diagnose some draws of a case."""
     import warnings
@@ -101,7 +112,7 @@ def run(task: Task) -> list[dict]:
     records = []
     for number in numbers:
         try:
-            found = judged(painted_case(case, parcels), number)
+            found = judged(painted_case(case, parcels), number) | strengths(case, parcels)
         except Exception as error:  # a crash is a result too
             found = {'error': f'{type(error).__name__}: {error}'}
         records.append({'case': name_of(case), 'redraw': number, **facts(case)} | found)
@@ -138,8 +149,6 @@ def judged(painted: PaintedCase, number: int) -> dict:
         'readings': len(draw.campaign.readings),
         'seconds': seconds,
         **said(diagnosis),
-        'strengths': [oracle.strength(column) for column in points.marks_um[rows].T],
-        'strength': oracle.strength(mark),
         'oracle_p': oracle.p_value((points.mean_um - points.clean_um)[rows], mark),
         'bic': stepwise_bic(diagnosis),
         'unseen': [

@@ -11,9 +11,11 @@ from scipy.stats import chi2
 from paint_deposition.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.fitting.least_squares import covariance_factor
+from paint_deposition.fitting.least_squares import covariance_factor, fit_readings
+from paint_deposition.fitting.parameters import FreeParameters
 
 MOST_CHOSEN = 3
+STARTS = 4
 
 
 @dataclass(frozen=True)
@@ -99,7 +101,7 @@ class Oracle:
         return Oracle(cholesky(covariance, lower=True))
 
     def strength(self, mark_um: np.ndarray) -> float:
-        """Size of a mark (P,) in standard deviations, the pattern refitted around it."""
+        """Size of a small mark (P,) in standard deviations, the pattern refitted around it."""
         return float(np.linalg.norm(solve_triangular(self.lower, mark_um, lower=True)))
 
     def p_value(self, deviation_um: np.ndarray, mark_um: np.ndarray) -> float:
@@ -108,6 +110,19 @@ class Oracle:
         deviation = solve_triangular(self.lower, deviation_um, lower=True)
         length = mark @ mark
         return float(chi2.sf((mark @ deviation) ** 2 / length, 1)) if length > 0.0 else 1.0
+
+
+def visible_strength(painted: PaintedCase, points: Points, mark_um: np.ndarray) -> float:
+    """Size of any mark (P,) in standard deviations: what the best pattern leaves of it.
+
+    Patterns have bounds, so that a great mark is more visible than where the pattern is linear.
+    """
+    sigma_um = points.sigma_um
+    films_um = painted.forward.predict_um(painted.pattern) + mark_um
+    nuisance = points.level_um / sigma_um[:, np.newaxis]
+    start = FreeParameters.of(painted.pattern)
+    fit = fit_readings(painted.forward, films_um, sigma_um, start, STARTS, 0, nuisance)
+    return float(np.sqrt(fit.marginal.chi_square))
 
 
 def stepwise_bic(diagnosis: Diagnosis) -> list[str]:
