@@ -29,7 +29,7 @@ test-fast: build  ## run the tests of less than a second each, none of them with
 bench: build  ## measure the speed of simulation and nodes
 	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)
 
-bench-diagnosis: build  ## score the diagnosis on doors with known defects
+bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
 
 lint: build  ## check style, types and the order of the rooms

@@ -234,6 +234,29 @@ def reliability(records: list[Record]) -> list[str]:
     return lines
 
 
+def failures(records: list[Record]) -> str:
+    """A line for each strong cause that was not named and for each wrong effect accepted."""
+    lines = []
+    for r in sorted(records, key=lambda r: (r['kind'], r['case'], r['redraw'])):
+        if 'error' in r:
+            lines.append(f'{r["case"]} ({r["redraw"]}): {r["error"]}')
+            continue
+        if r['kind'] == 'clean':
+            failed = r['verdict'] != 'none_missing'
+        else:
+            of_library = r['kind'] in ('effect', 'pair')
+            found = named(r) >= set(r['hidden']) if of_library else r['verdict'] != 'none_missing'
+            failed = bool(wrong(r)) or (r['strength'] >= STRONG and not found)
+        if failed:
+            groups_said = ', '.join(f'{"/".join(m)} {p:.2f}' for m, p in r['classes'][:3])
+            lines.append(
+                f'{r["case"]} ({r["redraw"]}): {r["strength"]:.0f} sd, {r["readings"]} readings: '
+                f'{r["verdict"]}, accepted {"+".join(r["accepted"]) or "nothing"}; '
+                f'{groups_said or "no group"}; unseen {r["unseen"][0]:.2f} -> {r["unseen"][-1]:.2f}'
+            )
+    return '\n'.join(lines)
+
+
 def detected(record: Record) -> bool:
     """Whether the diagnosis says that something is missing."""
     return record['verdict'] not in ('none_missing', 'fit_broken')

@@ -3,12 +3,24 @@
 import numpy as np
 import pytest
 from benchmarks.amounts import true_amounts
-from benchmarks.scores import Row, groups, interval, mistakes, named, naming, reliability, wrong
+from benchmarks.scores import (
+    Row,
+    failures,
+    groups,
+    interval,
+    mistakes,
+    named,
+    naming,
+    reliability,
+    wrong,
+)
 
 
 def result(case, **fields):
     return {
         'case': case,
+        'redraw': 0,
+        'unseen': [2.0, 1.1],
         'kind': 'effect',
         'hidden': ['edge_build'],
         'verdict': 'effect_missing',
@@ -77,6 +89,13 @@ def test_mistakes_are_counted_per_campaign():
     rows = mistakes([RIGHT, LISTED, WRONG, BLAMED])
     assert found(rows, 'wrong effects accepted, per campaign') == [0, 0, 1, 1]
     assert found(rows, 'unknown cause blamed on an effect') == [True]
+
+
+def test_failures_are_strong_causes_not_named_and_effects_wrongly_accepted():
+    weak = result('e', strength=3.0)
+    crash = {'case': 'f', 'redraw': 1, 'kind': 'clean', 'error': 'ValueError: x'}
+    lines = failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
+    assert [line[0] for line in lines] == ['f', 'b', 'c', 'd']
 
 
 def test_reliability_compares_stated_with_observed():

@@ -53,8 +53,7 @@ class _Edge(EdgeBuild):
 class EdgeExponential(_Edge):
     """The fringe field of an earthed sheet that is near others of its size decays like e^-d."""
 
-    form = 'exponential'
-    longest_m = 0.08
+    form, longest_m = 'exponential', 0.08
 
     @staticmethod
     def gain(d):
@@ -64,8 +63,7 @@ class EdgeExponential(_Edge):
 class EdgeGaussian(_Edge):
     """The sharp field of the edge, blurred by droplets that coast past it."""
 
-    form = 'gaussian'
-    shortest_m, longest_m = 0.02, 0.06
+    form, shortest_m, longest_m = 'gaussian', 0.02, 0.06
 
     @staticmethod
     def gain(d):
@@ -75,8 +73,7 @@ class EdgeGaussian(_Edge):
 class EdgeRamp(_Edge):
     """A band of even slope, drawn up by surface tension until the film gelled."""
 
-    form = 'ramp'
-    shortest_m, longest_m = 0.03, 0.12
+    form, shortest_m, longest_m = 'ramp', 0.03, 0.12
 
     @staticmethod
     def gain(d):
@@ -89,8 +86,7 @@ class EdgePower(_Edge):
     Minus 1/3, so that it ends eight reaches away.
     """
 
-    form = 'power'
-    longest_m = 0.03
+    form, longest_m = 'power', 0.03
 
     @staticmethod
     def gain(d):
@@ -100,8 +96,7 @@ class EdgePower(_Edge):
 class EdgeFlow(_Edge):
     """A fat edge: paint flows to the edge out of a band beside it, and none is lost."""
 
-    form = 'flow'
-    longest_m = 0.04
+    form, longest_m = 'flow', 0.04
 
     @staticmethod
     def gain(d):
