@@ -252,7 +252,8 @@ def failures(records: list[Record]) -> str:
             lines.append(
                 f'{r["case"]} ({r["redraw"]}): {r["strength"]:.0f} sd, {r["readings"]} readings: '
                 f'{r["verdict"]}, accepted {"+".join(r["accepted"]) or "nothing"}; '
-                f'{groups_said or "no group"}; unseen {r["unseen"][0]:.2f} -> {r["unseen"][-1]:.2f}'
+                f'{groups_said or "no group"}; '
+                f'unseen {r["unseen"][0]:.2f} -> {r["unseen"][-1]:.2f}'
             )
     return '\n'.join(lines)
 
