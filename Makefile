@@ -30,7 +30,7 @@ bench: build  ## measure the speed of the film integral and of the diagnosis
 	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)
 	@$(IN_ENVIRONMENT) python benchmarks/inference.py $(ARGS)
 
-bench-diagnosis: build  ## score the diagnosis on doors with known defects
+bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
 
 lint: build  ## check style, types and the order of the rooms

@@ -1,8 +1,9 @@
 """True amounts of hidden effects in the parameters of the model's laws.
 
 Only effects of which truth and law mean the same by their parameters: errors of the tool, shifts
-at the model plane, delays, levels and volumes. Attraction, shielding or losses follow laws of
-their own in the virtual paint shop, so their parameters cannot be compared.
+at the model plane, delays, levels and volumes, each in the form of its law that has the amount.
+Attraction, shielding or losses follow laws of their own in the virtual paint shop, so their
+parameters cannot be compared.
 """
 
 import numpy as np
@@ -16,6 +17,8 @@ NAMES = {
     'tcp_standoff': 'offset_z_m',
 }
 SAG_REFERENCE_UM = 20.0
+# Other forms of a law that mean the same by their amount: a shift at the model plane.
+SAME_AMOUNT = {'air_drift': ('square', 'carried'), 'gun_wake': ('even',)}
 
 
 def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
@@ -26,6 +29,8 @@ def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
         passes: number of passes of each experiment.
     """
     amplitude, truth = hidden['amplitude'], hidden['id']
+    if hidden['form'] and hidden['form'] not in SAME_AMOUNT.get(truth, ()):
+        return {}
     if truth == 'tcp_offset':
         angle = hidden['direction_rad']
         return {

@@ -145,9 +145,9 @@ class Part:
         )
         return vertices, faces
 
-    def mesh(self) -> tuple[np.ndarray, np.ndarray]:
+    def mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
         """The surface and whatever stands in front of it, as one mesh."""
-        vertices, faces = self.surface_mesh()
+        vertices, faces = self.surface_mesh(edge_m)
         if self.obstacle is None:
             return vertices, faces
         more, extra = self.obstacle

@@ -101,7 +101,10 @@ def write_readings(table: Readings, path: Path, sigma_column: bool) -> None:
 
 def _write_films(table: Readings, path: Path) -> None:
     films = [np.round(f, 4) for f in (table.film_um, table.expected_um, table.clean_um)]
-    _write_csv(path, ['point', 'film_um', 'expected_um', 'clean_um'], [table.point, *films])
+    marks = list(np.round(table.marks_um.T, 4))
+    head = ['point', 'film_um', 'expected_um', 'clean_um']
+    head += [f'mark_{k + 1}_um' for k in range(len(marks))]
+    _write_csv(path, head, [table.point, *films, *marks])
 
 
 def _write_csv(path: Path, head: list[str], columns: list) -> None:

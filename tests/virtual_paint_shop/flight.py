@@ -39,10 +39,13 @@ class Air:
     drift_m: (n, 3) displacement of the mean droplet at the model plane, per slice, part frame.
     narrowing: (p,) per parcel; 0 flies straight from the emission point, 1 parallel to the axis
         beyond the model plane, < 0 opens wider than the cone.
+    growth: the displacement grows with this power of the way: 1 for a parcel that moves with the
+        air at once, 2 for one that the air only begins to pull.
     """
 
     drift_m: np.ndarray
     narrowing: np.ndarray
+    growth: float = 1.5
 
 
 @dataclass(frozen=True)
@@ -85,6 +88,7 @@ def _fly(
     py,
     mobility,
     narrowing,
+    growth,
     plane,
     offset,
     bell_radius,
@@ -143,8 +147,8 @@ def _fly(
             for _step in range(_NEWTON_STEPS):
                 share = (axial / plane - start_share) / (1.0 - start_share)
                 if share > 0.0:
-                    root = np.sqrt(share)
-                    bent, bending = share * root, 1.5 * root / ((1.0 - start_share) * plane)
+                    bent = share**growth
+                    bending = growth * bent / (share * (1.0 - start_share) * plane)
                 else:
                     bent, bending = 0.0, 0.0
                 x, y, z = (
@@ -236,6 +240,7 @@ def fly(
             parcels.y_m,
             parcels.mobility,
             air.narrowing,
+            air.growth,
             model_plane_m,
             emission_offset_m,
             0.025,

@@ -17,6 +17,7 @@ class Elliptic(Truth):
     """Axes stretched by sqrt(1 + a) and 1 / sqrt(1 + a), at any angle."""
 
     id, family, typical, unit = 'footprint:elliptic', 'footprint', 0.30, '1'
+    most = 1.5
 
     @classmethod
     def details(cls, rng):
@@ -35,6 +36,7 @@ class TriangularRing(Truth):
     """Radii follow a triangle (0, peak, end) instead; a = 1 entirely, less: part of the way."""
 
     id, family, typical, unit = 'footprint:triangular_ring', 'footprint', 0.6, '1'
+    most = 1.0
 
     def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
         rho = np.hypot(parcels.x_m, parcels.y_m)
@@ -56,6 +58,7 @@ class Skewed(Truth):
     """A banana: parcels are pushed sideways by a x^2 / r."""
 
     id, family, typical, unit = 'footprint:skewed', 'footprint', 0.25, '1'
+    most = 1.2
 
     @classmethod
     def details(cls, rng):
@@ -75,6 +78,7 @@ class TwoLobes(Truth):
     """The ring has two lobes: angular density about 1 + a cos 2(angle - lobe)."""
 
     id, family, typical, unit = 'footprint:two_lobes', 'footprint', 0.30, '1'
+    most = 0.9
 
     @classmethod
     def details(cls, rng):

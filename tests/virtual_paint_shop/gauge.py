@@ -19,6 +19,9 @@ class GaugeNoise:
     heavy_tails: bool = False  # Student t, 4 degrees of freedom, same sigma
     outlier_fraction: float = 0.0  # gross errors of 4 to 10 sigma
     session_offset_um: float = 0.0  # standard deviation of one offset per experiment
+    texture: float = 0.0  # the film's own scatter from spot to spot, as a share of it
+    level: float = 0.0  # scatter of the parts' mean films, as a share
+    slip_fraction: float = 0.0  # readings that are mistyped
 
     def sigma_um(self, film_um: np.ndarray) -> np.ndarray:
         return np.hypot(self.floor_um, self.relative * film_um)
@@ -36,6 +39,16 @@ class GaugeNoise:
 
 
 @dataclass(frozen=True)
+class Session:
+    """One visit with the gauge to a part: what was written down, and why it is not the film."""
+
+    thickness_um: np.ndarray  # (n,) as written down
+    slipped: np.ndarray  # (n,) bool, mistyped
+    level: float  # the part's film over that of its kind
+    offset_um: float  # of the gauge's zero
+
+
+@dataclass(frozen=True)
 class Spots:
     """Gauge points on a part, each possibly read more than once."""
 
@@ -47,7 +60,7 @@ class Spots:
 
 @dataclass(frozen=True)
 class Readings:
-    """A table, one row per reading; the last four columns are the shop's secret."""
+    """A table, one row per reading; the last five columns are the shop's secret."""
 
     point: np.ndarray
     group: np.ndarray
@@ -57,7 +70,8 @@ class Readings:
     sigma_um: np.ndarray  # the gauge's true sigma there
     film_um: np.ndarray  # true dry film
     expected_um: np.ndarray  # what a noise-free gauge would say
-    clean_um: np.ndarray  # the film without the hidden effect
+    clean_um: np.ndarray  # the film without the hidden effects
+    marks_um: np.ndarray  # (n, hidden) what each hidden effect alone would change
 
     def __len__(self) -> int:
         return self.thickness_um.size
@@ -85,6 +99,41 @@ def layout(
     return Spots(x, z, group, times)
 
 
+def measure(
+    spot: np.ndarray,
+    film_um: np.ndarray,
+    expected_um: np.ndarray,
+    noise: GaugeNoise,
+    rng: np.random.Generator,
+) -> Session:
+    """Read a part anew: another part of its kind, in another session.
+
+    All arrays (n,). `spot` names the place of each reading; repeats share it and its texture.
+    """
+    places, place = np.unique(spot, return_inverse=True)
+    level = 1.0 + noise.level * rng.normal()
+    offset = noise.session_offset_um * rng.normal()
+    texture = 1.0 + noise.texture * rng.normal(size=places.size)[place]
+    film = film_um * (level * texture) + (expected_um - film_um)
+    reading = noise.read(film, rng, offset)
+    slipped = rng.random(spot.size) < noise.slip_fraction
+    reading[slipped] = [mistyped(value, rng) for value in reading[slipped]]
+    return Session(reading, slipped, level, offset)
+
+
+def mistyped(reading_um: float, rng: np.random.Generator) -> float:
+    """A slip of the fingers: the point left out (31.2 -> 312), digits swapped, or one wrong."""
+    digits = list(f'{reading_um:.1f}')
+    kind = rng.choice(['point', 'swapped', 'wrong'])
+    if kind == 'point':
+        digits.remove('.')
+    elif kind == 'swapped' and digits[1] != '.':
+        digits[0], digits[1] = digits[1], digits[0]
+    else:
+        digits[0] = str((int(digits[0]) + int(rng.integers(1, 10))) % 10)
+    return float(''.join(digits))
+
+
 def scatter(
     part: Part, count: int, rng: np.random.Generator, keep_off_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
@@ -101,6 +150,7 @@ def tabulate(
     film: np.ndarray,
     expected: np.ndarray,
     clean: np.ndarray,
+    marks: np.ndarray,
     noise: GaugeNoise,
     offset: float,
     rng: np.random.Generator,
@@ -121,6 +171,7 @@ def tabulate(
         film[row],
         expected[row],
         clean[row],
+        marks[row],
     )
 
 

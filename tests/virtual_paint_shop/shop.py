@@ -59,10 +59,12 @@ def generate(
     gun: str | None = None,
     follow: float | None = None,
     parcels: int = PARCELS,
+    mesh_edge_m: float = 0.012,
 ) -> Campaign:
     """A campaign; the same seed gives the same doors, paths, layout and noise for any truth.
 
-    truth: None, an effect id, 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a list.
+    truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a
+        list.
     style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
     follow: how much the tool axis follows the surface, 0 fixed to 1 normal; None for U(0.3, 0.9).
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
@@ -74,7 +76,20 @@ def generate(
     truths = choose(truth, stream(seed, 1), amplitude, scale)
     pattern, jobs = draw_jobs(seed, truths, experiments, emission_offset_m, gun, follow)
     painted = [
-        _paint(seed, n, job, pattern, truths, readings, repeats, heldout, style, noise, parcels)
+        _paint(
+            seed,
+            n,
+            job,
+            pattern,
+            truths,
+            readings,
+            repeats,
+            heldout,
+            style,
+            noise,
+            parcels,
+            mesh_edge_m,
+        )
         for n, job in enumerate(jobs)
     ]
     return _campaign(seed, pattern, painted, truths)
@@ -135,6 +150,7 @@ def _paint(
     style: str | None,
     noise: GaugeNoise,
     parcels: int,
+    mesh_edge_m: float = 0.012,
 ) -> Experiment:
     rng = stream(seed, 40 + number)
     style = style or str(rng.choice(['columns', 'rows', 'random']))
@@ -147,17 +163,29 @@ def _paint(
     clean, _ = bench.readings([], at_x, at_z)
     film, expected = bench.readings(truths, at_x, at_z)
     first = len(spots.x_m)
-    visible = {}
-    for one in truths:
+    marks = np.empty((at_x.size, len(truths)))
+    for k, one in enumerate(truths):
         alone = expected if len(truths) == 1 else bench.readings([one], at_x, at_z)[1]
-        visible[one.id] = float(np.sqrt(np.mean((alone - clean)[:first] ** 2)))
+        marks[:, k] = alone - clean
+    sizes = np.sqrt(np.mean(marks[:first] ** 2, axis=0))
+    visible = {one.id: float(size) for one, size in zip(truths, sizes, strict=True)}
     offset = noise.session_offset_um * rng.normal()
     tables = []
     for chosen, part in ((spots, slice(0, first)), (others, slice(first, None))):
         tables.append(
-            tabulate(job.part, chosen, film[part], expected[part], clean[part], noise, offset, rng)
+            tabulate(
+                job.part,
+                chosen,
+                film[part],
+                expected[part],
+                clean[part],
+                marks[part],
+                noise,
+                offset,
+                rng,
+            )
         )
-    vertices, faces = job.part.mesh()
+    vertices, faces = job.part.mesh(mesh_edge_m)
     return Experiment(
         job.name,
         job.part,

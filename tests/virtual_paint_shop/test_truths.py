@@ -89,7 +89,8 @@ def width(film, along):
 def test_there_is_a_truth_for_every_effect_of_the_contract():
     known = library()
     assert not CONTRACT_IDS - set(known)
-    extra = set(known) - CONTRACT_IDS
+    assert all(name.partition('~')[0] == truth.id for name, truth in known.items())
+    extra = {truth.id for truth in known.values()} - CONTRACT_IDS
     assert all(name.startswith(('unknown:', 'footprint:')) for name in extra)
     assert sum(name.startswith('unknown:') for name in extra) >= 2
 

@@ -3,6 +3,7 @@
 A truth acts on the parcels' way: the plume they leave in, the gun's true motion and flow, the air
 they fly through, whether they stay where they land, what the wet film does, what the gauge says.
 Amplitudes are in the units of the effect's usual parameter; they are drawn as typical x U(0.7, 2).
+An effect may have several laws: classes with one `id` and each its own `form`.
 """
 
 from __future__ import annotations
@@ -38,8 +39,10 @@ class Truth:
     drawn: dict = field(default_factory=dict)  # further parameters, by name
 
     id = 'clean'
+    form = ''  # '' for the effect's first law, a word for each other one
     family = 'none'
     typical = 0.0
+    most = np.inf  # largest amplitude that a shop would still paint with
     unit = ''
     sign = 'positive'  # 'positive', 'negative' or 'either'
 
@@ -48,10 +51,20 @@ class Truth:
         cls, rng: np.random.Generator, amplitude: float | None = None, scale: float = 1.0
     ) -> Truth:
         """A truth of physics-typical size, or of the given amplitude."""
-        size = cls.typical * rng.uniform(0.7, 2.0) * scale
-        flip = rng.choice([-1.0, 1.0])
-        signed = {'positive': size, 'negative': -size, 'either': flip * size}[cls.sign]
+        signed = cls.of_size(scale * rng.uniform(0.7, 2.0), rng)
         return cls(signed if amplitude is None else amplitude, cls.details(rng))
+
+    @classmethod
+    def of_size(cls, size: float, rng: np.random.Generator) -> float:
+        """The amplitude of so many typical sizes, at the most `most`, with a physical sign."""
+        amount = min(cls.typical * size, cls.most)
+        flip = rng.choice([-1.0, 1.0])
+        return {'positive': amount, 'negative': -amount, 'either': flip * amount}[cls.sign]
+
+    @classmethod
+    def name(cls) -> str:
+        """'edge_build', or 'edge_build~ramp' for another form of its law."""
+        return f'{cls.id}~{cls.form}' if cls.form else cls.id
 
     @classmethod
     def details(cls, rng: np.random.Generator) -> dict:
@@ -95,6 +108,7 @@ class Truth:
     def as_dict(self) -> dict:
         return {
             'id': self.id,
+            'form': self.form,
             'family': self.family,
             'amplitude': float(self.amplitude),
             'unit': self.unit,
@@ -111,10 +125,20 @@ def changes_flight(truth: Truth) -> bool:
 
 
 def library() -> dict[str, type[Truth]]:
-    """All truths by name: ids of the effects, 'unknown:...' and 'footprint:...'."""
-    from . import footprints, truths_film, truths_gun, truths_landing, unknowns
+    """All truths by name: ids of the effects, 'id~form', 'unknown:...' and 'footprint:...'."""
+    from . import (
+        footprints,
+        forms_film,
+        forms_gun,
+        forms_landing,
+        truths_film,
+        truths_gun,
+        truths_landing,
+        unknowns,
+    )
 
     modules = (truths_gun, truths_landing, truths_film, unknowns, footprints)
+    modules += (forms_gun, forms_landing, forms_film)
     found = [
         c
         for m in modules
@@ -122,9 +146,9 @@ def library() -> dict[str, type[Truth]]:
         if isinstance(c, type)
         and issubclass(c, Truth)
         and c.__module__ == m.__name__
-        and c.id != 'clean'
+        and not c.__name__.startswith('_')
     ]
-    return {c.id: c for c in found}
+    return {c.name(): c for c in found}
 
 
 def choose(
@@ -133,7 +157,7 @@ def choose(
     amplitude: float | dict | None = None,
     scale: float = 1.0,
 ) -> list[Truth]:
-    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag', 'unknown:*', a list of ids."""
+    """Truths named by `spec`: None, 'air_drift', 'air_drift+sag~yield', 'unknown:*', a list."""
     if spec is None or spec == 'clean':
         return []
     known = library()
@@ -151,6 +175,10 @@ def choose(
 
 def with_drift(air: Air, drift_m: np.ndarray) -> Air:
     return replace(air, drift_m=air.drift_m + drift_m)
+
+
+def with_narrowing(air: Air, narrowing: np.ndarray) -> Air:
+    return replace(air, narrowing=air.narrowing + narrowing)
 
 
 def plain(value: object) -> object:

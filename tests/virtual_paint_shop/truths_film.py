@@ -17,6 +17,7 @@ class Sag(Truth):
     """
 
     id, family, typical, unit = 'sag', 'lateral shift', 0.06, 'um m'
+    most = 0.5
 
     def on_film(self, film_um, x, z, scene, film_at):
         part = scene.part
@@ -26,18 +27,31 @@ class Sag(Truth):
         coarse = film_at(gx.ravel(), gz.ravel()).reshape(gx.shape)
         fine_z = np.linspace(0.0, part.height_m, 361)
         before = np.maximum(RectBivariateSpline(xs, zs, coarse)(xs, fine_z), 0.0)
-        after = run_down(before, fine_z[1] - fine_z[0], self.amplitude)
+        after = self.run_down(before, fine_z[1] - fine_z[0])
         change = RectBivariateSpline(xs, fine_z, after - before, kx=3, ky=1)
         return film_um + change.ev(x, z)
 
+    def run_down(self, film_um, dz_m):
+        return run_down(film_um, dz_m, self.amplitude)
 
-def run_down(film_um: np.ndarray, dz_m: float, volume_um_m: float) -> np.ndarray:
-    """Film (columns, heights bottom to top) after running down."""
-    total = volume_um_m / SAG_REFERENCE_UM**3
-    fastest = 3.0 * total * film_um.max() ** 2
+
+def run_down(
+    film_um: np.ndarray,
+    dz_m: float,
+    volume_um_m: float,
+    power: float = 3.0,
+    yield_um: float = 0.0,
+) -> np.ndarray:
+    """Film (columns, heights bottom to top) after running down.
+
+    Only what is thicker than `yield_um` moves: its flux ~ (T - yield)^power.
+    """
+    total = volume_um_m / (SAG_REFERENCE_UM - yield_um) ** power
+    moving = np.maximum(film_um - yield_um, 0.0)
+    fastest = power * total * moving.max() ** (power - 1.0)
     steps = int(np.ceil(2.0 * fastest / dz_m)) + 8
     for weight in np.full(steps, 1.0 / steps):
-        crossing = total * weight * film_um**3
+        crossing = total * weight * np.maximum(film_um - yield_um, 0.0) ** power
         arriving = np.concatenate([crossing[:, 1:], np.zeros((len(film_um), 1))], axis=1)
         film_um = film_um + (arriving - crossing) / dz_m
     return film_um
@@ -47,6 +61,7 @@ class OversprayFog(Truth):
     """Fine overspray settles everywhere alike."""
 
     id, family, typical, unit = 'overspray_fog', 'level', 1.0, 'um'
+    most = 6.0
 
     def on_film(self, film_um, x, z, scene, film_at):
         return film_um + self.amplitude
@@ -56,6 +71,7 @@ class FogGradient(Truth):
     """Overspray that settles more below: a (1 - height share)^1.5."""
 
     id, family, typical, unit = 'fog_gradient', 'order', 1.5, 'um'
+    most = 10.0
 
     def on_film(self, film_um, x, z, scene, film_at):
         share = np.clip(z / scene.part.height_m, 0.0, 1.0)
@@ -66,6 +82,7 @@ class GaugeGain(Truth):
     """The gauge reads (1 + a) times the film."""
 
     id, family, typical, unit, sign = 'gauge_gain', 'level', 0.02, '1', 'either'
+    most = 0.15
 
     def on_gauge(self, film_um, x, z, scene):
         return (1.0 + self.amplitude) * film_um
@@ -75,6 +92,7 @@ class GaugeZero(Truth):
     """The gauge reads `amplitude` too much."""
 
     id, family, typical, unit, sign = 'gauge_zero', 'level', 1.2, 'um', 'either'
+    most = 5.0
 
     def on_gauge(self, film_um, x, z, scene):
         return film_um + self.amplitude
@@ -87,6 +105,7 @@ class GaugeCurvatureBias(Truth):
     """
 
     id, family, typical, unit = 'gauge_curvature_bias', 'curvature', 1.2, 'um'
+    most = 6.0
 
     def on_gauge(self, film_um, x, z, scene):
         low, high = scene.part.curvature_over(x, z, 0.005)

@@ -18,6 +18,7 @@ class TcpOffset(Truth):
     """The true bell sits beside the logged TCP by a fixed vector in the tool frame."""
 
     id, family, typical, unit = 'tcp_offset', 'lateral shift', 0.004, 'm'
+    most = 0.04
 
     @classmethod
     def details(cls, rng):
@@ -33,6 +34,7 @@ class TcpStandoff(Truth):
     """The true bell is `amplitude` nearer to the part (along +z of the tool) than logged."""
 
     id, family, typical, unit, sign = 'tcp_standoff', 'standoff', 0.006, 'm', 'either'
+    most = 0.05
 
     def on_motion(self, motion: Motion, scene: Scene) -> Motion:
         return moved(motion, tcp_m=motion.tcp_m + self.amplitude * motion.turn[:, :, 2])
@@ -42,6 +44,7 @@ class TcpTilt(Truth):
     """The true bell axis is turned about a fixed axis of the tool's x-y plane."""
 
     id, family, typical, unit = 'tcp_tilt', 'lateral shift', np.deg2rad(1.5), 'rad'
+    most = np.deg2rad(12.0)
 
     @classmethod
     def details(cls, rng):
@@ -57,6 +60,7 @@ class PartMisalignment(Truth):
     """The door hangs elsewhere than its drawing: displaced (amplitude) and turned a little."""
 
     id, family, typical, unit = 'part_misalignment', 'lateral shift', 0.006, 'm'
+    most = 0.05
 
     @classmethod
     def details(cls, rng):
@@ -77,6 +81,7 @@ class PoseLag(Truth):
     """A pose is logged `amplitude` seconds after the gun was there; triggers are on time."""
 
     id, family, typical, unit = 'pose_lag', 'time', 0.015, 's'
+    most = 0.15
 
     def on_motion(self, motion: Motion, scene: Scene) -> Motion:
         return replace(motion, time_s=motion.time_s - self.amplitude)
@@ -90,6 +95,7 @@ class CornerSlowdown(Truth):
     """
 
     id, family, typical, unit = 'corner_slowdown', 'boundary', 0.3, '1'
+    most = 2.5
 
     @classmethod
     def details(cls, rng):
@@ -109,6 +115,7 @@ class TriggerLag(Truth):
     """The flow answers the trigger like a first-order lag: rise in `amplitude`, fall faster."""
 
     id, family, typical, unit = 'trigger_lag', 'boundary', 0.08, 's'
+    most = 0.6
 
     @classmethod
     def details(cls, rng):
@@ -140,6 +147,7 @@ class FlowDrift(Truth):
     """The pump's flow drifts steadily with time, by `amplitude` of the mean per pass."""
 
     id, family, typical, unit, sign = 'flow_drift', 'order', 0.02, '1/pass', 'either'
+    most = 0.12
 
     def on_flow(self, flow: Callable, scene: Scene) -> Callable:
         first, last = scene.nominal.trigger_s[0], scene.nominal.trigger_s[-1]
@@ -152,6 +160,7 @@ class GunWake(Truth):
     """The plume trails the moving gun: a parcel at the model plane lags by v x amplitude."""
 
     id, family, typical, unit = 'gun_wake', 'time', 0.020, 's'
+    most = 0.15
 
     def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
         duration = (slices.time_1_s - slices.time_0_s)[:, None]
@@ -167,6 +176,7 @@ class AirDrift(Truth):
     """
 
     id, family, typical, unit = 'air_drift', 'lateral shift', 0.015, 'm'
+    most = 0.12
 
     @classmethod
     def details(cls, rng):

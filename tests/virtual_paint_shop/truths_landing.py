@@ -10,7 +10,7 @@ import trimesh
 from .doors import Part
 from .flight import Air, Landings, Slices
 from .parcels import Parcels
-from .truths import KAPPA_REF_PER_M, Scene, Truth
+from .truths import KAPPA_REF_PER_M, Scene, Truth, with_narrowing
 
 
 class IncidenceAttraction(Truth):
@@ -21,12 +21,12 @@ class IncidenceAttraction(Truth):
     """
 
     id, family, typical, unit = 'incidence_attraction', 'incidence', 1.0, '1'
+    most = 6.0
 
     @classmethod
-    def draw(cls, rng, amplitude=None, scale=1.0):
-        size = scale * rng.uniform(0.7, 2.0)
-        signed = size if rng.random() < 0.7 else -0.6 * size
-        return cls(signed if amplitude is None else amplitude, {})
+    def of_size(cls, size, rng):
+        amount = min(cls.typical * size, cls.most)
+        return amount if rng.random() < 0.7 else -0.6 * amount
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         away = 1.0 / np.maximum(landings.cos_incidence, 0.2) - 1.0
@@ -42,6 +42,7 @@ class ConvexAttraction(Truth):
     """
 
     id, family, typical, unit = 'convex_attraction', 'curvature', 0.15, '1'
+    most = 1.0
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         low, _ = _curvature(landings, scene, 0.015)
@@ -53,6 +54,7 @@ class FaradayShielding(Truth):
     """Recesses get less: exp(-a k^0.8), k = concave curvature over 30 mm x 250 mm."""
 
     id, family, typical, unit = 'faraday_shielding', 'curvature', 0.15, '1'
+    most = 1.0
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         _, high = _curvature(landings, scene, 0.030)
@@ -64,6 +66,7 @@ class EdgeBuild(Truth):
     """Field concentration at free edges: 1 + a / (1 + (d / reach)^2) at distance d."""
 
     id, family, typical, unit = 'edge_build', 'boundary', 0.25, '1'
+    most = 2.0
 
     @classmethod
     def details(cls, rng):
@@ -79,6 +82,7 @@ class StandoffEfficiency(Truth):
     """Droplets are lost under way: e^(-a s / Omega), s = own path beyond the model plane."""
 
     id, family, typical, unit = 'standoff_efficiency', 'standoff', 0.5, '1'
+    most = 3.0
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         return np.exp(-self.amplitude * landings.beyond_m / scene.pattern.model_plane_m)
@@ -92,10 +96,10 @@ class PatternSpread(Truth):
     """
 
     id, family, typical, unit, sign = 'pattern_spread', 'standoff', 0.3, '1', 'either'
+    most = 0.8
 
     def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
-        own = self.amplitude * (0.7 + 0.6 * parcels.size)
-        return replace(air, narrowing=air.narrowing + own)
+        return with_narrowing(air, self.amplitude * (0.7 + 0.6 * parcels.size))
 
 
 class Occlusion(Truth):
@@ -107,6 +111,7 @@ class Occlusion(Truth):
     """
 
     id, family, typical, unit = 'occlusion', 'visibility', 0.06, 'm'
+    most = 0.11
 
     @classmethod
     def details(cls, rng):

@@ -15,6 +15,7 @@ class MaskingTape(Truth):
     """A strip across the door, half shadowed by a lifted masking tape, takes less paint."""
 
     id, family, typical, unit = 'unknown:masking_tape', 'unknown', 0.25, '1'
+    most = 0.95
 
     @classmethod
     def details(cls, rng):
@@ -38,6 +39,7 @@ class ThermalStripe(Truth):
     """Hot and cold stripes of the surface ripple the film along x."""
 
     id, family, typical, unit = 'unknown:thermal_stripe', 'unknown', 0.06, '1'
+    most = 0.4
 
     @classmethod
     def details(cls, rng):
@@ -52,6 +54,7 @@ class PoorGround(Truth):
     """A bolted-on patch is badly grounded and attracts less."""
 
     id, family, typical, unit = 'unknown:poor_ground', 'unknown', 0.12, '1'
+    most = 0.9
 
     @classmethod
     def details(cls, rng):
@@ -67,10 +70,28 @@ class PoorGround(Truth):
         return 1.0 - self.amplitude / (1.0 + np.exp(outside / 0.010))
 
 
+class LocalBump(Truth):
+    """A dripping bell leaves a soft spot of more paint."""
+
+    id, family, typical, unit = 'unknown:local_bump', 'unknown', 0.12, '1'
+    most = 1.0
+
+    @classmethod
+    def details(cls, rng):
+        return {'at': rng.uniform(0.15, 0.85, 2), 'radius_m': rng.uniform(0.06, 0.16)}
+
+    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+        part = scene.part
+        x = landings.position_m[:, 0] - (self.drawn['at'][0] - 0.5) * part.width_m
+        z = landings.position_m[:, 2] - self.drawn['at'][1] * part.height_m
+        return 1.0 + self.amplitude * np.exp(-0.5 * (x**2 + z**2) / self.drawn['radius_m'] ** 2)
+
+
 class PumpPulsation(Truth):
     """A worn gear pump: the flow swings with a period of a few pattern radii of travel."""
 
     id, family, typical, unit = 'unknown:pump_pulsation', 'unknown', 0.15, '1'
+    most = 0.8
 
     @classmethod
     def details(cls, rng):
@@ -92,6 +113,7 @@ class ChargeSwirl(Truth):
     """Charge builds up on the bell and swings the plume round slowly in the tool's frame."""
 
     id, family, typical, unit = 'unknown:charge_swirl', 'unknown', 0.015, 'm'
+    most = 0.08
 
     @classmethod
     def details(cls, rng):

@@ -1,0 +1,91 @@
+"""Cases are repeatable, as hard as they say, and their noise is what it is said to be."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from .cases import GUESSED, KINDS, MESH_EDGES_M, READINGS, SIZES, draw_case, paint
+from .gauge import GaugeNoise, measure, mistyped
+from .truths import library
+
+QUIET = GaugeNoise(floor_um=0.0, relative=0.0)
+
+
+def test_the_same_seed_draws_the_same_case():
+    assert draw_case(7, 'pair') == draw_case(7, 'pair')
+    assert draw_case(7, 'pair') != draw_case(8, 'pair')
+
+
+@pytest.mark.parametrize('kind', KINDS)
+def test_cases_are_of_their_kind_and_within_their_ranges(kind):
+    known = library()
+    cases = [draw_case(seed, kind) for seed in range(60)]
+    for case in cases:
+        assert len(case.truths) == {'clean': 0, 'pair': 2}.get(kind, 1)
+        assert READINGS[0] <= case.readings <= READINGS[1]
+        assert MESH_EDGES_M[0] <= case.mesh_edge_m <= MESH_EDGES_M[1]
+        for name, amplitude in zip(case.truths, case.amplitudes, strict=True):
+            truth = known[name]
+            assert (kind in ('unknown', 'footprint')) == (':' in name)
+            assert abs(amplitude) <= truth.most
+            size = abs(amplitude) / truth.typical
+            # Rebound is drawn 0.6 times as large as attraction.
+            assert 0.6 * SIZES[0] / GUESSED <= size <= SIZES[1] * GUESSED
+        if kind == 'pair':
+            one, other = (known[name] for name in case.truths)
+            assert one.family != other.family
+    for choice in ('stated', 'layout'):
+        assert len({getattr(case, choice) for case in cases}) > 1
+
+
+def test_without_noise_the_film_is_read():
+    film = np.linspace(5.0, 30.0, 20)
+    session = measure(np.arange(20), film, film + 1.0, QUIET, np.random.default_rng(0))
+    assert np.allclose(session.thickness_um, film + 1.0, atol=0.006)
+    assert not session.slipped.any()
+
+
+def test_repeats_share_the_texture_and_parts_their_level():
+    spot = np.repeat(np.arange(2000), 2)
+    film = np.full(4000, 100.0)
+    noise = GaugeNoise(floor_um=0.0, relative=0.0, texture=0.01, level=0.05)
+    session = measure(spot, film, film, noise, np.random.default_rng(3))
+    first, second = session.thickness_um[::2], session.thickness_um[1::2]
+    assert np.array_equal(first, second)
+    assert first.std() / session.level == pytest.approx(1.0, rel=0.06)
+    assert first.mean() == pytest.approx(100.0 * session.level, abs=0.1)
+    levels = [
+        measure(spot[:1], film[:1], film[:1], noise, np.random.default_rng(k)).level
+        for k in range(500)
+    ]
+    assert np.std(levels) == pytest.approx(0.05, rel=0.1)
+
+
+def test_one_reading_in_a_hundred_is_mistyped():
+    film = np.full(20_000, 31.2)
+    noise = GaugeNoise(floor_um=0.0, relative=0.0, slip_fraction=0.01)
+    session = measure(np.arange(20_000), film, film, noise, np.random.default_rng(1))
+    assert session.slipped.mean() == pytest.approx(0.01, abs=0.002)
+    assert np.all((session.thickness_um != 31.2) == session.slipped)
+
+
+def test_slips_are_those_of_fingers():
+    rng = np.random.default_rng(0)
+    found = {mistyped(31.24, rng) for _ in range(300)}
+    assert {312.0, 13.2} < found
+    assert found - {312.0, 13.2} == {10.0 * k + 1.2 for k in range(10) if k != 3}
+
+
+@pytest.mark.slow
+def test_a_painted_case_knows_the_mark_of_each_effect():
+    case = draw_case(11, 'pair', ('gauge_zero', 'overspray_fog'))
+    case = replace(case, layout=('panel', 'door'))
+    campaign = paint(case, parcels=200_000)
+    assert [e.name for e in campaign.experiments] == list(case.layout)
+    for experiment in campaign.experiments:
+        table = experiment.readings
+        assert np.allclose(table.marks_um, case.amplitudes)
+        assert np.allclose(table.expected_um - table.clean_um, sum(case.amplitudes))
