@@ -16,8 +16,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
-from paint_deposition.fitting.parameters import FreeParameters
-from paint_deposition.fitting.study import Study
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
 
 Progress = Callable[[str], None]
@@ -61,10 +60,10 @@ def compare(
         progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
-    study = Study.of(campaign, model.effects if model else ())
-    if model is None:
-        progress('fitting the pattern')
-        model = study.fit(FreeParameters.of(DepositionModel()), STARTS).model
+    progress('fitting the pattern')
+    start = model or DepositionModel()
+    study, fit = sifted(campaign, start, start.effects, STARTS)
+    model = model or fit.model
     progress('comparing')
     return compared(study, model)
 

@@ -29,6 +29,7 @@ from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
@@ -72,12 +73,11 @@ class Run:
             if start.effect(key) is None
         }
         neutral = (shapes[0] for shapes in self.candidates.values())
-        self.study = Study.of(campaign, (*start.effects, *neutral))
         self.seed = seed
         progress('fitting the model')
         self.start = start
-        parameters = FreeParameters.of(start, *start.effects)
-        self.fit = self.study.fit(parameters, STARTS, seed, self.study.nuisance)
+        effects = (*start.effects, *neutral)
+        self.study, self.fit = sifted(campaign, start, effects, STARTS, seed)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
@@ -253,7 +253,9 @@ def trouble_with(study: Study, fit: Fit) -> str:
     if not fit.converged:
         return 'the fit did not converge; give a start model nearer to the bell in use'
     if study.noise.source != 'assumed':
-        reduced = fit.chi_square / freedom
+        # Of the gauge alone: that a film has little texture is no fault.
+        over_gauge = fit.residual * study.sigma_um / study.gauge_um
+        reduced = float(over_gauge @ over_gauge) / freedom
         chance = f_ratio.cdf(reduced, freedom, min(study.noise.degrees_of_freedom, 1e6))
         if chance < TOO_GOOD:
             return (

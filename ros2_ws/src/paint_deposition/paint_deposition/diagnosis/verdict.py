@@ -190,6 +190,7 @@ class Diagnosis:
                 'measure': [place.to_dict() for place in places],
                 'spray': [spray.to_dict() for spray in sprays],
             },
-            'noise': {'sigma_um': self.study.noise.typical_um, 'source': self.study.noise.source},
+            'noise': self.study.noise_figures,
+            'left_out': [slip.to_dict() for slip in self.study.slips],
             'notes': list(self.notes),
         }

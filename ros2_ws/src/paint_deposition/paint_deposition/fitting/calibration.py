@@ -16,6 +16,7 @@ from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.uniformity import sigma_n_closed_form
 from paint_deposition.readings.campaign import Campaign
@@ -114,7 +115,8 @@ class Calibration:
             'readings': len(study.campaign.readings),
             'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
             'converged': self.fit.converged,
-            'noise': {'sigma_um': study.noise.typical_um, 'source': study.noise.source},
+            'noise': study.noise_figures,
+            'left_out': [slip.to_dict() for slip in study.slips],
             'warnings': list(self.warnings),
         }
 
@@ -148,8 +150,9 @@ def calibrate(
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
     """
     model = start or DepositionModel()
-    study = Study.of(campaign, model.effects)
-    check_enough(len(study))
+    check_enough(len(campaign))
+    progress('looking for slips among the readings')
+    study, _ = sifted(campaign, model, model.effects, seed=seed)
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
@@ -224,7 +227,7 @@ def _warnings(
     values: tuple[Estimate, ...],
     pairs: tuple[Correlation, ...],
 ) -> list[str]:
-    warnings = list(study.campaign.notes)
+    warnings = list(study.left_out)
     warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
     warnings += [
         f'{value.name} is not determined by these readings: {value.reason}'

@@ -21,7 +21,12 @@ class Forward:
         self.campaign = campaign
         # The compiled kernel has these laws in a fixed order; those a model lacks are neutral.
         self._in_kernel = tuple(e for e in effects if type(e).flux_factor or type(e).pattern_scale)
+        self._effects = effects
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
+
+    def at(self, campaign: Campaign) -> 'Forward':
+        """The same for the points of another campaign."""
+        return Forward(campaign, self._effects)
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""
