@@ -98,9 +98,10 @@ class Run:
         free = np.hstack([self.study.nuisance, law_errors(self.study, self.fit, kept)])
         null = NullModel.around(self.fit, apart, free)
         found = explanations(self.study, self.fit, self.candidates, kept)
+        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
         if self.testable is None:
-            self.testable = testability(null, found)
-        return ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+            self.testable = testability(space, self.seed)
+        return space
 
     @property
     def taken(self) -> list[Effect]:
