@@ -150,12 +150,13 @@ def calibrate(
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
     """
     model = start or DepositionModel()
-    check_enough(len(campaign))
-    progress('looking for slips among the readings')
-    study, _ = sifted(campaign, model, model.effects, seed=seed)
+    study = Study.of(campaign, model.effects)
+    check_enough(len(study))
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
+    progress('looking for slips among the readings')
+    study, _ = sifted(campaign, model, model.effects, seed=seed)
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
