@@ -198,6 +198,7 @@ def test_a_thick_film_without_texture_is_no_broken_fit(monkeypatch):
     assert texture.source == 'neighbours'
     assert texture.share < 0.004
     assert found.to_dict()['noise']['texture_share'] == texture.share
+    assert found.notes == (str(texture),)
 
 
 def test_an_assumed_noise_leaves_the_texture_assumed():

@@ -61,9 +61,11 @@ def compare(
     """
     model = model or _model_of(campaign)
     progress('fitting the pattern')
-    start = model or DepositionModel()
-    study, fit = sifted(campaign, start, start.effects, STARTS)
-    model = model or fit.model
+    if model is None:
+        study, fit = sifted(campaign, DepositionModel(), starts=STARTS)
+        model = fit.model
+    else:
+        study, _ = sifted(campaign, model, model.effects)
     progress('comparing')
     return compared(study, model)
 

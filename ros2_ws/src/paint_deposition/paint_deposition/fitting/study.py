@@ -149,7 +149,11 @@ class Study:
             'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
             'p-values that can be trusted.',
         )
-        return (*(assumed if self.noise.source == 'assumed' else ()), *self.left_out)
+        return (
+            *(assumed if self.noise.source == 'assumed' else ()),
+            *(() if self.texture.source == 'assumed' else (str(self.texture),)),
+            *self.left_out,
+        )
 
     @property
     def left_out(self) -> tuple[str, ...]:
