@@ -107,7 +107,9 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     done = installed_paint('compare', door_alone, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / 'comparison.json').read_text())
-    assert set(content) == {'readings', 'noise', 'misfits', 'regions', 'dependences', 'notes'}
+    assert set(content) == {
+        'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences', 'notes',
+    }  # fmt: skip
     assert content['noise']['source'] == 'repeats'
     door = content['misfits'][0]
     assert (door['experiment'], door['kind'], door['readings']) == ('door', 'experiment', 72)

@@ -17,8 +17,7 @@ from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
-from paint_deposition.fitting.parameters import FreeParameters
-from paint_deposition.fitting.study import Study
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
 
 Progress = Callable[[str], None]
@@ -62,10 +61,12 @@ def compare(
         progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
-    study = Study.of(campaign, model.effects if model else ())
+    progress('fitting the pattern')
     if model is None:
-        progress('fitting the pattern')
-        model = study.fit(FreeParameters.of(DepositionModel()), STARTS).model
+        study, fit = sifted(campaign, DepositionModel(), starts=STARTS)
+        model = fit.model
+    else:
+        study, _ = sifted(campaign, model, model.effects)
     progress('comparing')
     return compared(study, model)
 

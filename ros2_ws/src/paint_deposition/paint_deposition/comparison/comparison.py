@@ -68,10 +68,10 @@ class Comparison:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``comparison.json``."""
-        noise = self.study.noise
         return {
             'readings': len(self.readings),
-            'noise': {'sigma_um': noise.typical_um, 'source': noise.source},
+            'noise': self.study.noise_figures,
+            'left_out': [slip.to_dict() for slip in self.study.slips],
             'misfits': [
                 {'experiment': m.experiment, 'kind': m.kind, 'label': m.label}
                 | m.residuals.figures()

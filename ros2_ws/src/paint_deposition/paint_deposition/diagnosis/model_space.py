@@ -78,6 +78,7 @@ class ModelSpace:
         self, null: NullModel, explanations: Sequence[Explanation], freedom: float
     ) -> None:
         self.null, self.freedom = null, freedom
+        self._simulated: dict[int, np.ndarray] = {}
         self.explanations = sorted(explanations, key=lambda e: e.cause)
         self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
         names = [e.cause for e in self.explanations]
@@ -223,17 +224,34 @@ class ModelSpace:
         By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes, which is
         computed for every draw as for the readings: nothing is chosen on the readings.
         """
-        count = len(self.null.deviation)
-        draws = simulated(count, self.freedom, DRAWS, seed)
-        together = np.column_stack([self.null.deviation, draws])
+        found = self.evidence(self.null.deviation[:, np.newaxis])[0]
+        return float((1 + np.count_nonzero(self.null_evidence(seed) >= found)) / (1 + DRAWS))
+
+    def null_evidence(self, seed: int) -> np.ndarray:
+        """(DRAWS,) simulated evidence if no cause acted."""
+        if seed not in self._simulated:
+            self._simulated[seed] = self.evidence(self.null_draws(seed))
+        return self._simulated[seed]
+
+    def null_draws(self, seed: int) -> np.ndarray:
+        """(P, DRAWS) whitened deviations behind ``null_evidence``."""
+        return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
+
+    def evidence(self, deviations: np.ndarray, chosen: Iterable[int] | None = None) -> np.ndarray:
+        """(D,) log evidence that any cause acts, averaged, for whitened deviations (P, D).
+
+        Args:
+            deviations: of the readings, or simulated.
+            chosen: numbers of explanations; default: all.
+        """
         terms = []
-        for k, explanation in enumerate(self.explanations):
-            evidence = _by_size(self.columns[k], explanation.sides, together, self.freedom)
+        for k in range(len(self.explanations)) if chosen is None else chosen:
+            explanation = self.explanations[k]
+            evidence = _by_size(self.columns[k], explanation.sides, deviations, self.freedom)
             odds = self._log_odds[self.causes.index(explanation.cause)]
             share = np.log(explanation.share / len(SIZES))
             terms.append(logsumexp(evidence, axis=0) + share + odds)
-        total = logsumexp(terms, axis=0)
-        return float((1 + np.count_nonzero(total[1:] >= total[0])) / (1 + DRAWS))
+        return logsumexp(terms, axis=0)
 
     @cached_property
     def _alone(self) -> list[Model]:

@@ -31,6 +31,7 @@ from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.posterior import usable
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
@@ -75,12 +76,12 @@ class Run:
             if start.effect(key) is None
         }
         neutral = (shapes[0] for shapes in self.candidates.values())
-        self.study = Study.of(campaign, (*start.effects, *neutral))
         self.seed = seed
         progress('fitting the model')
         self.start = start
         self.known, self.remarks = usable(known, campaign)
-        self.fit = self.study.fit(self._free(start), STARTS, seed, self.study.nuisance)
+        effects = (*start.effects, *neutral)
+        self.study, self.fit = sifted(campaign, start, effects, STARTS, seed, self.known)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
@@ -106,9 +107,10 @@ class Run:
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
         null = NullModel.around(fit, free)
         found = explanations(self.study, fit, self.candidates)
+        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
         if self.testable is None:
-            self.testable = testability(null, found)
-        return ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+            self.testable = testability(space, self.seed)
+        return space
 
     @property
     def taken(self) -> list[Effect]:
@@ -260,7 +262,9 @@ def trouble_with(study: Study, fit: Fit) -> str:
     if not fit.converged:
         return 'the fit did not converge; give a start model nearer to the bell in use'
     if study.noise.source != 'assumed':
-        reduced = fit.chi_square / freedom
+        # Of the gauge alone: that a film has little texture is no fault.
+        over_gauge = fit.residual * study.sigma_um / study.gauge_um
+        reduced = float(over_gauge @ over_gauge) / freedom
         chance = f_ratio.cdf(reduced, freedom, min(study.noise.degrees_of_freedom, 1e6))
         if chance < TOO_GOOD:
             return (

@@ -4,45 +4,91 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.diagnosis.evidence import NullModel
-from paint_deposition.diagnosis.explanations import Explanation
+from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.diagnosis.sensitivities import Sensitivity
 
 # Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
 # effect counts as testable.
 TESTABLE = 2.0
-# Signal-to-noise ratio of an amplitude that is detected nine times in ten: three standard
-# deviations against chance among all causes, and 1.3 more for the power.
-DETECTED = 4.3
+# An amplitude is detectable if the test that something is missing, at this level, finds it with
+# this power.
+LEVEL, POWER = 0.05, 0.9
+# Signal-to-noise ratios at which the power is simulated, and with how many draws.
+RATIOS, DRAWS = np.geomspace(2.5, 10.0, 10), 200
+# As many explanations as follow an effect most closely are computed with it; the others weigh as
+# much as they do without it.
+FOLLOWING = 6
 
 
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 
-def testability(null: NullModel, explanations: Sequence[Explanation]) -> Testability:
-    """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
+def testability(space: ModelSpace, seed: int) -> Testability:
+    """Ids of effects that do not show, and detectable amplitudes of the others by parameter.
+
+    Args:
+        space: around the model without them.
+        seed: of simulated deviations.
+    """
     shapes: dict[str, list[Sensitivity]] = {}
-    for explanation in explanations:
+    for explanation in space.explanations:
         if explanation.sensitivity is not None:
             shapes.setdefault(explanation.cause, []).append(explanation.sensitivity)
     not_testable, detectable = [], {}
     for effect_id, found in shapes.items():
         # Along the combination of amplitudes that shows most.
-        if max(np.linalg.norm(null.whiten(s.columns), 2) for s in found) >= TESTABLE:
-            detectable[effect_id] = _detectable(null, found)
+        if max(np.linalg.norm(space.null.whiten(s.columns), 2) for s in found) >= TESTABLE:
+            detectable[effect_id] = _detectable(space, found, seed)
         else:
             not_testable.append(effect_id)
     return tuple(not_testable), detectable
 
 
-def _detectable(null: NullModel, shapes: list[Sensitivity]) -> dict[str, float]:
+def _detectable(space: ModelSpace, shapes: list[Sensitivity], seed: int) -> dict[str, float]:
     """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
     info = type(shapes[0].effect).parameters()
     found = {}
     for k, name in enumerate(shapes[0].names):
-        strength = max(float(np.linalg.norm(null.whiten(s.columns[:, [k]]))) for s in shapes)
-        amount = DETECTED * info[name]['typical'] / max(strength, 1e-9)
+        columns = [space.null.whiten(s.columns[:, [k]])[:, 0] for s in shapes]
+        best = max(columns, key=lambda column: float(np.linalg.norm(column)))
+        strength = float(np.linalg.norm(best))
+        if strength < 1e-9:
+            continue
+        backward = shapes[0].sides[k] < 0.0
+        ratio = detectable_ratio(space, (-best if backward else best) / strength, seed)
+        amount = ratio * info[name]['typical'] / strength
         room = max(abs(info[name][end] - info[name]['neutral']) for end in ('low', 'high'))
         if amount <= room:
             found[name] = amount
     return found
+
+
+def detectable_ratio(space: ModelSpace, direction: np.ndarray, seed: int) -> float:
+    """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried.
+
+    Args:
+        space: its test is simulated.
+        direction: (P,) unit vector of whitened deviations.
+        seed: of simulated deviations.
+    """
+    null = space.null_evidence(seed)
+    draws = space.null_draws(seed)[:, :DRAWS]
+    chosen = _following(space, direction)
+    rest = np.exp(null[:DRAWS]) - np.exp(space.evidence(draws, chosen))
+    moved = draws[:, np.newaxis] + np.multiply.outer(direction, RATIOS)[:, :, np.newaxis]
+    along = space.evidence(moved.reshape(len(direction), -1), chosen)
+    evidence = np.log(np.exp(along.reshape(len(RATIOS), DRAWS)) + rest)
+    power = np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
+    if power[-1] < POWER:
+        return np.inf
+    return float(np.interp(POWER, np.maximum.accumulate(power), RATIOS))
+
+
+def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
+    """Numbers of the explanations that take up most of a direction."""
+    taken = []
+    for columns in space.columns:
+        left, singular, _ = np.linalg.svd(columns, full_matrices=False)
+        shrink = singular**2 / (1.0 + singular**2)
+        taken.append(float(shrink @ (left.T @ direction) ** 2))
+    return np.argsort(taken)[::-1][:FOLLOWING].tolist()

@@ -219,6 +219,7 @@ class Diagnosis:
             },
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
-            'noise': {'sigma_um': self.study.noise.typical_um, 'source': self.study.noise.source},
+            'noise': self.study.noise_figures,
+            'left_out': [slip.to_dict() for slip in self.study.slips],
             'notes': list(self.notes),
         }

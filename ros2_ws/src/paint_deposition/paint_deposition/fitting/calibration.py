@@ -18,6 +18,7 @@ from paint_deposition.fitting.estimates import Correlation, Estimate, correlatio
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.posterior import posterior_of
+from paint_deposition.fitting.sifting import sifted
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.uniformity import sigma_n_closed_form
 from paint_deposition.readings.campaign import Campaign
@@ -116,7 +117,8 @@ class Calibration:
             'readings': len(study.campaign.readings),
             'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
             'converged': self.fit.converged,
-            'noise': {'sigma_um': study.noise.typical_um, 'source': study.noise.source},
+            'noise': study.noise_figures,
+            'left_out': [slip.to_dict() for slip in study.slips],
             'warnings': list(self.warnings),
         }
 
@@ -160,6 +162,8 @@ def calibrate(
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
+    progress('looking for slips among the readings')
+    study, _ = sifted(campaign, model, model.effects, seed=seed)
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
@@ -231,7 +235,7 @@ def _warnings(
     values: tuple[Estimate, ...],
     pairs: tuple[Correlation, ...],
 ) -> list[str]:
-    warnings = list(study.campaign.notes)
+    warnings = list(study.left_out)
     warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
     warnings += [
         f'{value.name} is not determined by these readings: {value.reason}'

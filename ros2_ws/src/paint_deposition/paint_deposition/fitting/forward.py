@@ -36,10 +36,15 @@ class Forward:
 
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
         self.campaign = campaign
+        self._effects = effects
         self._in_kernel = {effect.id: effect for effect in effects if _defines(effect, LAWS)}
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
         threads = min(numba.get_num_threads(), len(self._parts))
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def at(self, campaign: Campaign) -> 'Forward':
+        """The same for the points of another campaign."""
+        return Forward(campaign, self._effects)
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""

@@ -1,7 +1,8 @@
 """A campaign prepared for inference: point means, noise, blocks and forward model."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.cluster.vq import kmeans2
@@ -12,6 +13,7 @@ from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import Fit, fit_readings
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.random_effects import RandomEffects, random_effects
+from paint_deposition.fitting.slips import Slip
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.covariates import Covariate, Rays, along_rays, covariates
 from paint_deposition.readings.gauge_noise import GaugeNoise, gauge_noise
@@ -20,9 +22,29 @@ from paint_deposition.readings.residuals import Residuals, root_mean_square
 
 # Blocks for cross-validation hold about this many points, and each part has at least some blocks.
 POINTS_A_PATCH, FEWEST_PATCHES = 8, 4
-# The film's texture: it varies from spot to spot by about this share for reasons that no model
-# follows, and repeats at one spot do not average it out.
+# Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
+
+
+@dataclass(frozen=True)
+class Texture:
+    """The film's own variation from spot to spot, which no model follows.
+
+    Repeats at one spot do not average it out, and no gauge is to blame for it.
+
+    Attributes:
+        share: standard deviation as a share of the film.
+        source: 'neighbours' if estimated from readings near each other, else 'assumed'.
+    """
+
+    share: float = TEXTURE_SHARE
+    source: str = 'assumed'
+
+    def __str__(self) -> str:
+        share = f'{100.0 * self.share:.2g} % of the film'
+        if self.source == 'assumed':
+            return f"The film's own texture was assumed to be {share}."
+        return f"The film's own texture is {share}, estimated from neighbouring readings."
 
 
 @dataclass(frozen=True)
@@ -35,6 +57,8 @@ class Study:
         measured_um: (P,) means over repeats [um].
         sigma_um: (P,) their standard deviations, with the film's texture [um].
         noise: of single readings.
+        texture: of the film.
+        slips: single readings that were left out, see ``sifted``.
     """
 
     campaign: Campaign
@@ -42,6 +66,8 @@ class Study:
     measured_um: np.ndarray
     sigma_um: np.ndarray
     noise: GaugeNoise
+    texture: Texture = Texture()
+    slips: tuple[Slip, ...] = ()
     _rays: dict = field(default_factory=dict, repr=False)
 
     @staticmethod
@@ -57,10 +83,35 @@ class Study:
             check_unit(experiment.readings)
         noise = gauge_noise(campaign.readings)
         campaign, noise = campaign.without(noise.gross), noise.without_gross()
+        return Study._with(campaign, Forward(campaign, effects), noise, Texture())
+
+    @staticmethod
+    def _with(
+        campaign: Campaign, forward: Forward, noise: GaugeNoise, texture: Texture
+    ) -> 'Study':
         means = campaign.means
-        variance = np.bincount(means.owner, noise.sigma_um**2) / means.repeats**2
-        sigma = np.sqrt(variance + (TEXTURE_SHARE * means.mean_um) ** 2)
-        return Study(campaign, Forward(campaign, effects), means.mean_um, sigma, noise)
+        sigma = np.hypot(_of_means(noise, campaign), texture.share * means.mean_um)
+        return Study(campaign, forward, means.mean_um, sigma, noise, texture)
+
+    def textured(self, texture: Texture) -> 'Study':
+        """The same with another texture."""
+        other = Study._with(self.campaign, self.forward, self.noise, texture)
+        return replace(other, slips=self.slips)
+
+    def without(self, slips: dict[int, Slip]) -> 'Study':
+        """The same without some points, by their row."""
+        if not slips:
+            return self
+        left_out = np.isin(self.campaign.means.owner, list(slips))
+        campaign = self.campaign.without(left_out)
+        noise = self.noise.select(~left_out)
+        study = Study._with(campaign, self.forward.at(campaign), noise, self.texture)
+        return replace(study, slips=tuple(slips.values()))
+
+    @property
+    def gauge_um(self) -> np.ndarray:
+        """(P,) standard deviation of the points from the gauge alone, without texture [um]."""
+        return _of_means(self.noise, self.campaign)
 
     def __len__(self) -> int:
         return len(self.measured_um)
@@ -89,13 +140,30 @@ class Study:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks on the readings for the user."""
-        if self.noise.source != 'assumed':
-            return self.campaign.notes
-        return (
+        assumed = (
             'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
             'p-values that can be trusted.',
-            *self.campaign.notes,
         )
+        return (
+            *(assumed if self.noise.source == 'assumed' else ()),
+            *(() if self.texture.source == 'assumed' else (str(self.texture),)),
+            *self.left_out,
+        )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """A line for each point at which readings were left out."""
+        return (*self.campaign.notes, *map(str, self.slips))
+
+    @property
+    def noise_figures(self) -> dict[str, Any]:
+        """Noise and texture as results name them."""
+        return {
+            'sigma_um': self.noise.typical_um,
+            'source': self.noise.source,
+            'texture_share': self.texture.share,
+            'texture_source': self.texture.source,
+        }
 
     @property
     def noise_floor_um(self) -> float:
@@ -159,3 +227,8 @@ class Study:
         """(P,) number of the block of points that one pass painted; parts share no block."""
         labels = np.column_stack([self.campaign.experiment_of, self.passes(model)])
         return np.unique(labels, axis=0, return_inverse=True)[1].ravel()
+
+
+def _of_means(noise: GaugeNoise, campaign: Campaign) -> np.ndarray:
+    means = campaign.means
+    return np.sqrt(np.bincount(means.owner, noise.sigma_um**2)) / means.repeats

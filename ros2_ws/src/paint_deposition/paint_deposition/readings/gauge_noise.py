@@ -37,8 +37,11 @@ class GaugeNoise:
 
     def without_gross(self) -> 'GaugeNoise':
         """The noise of the readings that are no gross outliers."""
-        kept = ~self.gross
-        return replace(self, sigma_um=self.sigma_um[kept], gross=self.gross[kept])
+        return self.select(~self.gross)
+
+    def select(self, rows: np.ndarray) -> 'GaugeNoise':
+        """The noise of some of the readings, by mask or indices."""
+        return replace(self, sigma_um=self.sigma_um[rows], gross=self.gross[rows])
 
 
 def gauge_noise(readings: Readings) -> GaugeNoise:

@@ -51,7 +51,7 @@ def gross_outliers(readings: Readings) -> np.ndarray:
 
 
 def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
-    """A line for each point at which readings were left out.
+    """A line for each point at which some of several readings were left out.
 
     Args:
         taken: all readings of a part.
@@ -60,6 +60,8 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
     lines = []
     for label in dict.fromkeys(taken.point[~used]):
         here = taken.point == label
+        if np.count_nonzero(here) == 1:
+            continue
         out, kept = taken.thickness_um[here & ~used], taken.thickness_um[here & used]
         beside = f' beside {_listed(kept)}' if len(kept) else ' contradict each other'
         lines.append(
