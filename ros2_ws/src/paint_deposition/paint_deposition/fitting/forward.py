@@ -18,7 +18,7 @@ class Forward:
     """
 
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
-        self.campaign = campaign
+        self.campaign, self.effects = campaign, effects
         # The compiled kernel has these laws in a fixed order; those a model lacks are neutral.
         self._in_kernel = tuple(e for e in effects if type(e).flux_factor or type(e).pattern_scale)
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
@@ -47,6 +47,7 @@ class _Part:
         self._integrators: dict[bool, FilmIntegrator] = {}
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
+        model = model.without(self.experiment.switched_off)
         with_stencils = any(effect.needs_slope for effect in model.effects)
         integrator = self._integrators.get(with_stencils)
         if integrator is None:

@@ -25,6 +25,8 @@ TEXTURE_SHARE = 0.01
 # Parts painted alike differ in their mean film by about this share: 4 % was found for clearcoat
 # on 40 panels, the gauge and the booth's day included.
 LEVEL_SHARE = 0.03
+# Without voltage, or without the booth's air, another share of the paint arrives.
+OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
@@ -118,8 +120,11 @@ class Study:
         if parts == 1:
             return np.empty((len(self), 0))
         own = (self.campaign.experiment_of[:, np.newaxis] == np.arange(parts)) - 1.0 / parts
-        sizes_um = LEVEL_SHARE * self.measured_um, np.full(len(self), SESSION_UM)
-        return np.hstack([own * (size / self.sigma_um)[:, np.newaxis] for size in sizes_um])
+        share = np.array([OTHER_LEVEL_SHARE if e.switched_off else LEVEL_SHARE
+                          for e in self.campaign.experiments])  # fmt: skip
+        levels_um = share * self.measured_um[:, np.newaxis]
+        return np.hstack([own * size / self.sigma_um[:, np.newaxis]
+                          for size in (levels_um, SESSION_UM)])  # fmt: skip
 
     def rays(self, model: DepositionModel) -> list[Rays]:
         """The rays of each experiment for a model's pattern and projection."""

@@ -33,6 +33,7 @@ class Experiment:
             which the film's slope is taken.
         taken: all readings; used: (N,) which of them are used.
         files: where mesh, trajectory and readings came from, for reports.
+        switched_off: of the cell while the part was painted: 'voltage', 'draught'.
     """
 
     name: str
@@ -44,6 +45,7 @@ class Experiment:
     taken: Readings
     used: np.ndarray
     files: dict[str, str] = field(default_factory=dict)
+    switched_off: frozenset[str] = frozenset()
 
     @staticmethod
     def of(
@@ -52,6 +54,7 @@ class Experiment:
         path: SprayPath,
         readings: Readings,
         files: dict[str, str] | None = None,
+        switched_off: frozenset[str] = frozenset(),
     ) -> 'Experiment':
         """Match readings to the surface.
 
@@ -68,7 +71,8 @@ class Experiment:
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
-            name, surface, path, readings, means, points, readings, used, files or {}
+            name, surface, path, readings, means, points, readings, used, files or {},
+            switched_off,
         )
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
@@ -87,7 +91,8 @@ class Experiment:
         used = self.used.copy()
         used[used] = ~left_out
         kept = Experiment.of(
-            self.name, self.surface, self.path, self.taken.select(used), self.files
+            self.name, self.surface, self.path, self.taken.select(used), self.files,
+            self.switched_off,
         )
         return replace(kept, taken=self.taken, used=used)
 
