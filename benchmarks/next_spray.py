@@ -40,10 +40,11 @@ SURE = 0.8
 
 
 def run_one(job: tuple[int, str, float]) -> dict:
-    """Paint, diagnose; where that leaves it open, do the first proposed spray and diagnose both."""
+    """Paint and diagnose; where that leaves it open, spray what is proposed and diagnose both."""
     warnings.simplefilter('ignore')
-    import paint_deposition as pd
     from tests.virtual_paint_shop.shop import generate
+
+    import paint_deposition as pd
 
     seed, truth, scale = job
     with tempfile.TemporaryDirectory() as name:
@@ -73,8 +74,9 @@ def sprayed(painted, truth: str, scale: float, spray, seed: int):
 
 def read(painted, folder: Path):
     """The campaign as a user would read it from its files."""
-    from paint_deposition.files.campaign_file import read_campaign
     from tests.virtual_paint_shop.files import write
+
+    from paint_deposition.files.campaign_file import read_campaign
 
     return read_campaign(write(painted, folder))
 
@@ -91,7 +93,7 @@ def said(diagnosis) -> dict:
 
 def table(records: list[dict]) -> str:
     """The scores as lines, each with its 95 % interval."""
-    seen = [r for r in records if r['first']['verdict'] != 'none_missing']
+    seen = [r for r in records if not _is_none(r['first'])]
     opened = [r for r in seen if 'second' in r and r['truth'] in r['spray']['separates']]
     away = [r for r in seen if 'second' in r and r['truth'] not in r['spray']['separates']]
     named = [_named(r['second']) for r in opened]
@@ -99,8 +101,7 @@ def table(records: list[dict]) -> str:
         ('narrowed to one effect', [n is not None for n in named], '>= 80'),
         ('  the true one', [n == r['truth'] for n, r in zip(named, opened, strict=True)], ''),
         ('true one still among what is said', [_kept(r) for r in opened], ''),
-        ('  nothing missing, said then', [r['second']['verdict'] == 'none_missing' for r in opened],
-         ''),
+        ('  nothing missing, said then', [_is_none(r['second']) for r in opened], ''),
         ('true one not among what competed', [r in away for r in (*opened, *away)], ''),
         ('  named then all the same', [_named(r['second']) == r['truth'] for r in away], ''),
     ]  # fmt: skip
@@ -130,6 +131,10 @@ def _named(said: dict) -> str | None:
         if set(members) & set(said['accepted']) & set(EFFECTS) and probability > SURE
     ]  # fmt: skip
     return named[0][0] if len(named) == 1 and len(named[0]) == 1 else None
+
+
+def _is_none(said: dict) -> bool:
+    return said['verdict'] == 'none_missing'
 
 
 def _kept(record: dict) -> bool:

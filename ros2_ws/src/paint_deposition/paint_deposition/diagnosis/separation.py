@@ -64,7 +64,8 @@ class Predicted:
         amounts = solve_triangular(lower.T, target)[k:]
         if (amounts < self.low).any() or (amounts > self.high).any():
             # What is free comes first in the factor, so the last rows hold the amounts alone.
-            amounts = lsq_linear(lower.T[k:, k:], target[k:], bounds=(self.low, self.high)).x
+            bounds = (self.low, self.high)
+            amounts = lsq_linear(lower.T[k:, k:], target[k:], bounds, method='bvls').x
         return replace(self, amounts=amounts)
 
     def at_least_typical(self) -> 'Predicted':

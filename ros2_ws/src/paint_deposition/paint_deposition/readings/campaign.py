@@ -71,7 +71,15 @@ class Experiment:
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
-            name, surface, path, readings, means, points, readings, used, files or {},
+            name,
+            surface,
+            path,
+            readings,
+            means,
+            points,
+            readings,
+            used,
+            files or {},
             switched_off,
         )
 
@@ -91,7 +99,11 @@ class Experiment:
         used = self.used.copy()
         used[used] = ~left_out
         kept = Experiment.of(
-            self.name, self.surface, self.path, self.taken.select(used), self.files,
+            self.name,
+            self.surface,
+            self.path,
+            self.taken.select(used),
+            self.files,
             self.switched_off,
         )
         return replace(kept, taken=self.taken, used=used)
