@@ -12,7 +12,6 @@ import os
 import sys
 import tempfile
 import warnings
-from dataclasses import replace
 from pathlib import Path
 
 import click
@@ -42,7 +41,10 @@ SURE = 0.8
 def run_one(job: tuple[int, str, float]) -> dict:
     """Paint and diagnose; where that leaves it open, spray what is proposed and diagnose both."""
     warnings.simplefilter('ignore')
+    from tests.virtual_paint_shop.draw import stream
+    from tests.virtual_paint_shop.respray import sprayed_again
     from tests.virtual_paint_shop.shop import generate
+    from tests.virtual_paint_shop.truths import choose
 
     import paint_deposition as pd
 
@@ -54,22 +56,12 @@ def run_one(job: tuple[int, str, float]) -> dict:
         record = {'seed': seed, 'truth': truth, 'scale': scale, 'first': said(first)}
         _, sprays = first.proposals
         if sprays:
-            both = sprayed(painted, truth, scale, sprays[0], seed)
+            truths = choose(truth, stream(seed, 1), None, scale)
+            both = sprayed_again(painted, truths, sprays[0].experiment, sprays[0].changes, seed,
+                                 parcels=PARCELS)  # fmt: skip
             second = pd.diagnose(read(both, Path(name) / 'both'))
             record |= {'spray': sprays[0].to_dict(), 'second': said(second)}
         return record
-
-
-def sprayed(painted, truth: str, scale: float, spray, seed: int):
-    """The campaign with the part that a spray adds to it."""
-    from tests.virtual_paint_shop.draw import stream
-    from tests.virtual_paint_shop.respray import respray
-    from tests.virtual_paint_shop.truths import choose
-
-    truths = choose(truth, stream(seed, 1), None, scale)
-    experiment = next(e for e in painted.experiments if e.name == spray.experiment)
-    again = respray(painted.pattern, truths, experiment, spray.changes, seed, parcels=PARCELS)
-    return replace(painted, experiments=(*painted.experiments, again))
 
 
 def read(painted, folder: Path):

@@ -12,7 +12,7 @@ from .draw import stream, timed
 from .gauge import GaugeNoise, Readings, Spots, tabulate
 from .jobs import Job, Plan, record
 from .parcels import Pattern
-from .shop import PARCELS, USUAL_NOISE, Experiment
+from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment
 from .truths import Scene, Truth
 
 # A part's own level of film, as a share, and its gauge session's own zero [um].
@@ -23,6 +23,15 @@ STANDOFF_STEP_M, LONGER_OPEN_S = 0.06, 0.3
 # What vanishes with the field, and with the booth's air.
 OF_VOLTAGE = ('convex_attraction', 'edge_build', 'faraday_shielding')
 OF_DRAUGHT = ('air_drift',)
+
+
+def sprayed_again(
+    campaign: Campaign, truths: list[Truth], name: str, changes: Sequence[str], seed: int, **more
+) -> Campaign:
+    """The campaign with one more part like that of an experiment; see ``respray``."""
+    experiment = next(e for e in campaign.experiments if e.name == name)
+    again = respray(campaign.pattern, truths, experiment, changes, seed, **more)
+    return replace(campaign, experiments=(*campaign.experiments, again))
 
 
 def respray(
