@@ -174,3 +174,13 @@ def test_at_half_the_flow_the_tails_of_a_lag_are_half_too(study, lag):
     context = PathContext(Projection(), surface.down, surface.outward, surface.centre_m)
     usual = lag.on_path(experiment.path, context)
     np.testing.assert_array_equal(lag.on_path(changed, context).flow, 0.5 * usual.flow)
+
+
+def test_a_part_without_voltage_has_a_level_of_its_own(study):
+    (usual,) = study.campaign.experiments
+    off = replace(BY_KEY['voltage_off'].made(usual), name='off')
+    both = Study.of(Campaign((usual, off)))
+    level, other = both.nuisance[:, 0], both.nuisance[:, 1]
+    assert np.linalg.norm(other) == pytest.approx(10.0 * np.linalg.norm(level))
+    assert both.has(EFFECTS['edge_build']).tolist() == [True] * len(usual) + [False] * len(off)
+    assert both.has(EFFECTS['sag']).all()

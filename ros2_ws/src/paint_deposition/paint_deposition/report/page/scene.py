@@ -15,7 +15,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, base_layout
-from paint_deposition.report.style import ACCENT, INK, MUTED
+from paint_deposition.report.style import INK, MUTED
 
 SURFACE = '#c3c9cf'
 # Few readings beyond the end of the colours do not take the contrast from all others.
@@ -96,9 +96,9 @@ def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
                marker={'size': 3, 'color': INK}),
         _marks(wanted + 2.0 * LIFT_M * experiment.surface.outward, mode='markers+text',
                name='to measure', text=[f'<b>{number}</b>' for number, _ in numbered],
-               textposition='top center', textfont={'size': 14, 'color': ACCENT},
-               marker={'size': 7, 'symbol': 'diamond', 'color': ACCENT,
-                       'line': {'color': 'white', 'width': 1}},
+               textposition='top center', textfont={'size': 14, 'color': INK},
+               marker={'size': 7, 'symbol': 'diamond', 'color': 'white',
+                       'line': {'color': INK, 'width': 2}},
                customdata=np.round(wanted, 4),
                hovertemplate='%{customdata[0]:.3f}, %{customdata[1]:.3f}, %{customdata[2]:.3f} m'
                              '<extra>measure</extra>'),
