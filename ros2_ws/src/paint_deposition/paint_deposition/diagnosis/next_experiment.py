@@ -29,8 +29,9 @@ EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-# Sprays that are named, and single changes of which two at once are tried.
-PROPOSED_SPRAYS, COMBINED = 15, 4
+# Sprays that are named, parts on which they are tried, and single changes of which two at once
+# are tried.
+PROPOSED_SPRAYS, TRIED_PARTS, COMBINED = 15, 2, 4
 # Explanations further apart than this are told apart for certain; beyond it only the cost counts.
 CERTAIN = 10.0
 # Share of the separation that one unit of cost is worth.
@@ -142,11 +143,10 @@ def _now(rivals: Rivals) -> _Pair:
 
 
 def _sprays(rivals: Rivals) -> list[Spray]:
-    campaign = rivals.study.campaign
     now = _now(rivals).imitation.separation
     tried = [
         _tried(rivals, experiment, change, now)
-        for experiment in campaign.experiments
+        for experiment in _telling(rivals)
         for change in MENU
     ]
     made = sorted(filter(None, tried), key=lambda one: -one.worth)
@@ -156,6 +156,14 @@ def _sprays(rivals: Rivals) -> list[Spray]:
         both = [_tried(rivals, best, change, now) for change in pairs(leading)]
         made = sorted([*made, *filter(None, both)], key=lambda one: -one.worth)
     return [one.spray for one in made[:PROPOSED_SPRAYS]]
+
+
+def _telling(rivals: Rivals) -> list[Experiment]:
+    """The experiments on which what competes shows most."""
+    campaign = rivals.study.campaign
+    shown = sum(predicted.change**2 for predicted in rivals.here)
+    by_part = np.bincount(campaign.experiment_of, shown)
+    return [campaign.experiments[k] for k in np.argsort(-by_part)[:TRIED_PARTS]]
 
 
 def _tried(rivals: Rivals, experiment: Experiment, change: Change, now: float) -> _Tried | None:

@@ -121,7 +121,7 @@ class Rivals:
         self, campaign: Campaign, forward: Forward, sigma_um: np.ndarray
     ) -> tuple[Predicted, ...]:
         """What each explanation, as found, predicts for other readings."""
-        values = [v for e in campaign.experiments for v in [_covariates(e, self.fit)]]
+        values = [_covariates(experiment, self.fit) for experiment in campaign.experiments]
         joined = [
             Covariate(same[0].name, np.concatenate([part.values for part in same]))
             for same in zip(*values, strict=True)
