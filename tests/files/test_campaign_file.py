@@ -3,6 +3,7 @@
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 
@@ -56,6 +57,13 @@ def test_the_sample_arrives_whole(repository):
     assert set(door.groups) - {''}
 
 
+def test_what_was_switched_off_is_taken_over(campaign, folder):
+    read = read_campaign(campaign(switched_off=['voltage', 'draught']))
+    assert read.experiments[0].switched_off == {'voltage', 'draught'}
+    one = read.experiments[0]
+    assert one.without(np.arange(len(one.readings)) == 0).switched_off == {'voltage', 'draught'}
+
+
 def test_down_and_the_model_are_taken_over(campaign, folder):
     read = read_campaign(campaign(top={'model': 'start.yaml'}, down=[0, 0, -9.81], name=7))
     assert read.model_file == str(folder / 'start.yaml')
@@ -97,6 +105,7 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'down': 'z'}, r"down is 'z'; expected \[x, y, z\]"),
         ({'down': [0, 0, float('nan')]}, r'down.2 is nan; expected \[x, y, z\]'),
         ({'down': [0, 0, 0]}, 'give the direction of gravity'),
+        ({'switched_off': ['light']}, r"switched_off.0 is 'light'; expected"),
         ({'top': {'models': 'm.yaml'}}, "campaign: unknown key 'models'; .* 'model'"),
         ({'top': {'model': 3}}, 'campaign: model is 3; expected the name of a model file'),
         ({'top': {'experiments': []}}, r'experiments is \[\]; expected a list of at least one'),

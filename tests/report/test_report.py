@@ -126,7 +126,7 @@ def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
         assert f'{figure:.2f}' in text
     assert 'The model lacked air drift' in text
     assert f'{diagnosis.noise_floor_um:.2f}' in text
-    assert 'the same passes at half the flow' in text
+    assert 'The same passes at half the flow' in text
     shift = next(iter(diagnosis.classes[0].parameters.values())).value
     assert f'{1e3 * shift:.3g}'.replace('-', '−') in text
 

@@ -10,12 +10,15 @@ import numpy as np
 import trimesh
 import yaml
 from rosbags.rosbag2 import StoragePlugin, Writer
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from .gauge import Readings
-from .jobs import Log
+from .jobs import Log, Plan
 from .shop import Campaign
 
+ATOMIZER_STATE = Path(__file__).parents[2] / 'ros2_ws/src/paint_msgs/msg/AtomizerState.msg'
+STATE_TYPE = 'paint_msgs/msg/AtomizerState'
+NOT_KNOWN = dict.fromkeys(('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv'), float('nan'))
 POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
 
 
@@ -35,7 +38,7 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
         trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
             folder / mesh
         )
-        write_bag(experiment.log, folder / experiment.name)
+        write_bag(experiment.log, folder / experiment.name, experiment.plan.flow)
         write_readings(experiment.readings, folder / f'{experiment.name}.csv', sigma_column)
         write_readings(
             experiment.heldout, folder / 'truth' / f'heldout_{experiment.name}.csv', sigma_column
@@ -50,6 +53,7 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
                 'pose_topic': POSE_TOPIC,
                 'state_topic': STATE_TOPIC,
                 'measurements': f'{experiment.name}.csv',
+                **_otherwise(experiment.plan),
             }
         )
     (folder / 'truth' / 'truth.json').write_text(json.dumps(campaign.truth, indent=1) + '\n')
@@ -58,9 +62,19 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
     return path
 
 
-def write_bag(log: Log, folder: Path) -> None:
-    """A rosbag2 folder (MCAP): PoseStamped poses, Bool triggers at their log time."""
+def _otherwise(plan: Plan) -> dict:
+    """What of a plan a campaign must say."""
+    found = {'down': [0.0, 0.0, 1.0]} if plan.upside_down else {}
+    return found | ({'switched_off': list(plan.switched_off)} if plan.switched_off else {})
+
+
+def write_bag(log: Log, folder: Path, flow: float = 1.0) -> None:
+    """A rosbag2 folder (MCAP): PoseStamped poses; triggers as Bool at their log time.
+
+    A flow other than the usual one is written with each trigger, as AtomizerState.
+    """
     types = get_typestore(Stores.ROS2_JAZZY)
+    types.register(get_types_from_msg(ATOMIZER_STATE.read_text(), STATE_TYPE))
     time_type = types.types['builtin_interfaces/msg/Time']
     header_type = types.types['std_msgs/msg/Header']
     pose_type = types.types['geometry_msgs/msg/PoseStamped']
@@ -71,7 +85,8 @@ def write_bag(log: Log, folder: Path) -> None:
     queue = []
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         poses = bag.add_connection(POSE_TOPIC, pose_type.__msgtype__, typestore=types)
-        states = bag.add_connection(STATE_TOPIC, bool_type.__msgtype__, typestore=types)
+        state_type = bool_type.__msgtype__ if flow == 1.0 else STATE_TYPE
+        states = bag.add_connection(STATE_TOPIC, state_type, typestore=types)
         for stamp, p, q in zip(
             log.stamps_ns.tolist(),
             log.positions_m.tolist(),
@@ -82,9 +97,12 @@ def write_bag(log: Log, folder: Path) -> None:
             message = pose_type(header, inner(point(*p), quaternion(*q)))
             queue.append((stamp, poses, types.serialize_cdr(message, pose_type.__msgtype__)))
         for stamp, on in zip(log.trigger_stamps_ns.tolist(), log.trigger_on.tolist(), strict=True):
-            queue.append(
-                (stamp, states, types.serialize_cdr(bool_type(on), bool_type.__msgtype__))
-            )
+            if flow == 1.0:
+                message = bool_type(on)
+            else:
+                header = header_type(time_type(stamp // 10**9, stamp % 10**9), '')
+                message = types.types[STATE_TYPE](header, on, flow=flow * on, **NOT_KNOWN)
+            queue.append((stamp, states, types.serialize_cdr(message, state_type)))
         for stamp, connection, data in sorted(queue, key=lambda entry: entry[0]):
             bag.write(connection, stamp, data)
 

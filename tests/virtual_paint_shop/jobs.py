@@ -32,6 +32,11 @@ class Plan:
     roll_rad: float = 0.0
     teach_error_m: float = 0.004
     sample_s: float = 0.024
+    from_below: bool = False  # passes from the bottom up (or the right on)
+    other_way: bool = False  # each pass run from its other end
+    flow: float = 1.0  # times the usual flow
+    upside_down: bool = False  # the part hangs upside down; the passes are turned with it
+    switched_off: tuple[str, ...] = ()  # of the cell: 'voltage', 'draught'
 
 
 @dataclass(frozen=True)
@@ -113,9 +118,10 @@ def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
         else (0.0, part.height_m)
     )
     for number in range(plan.passes):
-        place = (0.5 * (plan.passes - 1) - number) * plan.index_m
+        rank = plan.passes - 1 - number if plan.from_below else number
+        place = (0.5 * (plan.passes - 1) - rank) * plan.index_m
         start, stop = along[0] - plan.overrun_m, along[1] + plan.overrun_m
-        forward = number % 2 == 0
+        forward = (rank % 2 == 0) != plan.other_way
         path = np.arange(start, stop, STEP_M)
         path = path if forward else path[::-1]
         tcp, axis = _pass(part, plan, rng, path, place)

@@ -160,7 +160,7 @@ def _write(
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.diagnosis.verdict import percent
     from paint_deposition.effects.learned.law import LearnedLaw
-    from paint_deposition.report.words import effect_name, learned_words
+    from paint_deposition.report.words import apart_words, effect_name, learned_words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -189,10 +189,8 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
-        yield (
-            f'next: {spray.what}: {" and ".join(spray.separates)} then differ by '
-            f'{spray.separation:.1f} standard deviations, now {spray.now:.1f}'
-        )
+        todo = f'spray {spray.what}, and measure {spray.readings} points'
+        yield f'next: {todo}: {apart_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:

@@ -45,12 +45,24 @@ class NullModel:
         return NullModel(columns, nuisance, raw, lower, solve_triangular(lower, raw, lower=True))
 
     @staticmethod
-    def around(fit: Fit, nuisance: np.ndarray) -> 'NullModel':
-        """Linear around a fit, with directions (P, n) over the noise that carry no meaning."""
-        prior = fit.parameters.prior
-        raw = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
-        columns = np.hstack([fit.jacobian @ prior.factor, nuisance])
-        return NullModel.of(columns, raw, nuisance.shape[1])
+    def around(fit: Fit, nuisance: np.ndarray, apart: frozenset[str] = frozenset()) -> 'NullModel':
+        """Linear around a fit, with nuisance directions (P, n) over the noise.
+
+        Args:
+            fit: of the model.
+            nuisance: directions that carry no meaning.
+            apart: ids of effects in it that the null hypothesis does not have: what they
+                contribute to the film counts as deviation.
+        """
+        prior, entries = fit.parameters.prior, fit.parameters.of_effects
+        pattern = len(fit.vector) - len(entries)
+        kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
+        # The shape of an effect that is not there contributes nothing; its amplitude does.
+        shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
+        counted = kept | ~shape
+        raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
+        directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
+        return NullModel.of(np.hstack([directions, nuisance]), raw, nuisance.shape[1])
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""

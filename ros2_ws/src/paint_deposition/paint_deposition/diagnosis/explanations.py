@@ -204,7 +204,9 @@ def _of_effect(
         yield Explanation(effect.id, columns, sides, law_share / len(shapes), law)
     for random in free:
         direction = effect.covariates[random.basis.law.covariate]
-        yield of_random(effect.id, study, random, (1.0 - law_share) / len(free), (direction,))
+        share = (1.0 - law_share) / len(free)
+        found = of_random(effect.id, study, random, share, (direction,))
+        yield replace(found, columns=found.columns * study.has(effect)[:, np.newaxis])
 
 
 def _free_laws(study: Study, model: DepositionModel, effect: type[Effect]) -> list[RandomLaw]:

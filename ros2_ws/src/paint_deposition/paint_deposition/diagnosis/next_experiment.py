@@ -1,63 +1,79 @@
-"""What to measure and what to spray next, to discriminate between two explanations.
+"""What to measure and what to spray next, to tell apart the explanations that compete.
 
-Their separation is what is left of the change that one makes to the readings after the pattern and
-the other have been refitted (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). More
-readings increase it where the two differ; another spray makes them differ.
+Their separation, see ``separation``, is computed for the readings at hand and for these together
+with those of a further experiment. The experiment that best separates each explanation
+from its nearest rival comes first; its cost decides between experiments that are about as good.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
+from itertools import permutations
 from typing import Any
 
 import numpy as np
 
-from paint_deposition.diagnosis.sensitivities import neutral_shapes, sensitivity
+from paint_deposition.diagnosis.rivals import Rivals, rivals_of
+from paint_deposition.diagnosis.separation import Imitation, Predicted, imitate
+from paint_deposition.diagnosis.sprays import MENU, Change, pairs
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.forward import Forward
-from paint_deposition.fitting.least_squares import Fit, derivatives
 from paint_deposition.fitting.study import Study
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.readings.campaign import Campaign, Experiment
-from paint_deposition.readings.readings import Readings
+from paint_deposition.readings.readings import PointMeans, Readings
 
 CANDIDATES = 220
 PROPOSED_POINTS = 8
 # Gauges are not to be trusted next to a free edge [m], and readings are spread out [m].
 EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
+# A point with less than this share of the mean film was hardly painted.
+PAINTED = 0.2
+# Sprays that are named, parts on which they are tried, and single changes of which two at once
+# are tried.
+PROPOSED_SPRAYS, TRIED_PARTS, COMBINED = 15, 2, 4
+# Explanations further apart than this are told apart for certain; beyond it only the cost counts.
+CERTAIN = 10.0
+# Share of the separation that one unit of cost is worth.
+WORTH_OF_COST = 0.05
 
 
 @dataclass(frozen=True)
 class Place:
-    """A point to measure: position (3,) [m] and why."""
+    """A point to measure: position (3,) [m], the film predicted there [um], and why."""
 
     position_m: np.ndarray
     experiment: str
     why: str
+    film_um: float = float('nan')
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``next.measure`` in ``diagnosis.json``."""
         position = dict(zip(('x_m', 'y_m', 'z_m'), self.position_m.tolist(), strict=True))
-        return {'experiment': self.experiment, **position, 'why': self.why}
+        film = {'film_um': self.film_um} if np.isfinite(self.film_um) else {}
+        return {'experiment': self.experiment, **position, **film, 'why': self.why}
 
 
 @dataclass(frozen=True)
 class Spray:
-    """A proposed experiment: what, which two effects it separates, and how well.
+    """A proposed experiment.
 
     Attributes:
         what: in words; names the part where there are several.
-        separates: two effect ids.
-        separation: standard deviations between the two effects with it.
+        separates: the explanations that it is to tell apart, effect ids or 'unknown'.
+        separation: standard deviations between the two that are least apart with it.
         now: the same without it.
+        readings: number of points to be measured on the new part.
+        experiment: the part that is painted anew. changes: what is done otherwise, by key.
     """
 
     what: str
-    separates: tuple[str, str]
+    separates: tuple[str, ...]
     separation: float
     now: float
+    readings: int = 0
+    experiment: str = ''
+    changes: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``next.spray`` in ``diagnosis.json``."""
@@ -66,177 +82,192 @@ class Spray:
             'separates': list(self.separates),
             'separation_sigma': self.separation,
             'separation_now_sigma': self.now,
+            'readings': self.readings,
+            'experiment': self.experiment,
+            'changes': list(self.changes),
         }
 
 
 @dataclass(frozen=True)
-class Rivals:
-    """Two explanations of the same readings: the base fit, and the effect of each."""
+class _Pair:
+    """Two explanations by number: the one shown, and the one that was refitted to imitate it."""
 
-    base: Fit
-    first: Effect
-    second: Effect
+    shown: int
+    imitator: int
+    imitation: Imitation
+
+
+@dataclass(frozen=True)
+class _Tried:
+    """A spray that was tried in the model."""
+
+    experiment: Experiment
+    change: Change
+    spray: Spray
+    worth: float
 
 
 def propose_for(
     diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
 ) -> tuple[list[Place], list[Spray]]:
-    """Places and sprays that would settle a diagnosis between its two leading explanations.
+    """Places and sprays that would settle a diagnosis between the explanations that compete.
 
-    These are the two most probable members of the leading class, or the leading effects of
-    the two most probable classes; without two of them nothing is proposed.
+    Without two of them nothing is proposed.
     """
-    found = diagnosis.classes
-    if not found:
-        return [], []
-    second = found[0].members[1] if len(found[0].members) > 1 else None
-    if second is None and len(found) > 1 and not diagnosis.accepted:
-        second = found[1].best
-    if second is None or found[0].best not in library or second not in library:
-        return [], []
-    values = {name: interval.value for name, interval in found[0].parameters.items()}
-    first = diagnosis.model.effect(found[0].best) or library[found[0].best](**values)
-    rival = neutral_shapes(library[second])[0]
-    return propose(diagnosis.study, Rivals(diagnosis.history[0].fit, first, rival))
+    rivals = rivals_of(diagnosis, library)
+    return ([], []) if rivals is None else propose(rivals)
 
 
-def propose(study: Study, rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
+def propose(rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
     """Places to measure on the parts at hand, and sprays, best first."""
-    sigma = study.noise.typical_um
-    here = _derivatives(study.campaign, rivals, study.sigma_um)
-    now = _separation([here])
-    names = rivals.first.id, rivals.second.id
-    sprays = []
-    for experiment, (what, change) in product(study.campaign.experiments, MENU.items()):
-        other = Campaign((replace(experiment, path=change(experiment.path, experiment)),))
-        there = _derivatives(other, rivals, np.full(len(other), sigma))
-        if len(study.campaign.experiments) > 1:
-            what = f'{what}, on {experiment.name}'
-        sprays.append(Spray(what, names, _separation([here, there]), now))
-    places = _places(study, rivals, here, sigma, seed)
-    return places, sorted(sprays, key=lambda spray: -spray.separation)[: len(MENU)]
+    return _places(rivals, seed), _sprays(rivals)
 
 
-@dataclass(frozen=True)
-class _Derivatives:
-    """Derivatives of the readings over the noise.
+def compared(free: np.ndarray, predicted: Sequence[Predicted]) -> list[_Pair]:
+    """Each explanation beside each other, the two that are least apart first.
 
-    By the pattern's parameters, by the first effect as it was found, and by the amplitudes of the
-    second.
+    Args:
+        free: (P, k) directions of unit variance in which the readings may deviate anyway.
+        predicted: what each explanation predicts for these readings.
     """
-
-    jacobian: np.ndarray
-    first: np.ndarray
-    second: np.ndarray
-
-    def at(self, k: int) -> '_Derivatives':
-        """Those of one reading."""
-        return _Derivatives(self.jacobian[[k]], self.first[[k]], self.second[[k]])
+    found = [
+        _Pair(shown, imitator, imitate(free, predicted[shown], predicted[imitator]))
+        for shown, imitator in permutations(range(len(predicted)), 2)
+    ]
+    return sorted(found, key=lambda pair: pair.imitation.separation)
 
 
-def _derivatives(campaign: Campaign, rivals: Rivals, sigma_um: np.ndarray) -> _Derivatives:
-    forward = Forward(campaign)
-    base = rivals.base
-    jacobian = derivatives(forward, base.parameters, base.vector, sigma_um)
-    without = forward.predict_um(base.model)
-    first = (forward.predict_um(base.model.with_effect(rivals.first)) - without) / sigma_um
-    second = sensitivity(forward, base, rivals.second, sigma_um).columns
-    return _Derivatives(jacobian, first, second)
+def _now(rivals: Rivals) -> _Pair:
+    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
+    return compared(free, rivals.here)[0]
 
 
-def _separation(parts: list[_Derivatives]) -> float:
-    """Standard deviations of the first effect's change that the second cannot imitate."""
-    fitted = np.vstack([np.hstack([p.jacobian, p.second]) for p in parts])
-    change = np.concatenate([p.first for p in parts])
-    priors = np.eye(fitted.shape[1]) * 1e-3
-    solved, *_ = np.linalg.lstsq(
-        np.vstack([fitted, priors]), np.concatenate([change, np.zeros(len(priors))]), rcond=None
-    )
-    return float(np.linalg.norm(change - fitted @ solved))
+def _sprays(rivals: Rivals) -> list[Spray]:
+    now = _now(rivals).imitation.separation
+    tried = [
+        _tried(rivals, experiment, change, now)
+        for experiment in _telling(rivals)
+        for change in MENU
+    ]
+    made = sorted(filter(None, tried), key=lambda one: -one.worth)
+    if made:
+        best = made[0].experiment
+        leading = [one.change for one in made if one.experiment is best][:COMBINED]
+        both = [_tried(rivals, best, change, now) for change in pairs(leading)]
+        made = sorted([*made, *filter(None, both)], key=lambda one: -one.worth)
+    return [one.spray for one in made[:PROPOSED_SPRAYS]]
 
 
-def _places(
-    study: Study, rivals: Rivals, here: _Derivatives, sigma_um: float, seed: int
-) -> list[Place]:
-    """Add one point after the other, on any part, each where it separates most."""
-    parts_of = study.campaign.experiments
-    count = CANDIDATES // len(parts_of)
-    there = Campaign(tuple(_candidates(e, count, seed + k) for k, e in enumerate(parts_of)))
-    part, positions_m = there.experiment_of, there.positions_m
-    derivatives_there = _derivatives(there, rivals, np.full(len(part), sigma_um))
-    reached = Forward(there).predict_um(rivals.base.model)
-    usable = reached > 0.2 * np.mean(study.measured_um)
+def _telling(rivals: Rivals) -> list[Experiment]:
+    """The experiments on which what competes shows most."""
+    campaign = rivals.study.campaign
+    shown = sum(predicted.change**2 for predicted in rivals.here)
+    by_part = np.bincount(campaign.experiment_of, shown)
+    return [campaign.experiments[k] for k in np.argsort(-by_part)[:TRIED_PARTS]]
+
+
+def _tried(rivals: Rivals, experiment: Experiment, change: Change, now: float) -> _Tried | None:
+    """How well the readings would separate with this spray, None where it cannot be done."""
+    study = rivals.study
+    new = change.made(experiment)
+    if new is None:
+        return None
+    new = replace(new, name=f'{experiment.name}, next')
+    forward = Forward(Campaign((new,)), study.forward.effects)
+    film_um = forward.predict_um(rivals.fit.model)
+    if film_um.mean() < PAINTED * study.measured_um.mean():
+        return None
+    noise_um = study.noise.typical_um
+    new = _with_readings(new, new.measured_points.positions_m, film_um, noise_um)
+    together = Study.of(Campaign((*study.campaign.experiments, new)))
+    if len(together) != len(study) + len(film_um):
+        return None
+    sigma_um = together.sigma_um[len(study) :]
+    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.free_there(forward, sigma_um)])
+    free = np.hstack([free, together.nuisance])
+    there = rivals.there(Campaign((new,)), forward, sigma_um)
+    predicted = [here.with_more(more) for here, more in zip(rivals.here, there, strict=True)]
+    apart = compared(free, predicted)
+    what = f'the same passes {change.words}'
+    if len(study.campaign.experiments) > 1:
+        what += f', on {experiment.name}'
+    least = apart[0].imitation.separation
+    spray = Spray(
+        what, rivals.names, least, now, len(film_um), experiment.name, change.keys
+    )  # fmt: skip
+    return _Tried(experiment, change, spray, _worth(apart, change))
+
+
+def _worth(apart: Sequence[_Pair], change: Change) -> float:
+    """Separation of an explanation from its nearest rival, on average, less what it costs."""
+    nearest: dict[int, float] = {}
+    for pair in apart:
+        for one in (pair.shown, pair.imitator):
+            nearest[one] = min(nearest.get(one, CERTAIN), pair.imitation.separation)
+    return float(np.mean(list(nearest.values()))) * (1.0 - WORTH_OF_COST * change.cost)
+
+
+def _with_readings(
+    experiment: Experiment, positions_m: np.ndarray, film_um: np.ndarray, noise_um: float
+) -> Experiment:
+    """The experiment with predicted films (P,) [um] as its readings."""
+    noise = np.full(len(film_um), noise_um)
+    readings = Readings.of(positions_m, film_um, sigma_um=noise)
+    return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
+                   used=np.ones(len(readings), dtype=bool))  # fmt: skip
+
+
+def _places(rivals: Rivals, seed: int) -> list[Place]:
+    """Add one point after the other, on any part, each where it separates the least apart most."""
+    study = rivals.study
+    parts = study.campaign.experiments
+    both = [_with_candidates(rivals, e, seed + k) for k, e in enumerate(parts)]
+    together = Study.of(Campaign(tuple(both)), study.forward.effects)
+    part, positions_m = together.campaign.experiment_of, together.campaign.positions_m
+    taken = np.concatenate([np.arange(len(b)) < len(e) for b, e in zip(both, parts, strict=True)])
+    film_um, sigma_um = together.measured_um, together.sigma_um
+    if len(taken) != len(film_um):
+        return []
+    free = rivals.free_there(together.forward, sigma_um)
+    free = np.hstack([free, together.nuisance])
+    predicted = rivals.there(together.campaign, together.forward, sigma_um)
+    usable = ~taken & (film_um > PAINTED * np.mean(study.measured_um))
     places: list[Place] = []
-    parts = [here]
-    before = _separation(parts)
-    for _ in range(PROPOSED_POINTS):
-        best, gain = -1, before
-        for k in np.flatnonzero(usable):
-            value = _separation([*parts, derivatives_there.at(k)])
-            if value > gain:
-                best, gain = int(k), value
-        if best < 0:
-            break
-        parts.append(derivatives_there.at(best))
-        where = positions_m[best]
+    pair = compared(free[taken], [p.select(taken) for p in predicted])[0]
+    while usable.any() and len(places) < PROPOSED_POINTS:
+        shown, imitator = pair.shown, pair.imitator
+        gains = pair.imitation.gains(free, predicted[shown], predicted[imitator])
+        best = int(np.argmax(np.where(usable, gains, -1.0)))
+        before = pair.imitation.separation
+        after = float(np.hypot(before, np.sqrt(gains[best])))
+        names = rivals.found[shown].name, rivals.found[imitator].name
         why = (
-            f'separates {rivals.first.id} from {rivals.second.id}: '
-            f'{before:.1f} to {gain:.1f} standard deviations'
+            f'separates {names[0]} from {names[1]}: {before:.1f} to {after:.1f} standard '
+            'deviations'
         )
-        places.append(Place(where, parts_of[part[best]].name, why))
-        near = np.linalg.norm(positions_m - where, axis=1) < SPACING_M
+        places.append(Place(positions_m[best], parts[part[best]].name, why, float(film_um[best])))
+        near = np.linalg.norm(positions_m - positions_m[best], axis=1) < SPACING_M
         usable &= ~(near & (part == part[best]))
-        before = gain
+        taken[best] = True
+        pair = compared(free[taken], [p.select(taken) for p in predicted])[0]
     return places
 
 
-def _candidates(experiment: Experiment, count: int, seed: int) -> Experiment:
-    """The experiment with readings yet to be taken at random points, clear of free edges."""
-    surface = experiment.surface
+def _with_candidates(rivals: Rivals, experiment: Experiment, seed: int) -> Experiment:
+    """The experiment with further readings at random points, clear of free edges."""
+    study, surface = rivals.study, experiment.surface
+    count = CANDIDATES // len(study.campaign.experiments)
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
     inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]
-    readings = Readings.of(
-        surface.vertices_m[inside], np.zeros(len(inside)), normals=surface.normals[inside]
-    )
-    return Experiment.of(experiment.name, surface, experiment.path, readings)
-
-
-def _gun_rolled(path: SprayPath, experiment: Experiment) -> SprayPath:
-    rolled = path.rotation.copy()
-    rolled[:, :, :2] *= -1.0
-    return path.with_(rotation=rolled)
-
-
-def _passes_reversed(path: SprayPath, experiment: Experiment) -> SprayPath:
-    return path.with_(
-        spray_pass=np.where(path.spray_pass < 0, -1, path.spray_pass.max() - path.spray_pass),
-        velocity_m_per_s=-path.velocity_m_per_s,
-        since_on_s=path.until_off_s,
-        until_off_s=path.since_on_s,
-        since_off_s=path.until_on_s,
-        until_on_s=path.since_off_s,
-        from_turn_m=path.to_turn_m,
-        to_turn_m=path.from_turn_m,
-    )
-
-
-def _moved_off(distance_m: float) -> Callable[[SprayPath, Experiment], SprayPath]:
-    def moved(path: SprayPath, experiment: Experiment) -> SprayPath:
-        return path.with_(position_m=path.position_m - distance_m * path.rotation[:, :, 2])
-
-    return moved
-
-
-def _half_flow(path: SprayPath, experiment: Experiment) -> SprayPath:
-    return path.with_flow_scaled(0.5)
-
-
-MENU: dict[str, Callable[[SprayPath, Experiment], SprayPath]] = {
-    'the same passes with the gun rolled 180 deg about its axis': _gun_rolled,
-    'the same passes in reverse order and direction': _passes_reversed,
-    'the same passes 60 mm further off': _moved_off(0.06),
-    'the same passes 60 mm closer': _moved_off(-0.06),
-    'the same passes at half the flow': _half_flow,
-}
+    here = experiment.measured_points
+    positions = np.vstack([here.positions_m, surface.vertices_m[inside]])
+    normals = np.vstack([here.normals, surface.normals[inside]])
+    new = Experiment.of(
+        experiment.name, surface, experiment.path,
+        Readings.of(positions, np.zeros(len(positions)), normals=normals),
+        switched_off=experiment.switched_off,
+    )  # fmt: skip
+    film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(rivals.fit.model)
+    return _with_readings(new, positions, film_um, study.noise.typical_um)

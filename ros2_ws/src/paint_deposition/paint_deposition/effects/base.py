@@ -116,6 +116,9 @@ class Effect(BaseModel):
     # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
     # over a covariate is not that effect.
     free_law: ClassVar[str] = ''
+    # What the cell must switch off for the effect to vanish: 'voltage', 'draught', or '' where
+    # nothing does.
+    needs: ClassVar[str] = ''
     needs_whole_strokes: ClassVar[bool] = False
     needs_slope: ClassVar[bool] = False
     flux_factor: ClassVar[Callable[..., float] | None] = None
@@ -146,6 +149,13 @@ class Effect(BaseModel):
         """Whether all amplitudes are at the value at which the effect is absent."""
         described = self.parameters()
         return all(getattr(self, name) == described[name]['neutral'] for name in self.amplitudes())
+
+    @property
+    def absent(self) -> 'Effect':
+        """The same with all amplitudes neutral."""
+        described = self.parameters()
+        neutral = {name: described[name]['neutral'] for name in self.amplitudes()}
+        return self.model_copy(update=neutral)
 
     @classmethod
     def typical(cls) -> 'Effect':

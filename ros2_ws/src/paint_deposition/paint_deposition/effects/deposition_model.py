@@ -52,6 +52,13 @@ class DepositionModel(BaseModel):
         """The effect with this id, or None."""
         return next((e for e in self.effects if e.id == effect_id), None)
 
+    def without(self, switched_off: frozenset[str]) -> 'DepositionModel':
+        """A copy in which the effects that need one of these of the cell are absent."""
+        if not switched_off:
+            return self
+        left = tuple(e.absent if e.needs in switched_off else e for e in self.effects)
+        return self.model_copy(update={'effects': left})
+
     def with_effect(self, effect: Effect) -> 'DepositionModel':
         """A copy with the effect added, or replaced where one of its id is there."""
         others = tuple(e for e in self.effects if e.id != effect.id)

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field
@@ -47,6 +47,9 @@ class _Entry(BaseModel, extra='forbid'):
     )
     down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
         None, description='[x, y, z], the direction of gravity in the mesh frame'
+    )
+    switched_off: list[Literal['voltage', 'draught']] = Field(
+        [], description="a list of what the cell had switched off, of 'voltage' and 'draught'"
     )
 
 
@@ -97,4 +100,5 @@ def _read_experiment(
     if counts.rejected:
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
     readings = read_readings(files['measurements'])
-    return Experiment.of(name, surface, path, readings, files, trajectory.settings)
+    off = frozenset(entry.switched_off)
+    return Experiment.of(name, surface, path, readings, files, trajectory.settings, off)

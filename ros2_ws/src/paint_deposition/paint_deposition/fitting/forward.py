@@ -35,8 +35,7 @@ class Forward:
     """
 
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
-        self.campaign = campaign
-        self._effects = effects
+        self.campaign, self.effects = campaign, effects
         self._in_kernel = {effect.id: effect for effect in effects if _defines(effect, LAWS)}
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
         threads = min(numba.get_num_threads(), len(self._parts))
@@ -44,29 +43,37 @@ class Forward:
 
     def at(self, campaign: Campaign) -> 'Forward':
         """The same for the points of another campaign."""
-        return Forward(campaign, self._effects)
+        return Forward(campaign, self.effects)
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""
         stages = self._stages(model)
-        return self._shown_um(self._each(lambda part: part.film_um(stages)), stages)
+        return self._shown_um(self._each(_Part.film_um, stages), stages)
 
     def terms(self, model: DepositionModel) -> 'Terms':
         """What the readings are made of, for r, sigma1, sigma2 and the effects of a model."""
         stages = self._stages(model)
-        terms = self._each(lambda part: part.terms(stages))
+        terms = self._each(_Part.terms, stages)
         return Terms(model, lambda w: self._shown_um([w @ part for part in terms], stages))
 
-    def _each(self, work: Callable[['_Part'], np.ndarray]) -> list[np.ndarray]:
-        return list((self._pool.map if self._pool else map)(work, self._parts))
+    def _each(
+        self, work: Callable[['_Part', '_Stages'], np.ndarray], stages: list['_Stages']
+    ) -> list[np.ndarray]:
+        return list((self._pool.map if self._pool else map)(work, self._parts, stages))
 
-    def _shown_um(self, films_um: list[np.ndarray], stages: '_Stages') -> np.ndarray:
+    def _shown_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
         return np.concatenate([
-            shown_um(film, stages.effects, part.points(stages.slope))[: len(part.experiment)]
-            for part, film in zip(self._parts, films_um, strict=True)
+            shown_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
+            for part, film, one in zip(self._parts, films_um, stages, strict=True)
         ])  # fmt: skip
 
-    def _stages(self, model: DepositionModel) -> '_Stages':
+    def _stages(self, model: DepositionModel) -> list['_Stages']:
+        """The model of each part: without the effects of what was switched off."""
+        off = [part.experiment.switched_off for part in self._parts]
+        stages = {each: self._taken_apart(model.without(each)) for each in set(off)}
+        return [stages[each] for each in off]
+
+    def _taken_apart(self, model: DepositionModel) -> '_Stages':
         acting = tuple(effect for effect in model.effects if not effect.is_neutral)
         before = tuple(effect for effect in acting if _defines(effect, BEFORE_ARRIVAL))
         if any(_defines(effect, LAWS) for effect in before):

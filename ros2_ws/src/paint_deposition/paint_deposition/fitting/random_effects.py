@@ -14,6 +14,8 @@ from paint_deposition.readings.campaign import Campaign
 # Parts painted alike differ in their mean film by about this share: 4 % was found for clearcoat
 # on 40 panels, the gauge and the booth's day included.
 LEVEL_SHARE = 0.03
+# Without voltage, or without the booth's air, another share of the paint arrives.
+OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
@@ -29,14 +31,14 @@ class RandomEffects:
         kind: 'part level', or 'gauge zero'.
         unit: of their amounts.
         names: of the n parts or gauge sessions.
-        size: standard deviation of the amounts, in the unit.
+        sizes: (n,) standard deviations of the amounts, in the unit.
         columns: (P, n) directions over the noise, for amplitudes of unit variance.
     """
 
     kind: str
     unit: str
     names: tuple[str, ...]
-    size: float
+    sizes: np.ndarray
     columns: np.ndarray
 
 
@@ -78,9 +80,11 @@ def random_effects(
     """
     names = tuple(experiment.name for experiment in campaign.experiments)
     part_of = campaign.experiment_of[:, np.newaxis] == np.arange(len(names))
+    off = [bool(experiment.switched_off) for experiment in campaign.experiments]
+    share = np.where(off, OTHER_LEVEL_SHARE, LEVEL_SHARE)
     level = RandomEffects(
-        'part level', '%', names, 100.0 * LEVEL_SHARE,
-        _contrasts(part_of) * (LEVEL_SHARE * measured_um / sigma_um)[:, np.newaxis],
+        'part level', '%', names, 100.0 * share,
+        _contrasts(part_of) * share * (measured_um / sigma_um)[:, np.newaxis],
     )  # fmt: skip
     means, labels = campaign.means, campaign.readings.session
     sessions = tuple(dict.fromkeys(labels.tolist()))
@@ -89,7 +93,7 @@ def random_effects(
         [np.bincount(means.owner, labels == session) / means.repeats for session in sessions]
     )
     zero = RandomEffects(
-        'gauge zero', 'µm', sessions, SESSION_UM,
+        'gauge zero', 'µm', sessions, np.full(len(sessions), SESSION_UM),
         _contrasts(shares) * (SESSION_UM / sigma_um)[:, np.newaxis],
     )  # fmt: skip
     return tuple(effects for effects in (level, zero) if len(effects.names) > 1)
@@ -111,7 +115,7 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
     for kind in effects:
         count = len(kind.names)
         rows = slice(first, first + count)
-        contrasts = kind.size * _contrasts(np.eye(count))
+        contrasts = _contrasts(np.eye(count)) * kind.sizes
         values = contrasts @ mean[rows]
         deviations = np.sqrt(np.diag(contrasts @ covariance[rows, rows] @ contrasts.T))
         found += [

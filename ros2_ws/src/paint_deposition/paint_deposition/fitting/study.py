@@ -181,6 +181,11 @@ class Study:
         none = np.empty((len(self), 0))
         return np.hstack([none, *(effects.columns for effects in self.random_effects)])
 
+    def has(self, effect: type[Effect]) -> np.ndarray:
+        """(P,) bool, whether the cell had what an effect needs switched on."""
+        parts = [effect.needs not in e.switched_off for e in self.campaign.experiments]
+        return np.array(parts)[self.campaign.experiment_of]
+
     def rays(self, model: DepositionModel) -> list[Rays]:
         """The rays of each experiment for a model's pattern and projection."""
         key = (model.planar, model.projection)

@@ -35,6 +35,7 @@ class Experiment:
         taken: all readings; used: (N,) which of them are used.
         files: where mesh, trajectory and readings came from, for reports.
         settings: of the process, by name, where known.
+        switched_off: of the cell while the part was painted: 'voltage', 'draught'.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Experiment:
     used: np.ndarray
     files: dict[str, str] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
+    switched_off: frozenset[str] = frozenset()
 
     @staticmethod
     def of(
@@ -56,6 +58,7 @@ class Experiment:
         readings: Readings,
         files: dict[str, str] | None = None,
         settings: Mapping[str, float] | None = None,
+        switched_off: frozenset[str] = frozenset(),
     ) -> 'Experiment':
         """Match readings to the surface.
 
@@ -73,7 +76,7 @@ class Experiment:
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
             name, surface, path, readings, means, points, readings, used, files or {},
-            settings or {},
+            settings or {}, switched_off,
         )  # fmt: skip
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
@@ -92,8 +95,9 @@ class Experiment:
         used = self.used.copy()
         used[used] = ~left_out
         kept = Experiment.of(
-            self.name, self.surface, self.path, self.taken.select(used), self.files, self.settings
-        )
+            self.name, self.surface, self.path, self.taken.select(used), self.files,
+            self.settings, self.switched_off,
+        )  # fmt: skip
         return replace(kept, taken=self.taken, used=used)
 
     def __len__(self) -> int:

@@ -154,7 +154,9 @@ class ReportData:
 
     def _paint(self, index: int, model: DepositionModel) -> FilmIntegrator:
         experiment, points = self.experiments[index], self._surfaces[index]
-        integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
+        integrator = FilmIntegrator(
+            points, model.without(experiment.switched_off), 'double', experiment.surface.occluder
+        )
         integrator.add(experiment.path)
         return integrator
 

@@ -6,6 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.diagnosis.explanations import UNKNOWN
+from paint_deposition.diagnosis.next_experiment import Spray
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
@@ -61,6 +63,22 @@ def effect_name(effect_id: str) -> str:
         return f'learned law over {LEARNED[covariate].over}'
     name = effect_id.replace('tcp_', 'TCP ').replace('faraday', 'Faraday')
     return name.replace('_', ' ')
+
+
+def competing(spray: Spray) -> str:
+    """The explanations that a spray is to tell apart."""
+    names = [name for name in spray.separates if name != UNKNOWN]
+    found = [effect_name(name) for name in names]
+    return joined(found + ['a cause outside the library'] * (len(names) < len(spray.separates)))
+
+
+def apart_words(spray: Spray) -> str:
+    """How far apart the explanations are now, and with a spray."""
+    several = 'the two least apart of ' if len(spray.separates) > 2 else ''
+    return (
+        f'{several}{competing(spray)} then differ by {spray.separation:.1f} standard deviations, '
+        f'now by {spray.now:.1f}'
+    )
 
 
 def is_learned(effect_id: str) -> bool:

@@ -21,6 +21,7 @@ class AirDrift(Effect):
 
     id = 'air_drift'
     family = 'lateral shift'
+    needs = 'draught'
     covariates = MappingProxyType({'height_fraction': 0, 'standoff_ratio': 0})
     signature = 'pattern shifted in a direction fixed in the booth, however the gun is turned'
     rivals = ('tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag')

@@ -17,6 +17,7 @@ class ConvexAttraction(Effect):
 
     id = 'convex_attraction'
     family = 'curvature'
+    needs = 'voltage'
     covariates = MappingProxyType({'curvature_per_m': -1})
     free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'

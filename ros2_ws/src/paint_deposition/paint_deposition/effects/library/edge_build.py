@@ -17,6 +17,7 @@ class EdgeBuild(Effect):
 
     id = 'edge_build'
     family = 'boundary'
+    needs = 'voltage'
     covariates = MappingProxyType({'edge_distance_m': -1})
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'

@@ -18,6 +18,7 @@ class FaradayShielding(Effect):
 
     id = 'faraday_shielding'
     family = 'curvature'
+    needs = 'voltage'
     covariates = MappingProxyType({'curvature_per_m': -1, 'sky_view_factor': 1})
     free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'

@@ -226,7 +226,7 @@ def _sure(rows: list[dict]) -> str:
         names = joined([row['name'], *row['others']], 'or')
         text = f'{capital(names)} with a probability of {percent_words(row["found"].probability)}'
         if row['others']:
-            text += '; these readings cannot tell them apart'
+            text += '; these readings leave open which of them it is'
         found.append(f'{text}.')
     return ' '.join(found)
 

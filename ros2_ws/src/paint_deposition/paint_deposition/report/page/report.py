@@ -48,6 +48,8 @@ def report_html(data: ReportData) -> str:
         'percent': percent,
         'in_print': words.in_print,
         'effect': words.effect_name,
+        'capital': words.capital,
+        'film': lambda value: '' if np.isnan(value) else words.minus(f'{value:.1f}'),
         'step': words.step_words,
     }
     environment.filters.update(filters)
@@ -81,6 +83,7 @@ def report_html(data: ReportData) -> str:
         misfits=tables.misfit_rows(data),
         places=places,
         sprays=sprays[:SPRAYS_SHOWN],
+        separates=words.capital(words.competing(sprays[0])) if sprays else '',
         provenance=_provenance(),
         lined=all(len(p.line_m) for p in data.profiles),
         figures=[figure['name'] for figure in figures],

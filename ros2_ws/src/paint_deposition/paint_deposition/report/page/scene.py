@@ -15,7 +15,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, base_layout
-from paint_deposition.report.style import ACCENT, INK, MUTED
+from paint_deposition.report.style import INK, MUTED
 
 SURFACE = '#c3c9cf'
 # Few readings beyond the end of the colours do not take the contrast from all others.
@@ -79,28 +79,33 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
 
 
 def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
-    """The part with what was measured and what to measure next; None where nothing is."""
+    """The part with its present film, what was measured and what to measure next.
+
+    None where nothing is to be measured.
+    """
     experiment, (places, _) = data.experiments[index], data.proposals
     numbered = [(k, p) for k, p in enumerate(places, start=1) if p.experiment == experiment.name]
     if not numbered:
         return None
     positions, normals = _places_of(experiment)
+    film_um = data.painted[index][-1].film_um
     wanted = np.array([place.position_m for _, place in numbered])
     traces = [
-        _mesh('all', [], color=SURFACE),
+        _mesh('all', [], intensity=film_um, coloraxis='coloraxis'),
         _marks(positions + LIFT_M * normals, name='measured', hoverinfo='skip',
-               marker={'size': 3, 'color': MUTED}),
+               marker={'size': 3, 'color': INK}),
         _marks(wanted + 2.0 * LIFT_M * experiment.surface.outward, mode='markers+text',
                name='to measure', text=[f'<b>{number}</b>' for number, _ in numbered],
-               textposition='top center', textfont={'size': 14, 'color': ACCENT},
-               marker={'size': 7, 'symbol': 'diamond', 'color': ACCENT,
-                       'line': {'color': 'white', 'width': 1}},
+               textposition='top center', textfont={'size': 14, 'color': INK},
+               marker={'size': 7, 'symbol': 'diamond', 'color': 'white',
+                       'line': {'color': INK, 'width': 2}},
                customdata=np.round(wanted, 4),
                hovertemplate='%{customdata[0]:.3f}, %{customdata[1]:.3f}, %{customdata[2]:.3f} m'
                              '<extra>measure</extra>'),
     ]  # fmt: skip
     scene = _scene(experiment, [0.0, 1.0], experiment.surface.vertices_m, PANE_ASPECT)
-    return {'data': traces, 'layout': _scene_layout(420, 0, 0, scene=scene)}
+    colours = _colours(FILM, FILM_COLOURS, 0.0, round_up(float(film_um.max())))
+    return {'data': traces, 'layout': _scene_layout(460, 0, 60, scene=scene, coloraxis=colours)}
 
 
 def _places_of(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,155 @@
+"""A further part, painted otherwise, in the same hidden world as a campaign's parts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from .bench import Bench
+from .draw import stream, timed
+from .gauge import GaugeNoise, Readings, Spots, tabulate
+from .jobs import Job, Plan, record
+from .parcels import Pattern
+from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment
+from .truths import Scene, Truth
+
+# A part's own level of film, as a share, and its gauge session's own zero [um].
+LEVEL, SESSION_UM = 0.03, 0.3
+# Share of the paint that still arrives without voltage.
+WITHOUT_VOLTAGE = 0.75
+STANDOFF_STEP_M, LONGER_OPEN_S = 0.06, 0.3
+# What vanishes with the field, and with the booth's air.
+OF_VOLTAGE = ('convex_attraction', 'edge_build', 'faraday_shielding')
+OF_DRAUGHT = ('air_drift',)
+
+
+def sprayed_again(
+    campaign: Campaign, truths: list[Truth], name: str, changes: Sequence[str], seed: int, **more
+) -> Campaign:
+    """The campaign with one more part like that of an experiment; see ``respray``."""
+    experiment = next(e for e in campaign.experiments if e.name == name)
+    again = respray(campaign.pattern, truths, experiment, changes, seed, **more)
+    return replace(campaign, experiments=(*campaign.experiments, again))
+
+
+def respray(
+    pattern: Pattern,
+    truths: list[Truth],
+    experiment: Experiment,
+    changes: Sequence[str],
+    seed: int,
+    *,
+    noise: GaugeNoise = USUAL_NOISE,
+    parcels: int = PARCELS,
+) -> Experiment:
+    """Paint another part like that of an experiment, with changes, and measure the same points.
+
+    The hidden effects and the bell are the same; teaching, the part's level, the gauge's zero and
+    its noise are drawn anew. Raises ValueError for a change that the shop cannot do.
+    """
+    rng = stream(seed, 60)
+    part, plan = experiment.part, experiment.plan
+    for change in changes:
+        if change not in PLANS:
+            raise ValueError(f'no change {change!r}; there are: {", ".join(PLANS)}')
+        plan = PLANS[change](plan, part)
+    plan, motion = timed(part, plan, rng)
+    job = Job(f'{experiment.name}_next', part, plan, motion)
+    arriving = plan.flow
+    if 'voltage' in plan.switched_off:
+        truths = [t for t in truths if t.id not in OF_VOLTAGE]
+        arriving *= WITHOUT_VOLTAGE
+    if 'draught' in plan.switched_off:
+        truths = [t for t in truths if t.id not in OF_DRAUGHT]
+    if plan.upside_down:
+        truths = [_upside_down(t) for t in truths]
+    _, first = np.unique(experiment.readings.point, return_index=True)
+    x, _, z = experiment.readings.positions_m[np.sort(first)].T
+    sprayed = replace(pattern, K1_cm3_per_s=arriving * pattern.K1_cm3_per_s)
+    bench = Bench(seed, job, sprayed, parcels)
+    clean, _ = bench.readings([], x, z)
+    film, expected = bench.readings(truths, x, z)
+    level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
+    spots = Spots(x, z, np.full(x.size, ''), np.ones(x.size, int))
+    table = tabulate(
+        part, spots, level * film, level * expected, level * clean, noise, offset, rng
+    )
+    return Experiment(
+        job.name, part, plan, *part.mesh(), record(motion, plan.sample_s, rng), table,
+        _none(table), {},
+    )  # fmt: skip
+
+
+def _none(table: Readings) -> Readings:
+    return Readings(*(column[:0] for column in vars(table).values()))
+
+
+def _longer_open(plan: Plan, part) -> Plan:
+    margin = plan.gun_margin_m + LONGER_OPEN_S * plan.speed_m_per_s
+    return replace(plan, gun_margin_m=margin, overrun_m=max(plan.overrun_m, margin + 0.04))
+
+
+def _turned(plan: Plan, part) -> Plan:
+    direction = 'vertical' if plan.direction == 'horizontal' else 'horizontal'
+    across = part.height_m if direction == 'horizontal' else part.width_m
+    passes = int(np.clip(np.rint(across / plan.index_m) + 1, 3, 6))
+    return replace(plan, direction=direction, passes=passes)
+
+
+def _moved_off(distance_m: float):
+    return lambda plan, part: replace(plan, standoff_m=plan.standoff_m + distance_m)
+
+
+def _flow(factor: float):
+    return lambda plan, part: replace(plan, flow=factor * plan.flow)
+
+
+def _speed(factor: float):
+    return lambda plan, part: replace(plan, speed_m_per_s=factor * plan.speed_m_per_s)
+
+
+def _rolled(angle_rad: float):
+    return lambda plan, part: replace(plan, roll_rad=plan.roll_rad + angle_rad)
+
+
+def _off(setting: str):
+    return lambda plan, part: replace(plan, switched_off=(*plan.switched_off, setting))
+
+
+PLANS = {
+    'roll_180': _rolled(np.pi),
+    'roll_90': _rolled(0.5 * np.pi),
+    'reverse_order': lambda plan, part: replace(plan, from_below=not plan.from_below),
+    'other_way': lambda plan, part: replace(plan, other_way=not plan.other_way),
+    'further': _moved_off(STANDOFF_STEP_M),
+    'closer': _moved_off(-STANDOFF_STEP_M),
+    'half_flow': _flow(0.5),
+    'double_flow': _flow(2.0),
+    'half_speed': _speed(0.5),
+    'double_speed': _speed(2.0),
+    'longer_open': _longer_open,
+    'turned': _turned,
+    'upside_down': lambda plan, part: replace(plan, upside_down=not plan.upside_down),
+    'voltage_off': _off('voltage'),
+    'draught_off': _off('draught'),
+}
+
+
+def _upside_down(truth: Truth) -> Truth:
+    if truth.id == 'air_drift':
+        return replace(truth, drawn={'direction': -np.asarray(truth.drawn['direction'])})
+    if truth.id in ('fog_gradient', 'sag'):
+        return _Film(truth.amplitude, {'truth': truth})
+    return truth
+
+
+class _Film(Truth):
+    """A truth of gravity on the film, as a part sees it that hangs upside down, in its frame."""
+
+    def on_film(self, film_um, x, z, scene: Scene, film_at):
+        top = scene.part.height_m
+        return self.drawn['truth'].on_film(
+            film_um, -x, top - z, scene, lambda x, z: film_at(-x, top - z)
+        )

@@ -1,0 +1,87 @@
+"""Another part of the same hidden world: what is changed changes, the rest stays."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+from .files import write
+from .gauge import GaugeNoise
+from .jobs import drive
+from .respray import PLANS, respray, sprayed_again
+from .shop import generate
+from .truths import library
+
+FEW = {'parcels': 300_000, 'noise': GaugeNoise(floor_um=0.0, relative=0.0)}
+
+
+@pytest.fixture(scope='module')
+def painted():
+    return generate(5, readings=40, repeats=10, heldout=1, **FEW)
+
+
+def film(painted, changes=(), truths=()):
+    """Films at the same points; the level of the part is that of its seed."""
+    (experiment,) = painted.experiments
+    return respray(painted.pattern, list(truths), experiment, changes, 9, **FEW).readings.film_um
+
+
+@pytest.mark.slow
+def test_twice_the_flow_is_twice_the_film_and_half_the_speed_too(painted):
+    usual = film(painted)
+    assert film(painted, ['double_flow']) == pytest.approx(2.0 * usual, rel=1e-9)
+    assert film(painted, ['half_speed']).mean() == pytest.approx(2.0 * usual.mean(), rel=0.03)
+    assert film(painted, ['voltage_off']) == pytest.approx(0.75 * usual, rel=1e-9)
+
+
+@pytest.mark.slow
+def test_what_needs_voltage_is_gone_without_it(painted):
+    shielding = library()['faraday_shielding'](0.5)
+    assert np.ptp(film(painted, truths=[shielding]) / film(painted)) > 0.05
+    off = film(painted, ['voltage_off'], [shielding])
+    assert off == pytest.approx(film(painted, ['voltage_off']), rel=1e-9)
+
+
+@pytest.mark.slow
+def test_upside_down_fog_settles_on_the_other_end(painted):
+    fog = library()['fog_gradient'](3.0)
+    height = painted.experiments[0].part.height_m
+    _, first = np.unique(painted.experiments[0].readings.point, return_index=True)
+    z = painted.experiments[0].readings.positions_m[np.sort(first), 2]
+    for changes, share in (([], 1.0 - z / height), (['upside_down'], z / height)):
+        added = film(painted, changes, [fog]) - film(painted, changes)
+        assert np.corrcoef(added, share**1.5)[0, 1] > 0.999
+
+
+def test_order_and_way_are_those_of_the_plan(painted):
+    (experiment,) = painted.experiments
+
+    def passes(*changes):
+        plan = experiment.plan
+        for change in changes:
+            plan = PLANS[change](plan, experiment.part)
+        motion = drive(experiment.part, plan, np.random.default_rng(1))
+        ends = [motion.tcp_m[motion.pass_number == n][[0, -1]] for n in range(plan.passes)]
+        axis = 2 if plan.direction == 'horizontal' else 0
+        return [(e[:, axis].mean(), np.sign(e[1] - e[0])[2 - axis]) for e in ends]
+
+    usual, order, way = passes(), passes('reverse_order'), passes('other_way')
+    assert [w for _, w in order] == [w for _, w in usual][::-1]
+    assert np.allclose([p for p, _ in order], [p for p, _ in usual][::-1], atol=0.03)
+    assert [w for _, w in way] == [-w for _, w in usual]
+    assert np.allclose([p for p, _ in way], [p for p, _ in usual], atol=0.03)
+
+
+@pytest.mark.slow
+def test_a_campaign_says_what_was_done_otherwise(painted, tmp_path):
+    changes = ['draught_off', 'upside_down', 'half_flow']
+    both = sprayed_again(painted, [], 'door', changes, 9, **FEW)
+    entry = yaml.safe_load(write(both, tmp_path / 'both').read_text())['experiments'][1]
+    assert (entry['name'], entry['switched_off']) == ('door_next', ['draught'])
+    assert entry['down'] == [0.0, 0.0, 1.0]
+    assert 'door_next' not in json.loads((tmp_path / 'both/truth/truth.json').read_text())
+    with pytest.raises(ValueError, match=r"no change 'louder'; there are: roll_180"):
+        film(painted, ['louder'])
