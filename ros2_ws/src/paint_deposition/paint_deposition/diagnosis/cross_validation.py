@@ -6,11 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.diagnosis.evidence import NullModel
-from paint_deposition.diagnosis.learning import choose_laws
+from paint_deposition.diagnosis.learning import MOST_LAWS, choose_laws
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
-from paint_deposition.readings.residuals import root_mean_square
 
 # How many times some of the blocks are left out.
 FOLDS = 6
@@ -57,25 +56,31 @@ def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
 
 @dataclass(frozen=True)
 class Stage:
-    """One step of a search: what may be missing at a fit, and what was accepted there."""
+    """One step of a search.
+
+    Attributes:
+        space: what may be missing at a fit, whose effects' laws may be off.
+        plain: the model of that fit, its laws taken as they are.
+        accepted: effects that the space called for; none at the last stage.
+    """
 
     space: ModelSpace
-    accepted: frozenset[str]
+    plain: NullModel
+    accepted: frozenset[str] = frozenset()
 
 
-def nested_rmse_um(stages: Sequence[Stage], study: Study, learn: bool) -> float:
-    """Error on points left out when effects and learned laws are chosen without them, too [um].
+def nested_rmse_um(stages: Sequence[Stage], study: Study) -> np.ndarray:
+    """(n,) errors on points left out with effects and 0 to n - 1 laws learned without them [um].
 
     For each fold the search is repeated on the other points: as long as they call for the same
     effects, it goes on to the next stage; only the linearisations are shared by all folds.
 
     Args:
-        stages: of the search; nothing was accepted at the last one.
+        stages: of the search.
         study: the readings; some patches of points at a time are left out.
-        learn: whether laws are learned, too, or effects of the library alone.
     """
     blocks = study.patches()
-    deviation = np.empty(len(blocks))
+    deviation = np.empty((MOST_LAWS + 1, len(blocks)))
     for fold in np.array_split(np.random.default_rng(0).permutation(np.unique(blocks)), FOLDS):
         out = np.isin(blocks, fold)
         for stage in stages:
@@ -84,10 +89,13 @@ def nested_rmse_um(stages: Sequence[Stage], study: Study, learn: bool) -> float:
             if {cause for cause, _, _ in found} != stage.accepted:
                 break
         columns = [size * space.explanations[k].law for _, k, size in found]
-        if learn:
-            columns += _learned(space, part, columns, ~out)
-        deviation[out] = left_out(space.null, columns, out)
-    return root_mean_square(deviation * study.sigma_um)
+        given = np.hstack([stage.plain.columns, *columns])
+        null = NullModel.of(given[~out], stage.plain.raw[~out])
+        laws = choose_laws(null, part.explanations, space.freedom)
+        learned = [size * space.explanations[k].columns for k, size in laws]
+        for count in range(MOST_LAWS + 1):
+            deviation[count, out] = left_out(stage.plain, columns + learned[:count], out)
+    return np.sqrt(np.mean((deviation * study.sigma_um) ** 2, axis=1))
 
 
 def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
@@ -104,13 +112,3 @@ def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> n
     stop = null.columns.shape[1]
     amounts[stop - null.nuisance : stop] = 0.0
     return null.raw[out] - columns[out] @ amounts
-
-
-def _learned(
-    space: ModelSpace, part: ModelSpace, columns: list[np.ndarray], rows: np.ndarray
-) -> list[np.ndarray]:
-    """Directions (P, n) of the laws that some readings (P,) bool call for beside others."""
-    given = np.hstack([part.null.columns, *(c[rows] for c in columns)])
-    null = NullModel.of(given, part.null.raw)
-    laws = choose_laws(null, part.explanations, space.freedom)
-    return [size * space.explanations[k].columns for k, size in laws]

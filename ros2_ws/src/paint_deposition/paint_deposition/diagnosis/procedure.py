@@ -10,12 +10,11 @@
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from paint_deposition.diagnosis.cross_validation import Stage, nested_rmse_um
-from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.diagnosis.learning import choose_laws
 from paint_deposition.diagnosis.model_space import SURE, Group, Model, ModelSpace
@@ -66,17 +65,16 @@ def diagnose(
     stages: list[Stage] = []
     while len(stages) < ROUNDS and (effects := _started(space)):
         progress('refitting with ' + ', '.join(effect.id for effect in effects))
-        stages.append(Stage(space, frozenset(effect.id for effect in effects)))
+        stages.append(Stage(space, run.plain, frozenset(effect.id for effect in effects)))
         run.fit = run.fitted_with([*run.taken, *effects])
         space = run.linearise()
     groups = _tested(run)
     if len(groups) < sum(len(stage.accepted) for stage in stages):
         space = run.linearise()
-    stages.append(Stage(space, frozenset()))
-    holdout_um = nested_rmse_um(stages, run.study, learn=False)
-    _accept(run, groups, holdout_um)
+    errors_um = nested_rmse_um([*stages, Stage(space, run.plain)], run.study)
+    _accept(run, groups, errors_um[0])
     progress('learning what the laws leave unexplained')
-    _learn(run, stages, holdout_um)
+    _learn(run, space, errors_um)
     return _conclude(run, space, p_value)
 
 
@@ -137,15 +135,11 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
         run.accepted.append(run.described(members, probability, before))
 
 
-def _learn(run: Run, stages: Sequence[Stage], without_um: float) -> None:
-    """Add laws of any form if they improve the prediction of points left out."""
-    null = NullModel.around(run.fit, run.study.nuisance)
-    space = stages[-1].space
-    chosen = choose_laws(null, space.explanations, space.freedom)
+def _learn(run: Run, space: ModelSpace, errors_um: np.ndarray) -> None:
+    """Add as many laws of any form as improve the prediction of points left out."""
+    enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
+    chosen = choose_laws(run.plain, space.explanations, space.freedom)[:enough]
     if not chosen:
-        return
-    with_um = nested_rmse_um(stages, run.study, learn=True)
-    if with_um > (1.0 - LEAST_GAIN) * without_um:
         return
     fit = run.learned([(space.explanations[k], size) for k, size in chosen])
     if fit.objective > run.fit.objective:
@@ -154,7 +148,7 @@ def _learn(run: Run, stages: Sequence[Stage], without_um: float) -> None:
         e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
     ]
     before = run.history[-1]
-    run.record(' and '.join(laws), fit, with_um)
+    run.record(' and '.join(laws), fit, errors_um[len(chosen)])
     run.accepted += [run.described((law,), 1.0, before) for law in laws]
 
 

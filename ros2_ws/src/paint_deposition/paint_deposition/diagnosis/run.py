@@ -113,6 +113,11 @@ class Run:
         return space
 
     @property
+    def plain(self) -> NullModel:
+        """The newest model as it is, with nothing missing."""
+        return NullModel.around(self.fit, self.study.nuisance)
+
+    @property
     def taken(self) -> list[Effect]:
         """The candidates that the newest model has."""
         return self._candidates_in(self.fit)
