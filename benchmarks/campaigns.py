@@ -150,7 +150,7 @@ class PaintedCase:
             parameters.encode(parameters.start),
             np.ones(len(forward.campaign)),
         )
-        return slopes * parameters.prior[1]
+        return slopes * parameters.prior.width
 
     @property
     def passes(self) -> list[int]:

@@ -73,8 +73,9 @@ def respray(
     film, expected = bench.readings(truths, x, z)
     level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
     spots = Spots(x, z, np.full(x.size, ''), np.ones(x.size, int))
+    marks = np.empty((x.size, 0))  # what each effect does by itself is not asked here
     table = tabulate(
-        part, spots, level * film, level * expected, level * clean, noise, offset, rng
+        part, spots, level * film, level * expected, level * clean, marks, noise, offset, rng
     )
     return Experiment(
         job.name, part, plan, *part.mesh(), record(motion, plan.sample_s, rng), table,
