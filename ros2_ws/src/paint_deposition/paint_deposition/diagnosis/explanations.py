@@ -211,14 +211,16 @@ def _of_effect(
 
 def _free_laws(study: Study, model: DepositionModel, effect: type[Effect]) -> list[RandomLaw]:
     size = FREE_ADDITION_UM if effect.free_law == 'addition' else FREE_FACTOR
-    own = [name for name in effect.covariates if name in CURVES]
-    bases = [curve_basis(study, model, name, effect.free_law) for name in own]
-    return [
-        basis.random(size, length)
-        for basis in bases
-        if basis is not None
-        for length in FREE_LENGTHS
-    ]
+    found = []
+    for name in (name for name in effect.covariates if name in CURVES):
+        basis = curve_basis(study, model, name, effect.free_law)
+        if basis is None:
+            continue
+        within = effect.acts_within.get(name)
+        among = None if within is None else basis.within(*within)
+        if among is None or among.any():
+            found += [basis.random(size, length, among) for length in FREE_LENGTHS]
+    return found
 
 
 def _shapeless(

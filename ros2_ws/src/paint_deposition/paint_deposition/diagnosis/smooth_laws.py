@@ -53,6 +53,13 @@ class Basis:
     knots: np.ndarray
     shortest: float
 
+    def within(self, low: float, high: float) -> np.ndarray:
+        """(K,) knots of a curve at values of its covariate in a range."""
+        axis = CURVES[self.law.covariate].axis
+        first, last = axis(self.settings['low']), axis(self.settings['high'])
+        values = np.linspace(first, last, len(self.knots))
+        return (values >= axis(low)) & (values <= axis(high))
+
     def random(self, size: float, length: float, among: np.ndarray | None = None) -> 'RandomLaw':
         """Random laws.
 

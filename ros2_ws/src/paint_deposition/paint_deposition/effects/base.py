@@ -113,6 +113,8 @@ class Effect(BaseModel):
     # Covariates along which the law may be off, each with the direction in which a law of any form
     # over it must go: it rises (1), falls (-1), or either (0).
     covariates: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    # The range of a covariate in which the effect acts at all; default everywhere.
+    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
     # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
     # over a covariate is not that effect.
     free_law: ClassVar[str] = ''

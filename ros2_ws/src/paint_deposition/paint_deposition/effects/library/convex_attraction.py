@@ -1,5 +1,6 @@
 """Attraction to convex lines and corners."""
 
+import math
 from types import MappingProxyType
 
 import numpy as np
@@ -19,6 +20,7 @@ class ConvexAttraction(Effect):
     family = 'curvature'
     needs = 'voltage'
     covariates = MappingProxyType({'curvature_per_m': -1})
+    acts_within = MappingProxyType({'curvature_per_m': (-math.inf, 0.0)})
     free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'
     rivals = ('gauge_curvature_bias',)

@@ -1,5 +1,6 @@
 """Recesses that the field does not reach."""
 
+import math
 from types import MappingProxyType
 
 import numpy as np
@@ -20,6 +21,7 @@ class FaradayShielding(Effect):
     family = 'curvature'
     needs = 'voltage'
     covariates = MappingProxyType({'curvature_per_m': -1, 'sky_view_factor': 1})
+    acts_within = MappingProxyType({'curvature_per_m': (0.0, math.inf)})
     free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'
     rivals = ('gauge_curvature_bias', 'occlusion')
