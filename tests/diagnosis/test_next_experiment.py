@@ -180,7 +180,12 @@ def test_a_part_without_voltage_has_a_level_of_its_own(study):
     (usual,) = study.campaign.experiments
     off = replace(BY_KEY['voltage_off'].made(usual), name='off')
     both = Study.of(Campaign((usual, off)))
-    level, other = both.nuisance[:, 0], both.nuisance[:, 1]
-    assert np.linalg.norm(other) == pytest.approx(10.0 * np.linalg.norm(level))
+    (level, *_) = both.random_effects
+    first, other = level.columns.T
+    assert not first.any()  # there is no other part that it could differ from
+    rows = both.campaign.experiment_of == 1
+    np.testing.assert_allclose(other, np.where(rows, 0.3 * both.measured_um / both.sigma_um, 0.0))
+    double = both.residuals(both.measured_um * np.where(rows, 2.0, 1.0))
+    np.testing.assert_allclose(double.predicted_um, both.measured_um)
     assert both.has(EFFECTS['edge_build']).tolist() == [True] * len(usual) + [False] * len(off)
     assert both.has(EFFECTS['sag']).all()

@@ -1,7 +1,8 @@
 """Random effects: by how much parts and gauge sessions differ for reasons that carry no meaning.
 
 They are drawn anew for every part and session. Only differences count: what all have in common
-is for K1 and the effects to explain.
+is for K1 and the effects to explain. A part that was painted with something switched off has a
+level of its own, which says nothing of the others.
 """
 
 from dataclasses import dataclass
@@ -31,14 +32,14 @@ class RandomEffects:
         kind: 'part level', or 'gauge zero'.
         unit: of their amounts.
         names: of the n parts or gauge sessions.
-        sizes: (n,) standard deviations of the amounts, in the unit.
+        mixing: (n, n) amounts in the unit for amplitudes of unit variance.
         columns: (P, n) directions over the noise, for amplitudes of unit variance.
     """
 
     kind: str
     unit: str
     names: tuple[str, ...]
-    sizes: np.ndarray
+    mixing: np.ndarray
     columns: np.ndarray
 
 
@@ -80,11 +81,12 @@ def random_effects(
     """
     names = tuple(experiment.name for experiment in campaign.experiments)
     part_of = campaign.experiment_of[:, np.newaxis] == np.arange(len(names))
-    off = [bool(experiment.switched_off) for experiment in campaign.experiments]
-    share = np.where(off, OTHER_LEVEL_SHARE, LEVEL_SHARE)
+    off = np.array([bool(experiment.switched_off) for experiment in campaign.experiments])
+    mixing = np.diag(OTHER_LEVEL_SHARE * off)
+    mixing[np.ix_(~off, ~off)] = LEVEL_SHARE * _contrasts(np.count_nonzero(~off))
     level = RandomEffects(
-        'part level', '%', names, 100.0 * share,
-        _contrasts(part_of) * share * (measured_um / sigma_um)[:, np.newaxis],
+        'part level', '%', names, 100.0 * mixing,
+        part_of @ mixing * (measured_um / sigma_um)[:, np.newaxis],
     )  # fmt: skip
     means, labels = campaign.means, campaign.readings.session
     sessions = tuple(dict.fromkeys(labels.tolist()))
@@ -93,8 +95,8 @@ def random_effects(
         [np.bincount(means.owner, labels == session) / means.repeats for session in sessions]
     )
     zero = RandomEffects(
-        'gauge zero', 'µm', sessions, np.full(len(sessions), SESSION_UM),
-        _contrasts(shares) * (SESSION_UM / sigma_um)[:, np.newaxis],
+        'gauge zero', 'µm', sessions, SESSION_UM * _contrasts(len(sessions)),
+        SESSION_UM * shares @ _contrasts(len(sessions)) / sigma_um[:, np.newaxis],
     )  # fmt: skip
     return tuple(effects for effects in (level, zero) if len(effects.names) > 1)
 
@@ -115,9 +117,8 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
     for kind in effects:
         count = len(kind.names)
         rows = slice(first, first + count)
-        contrasts = _contrasts(np.eye(count)) * kind.sizes
-        values = contrasts @ mean[rows]
-        deviations = np.sqrt(np.diag(contrasts @ covariance[rows, rows] @ contrasts.T))
+        values = kind.mixing @ mean[rows]
+        deviations = np.sqrt(np.diag(kind.mixing @ covariance[rows, rows] @ kind.mixing.T))
         found += [
             Amount(kind.kind, name, float(value), float(deviation), kind.unit)
             for name, value, deviation in zip(kind.names, values, deviations, strict=True)
@@ -126,6 +127,6 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
     return tuple(found)
 
 
-def _contrasts(design: np.ndarray) -> np.ndarray:
-    """(P, n) of a design (P, n), without what all n have in common."""
-    return design - 1.0 / design.shape[1]
+def _contrasts(count: int) -> np.ndarray:
+    """(n, n) amounts without what all n have in common."""
+    return np.eye(count) - 1.0 / count
