@@ -5,7 +5,10 @@ from dataclasses import replace
 import numpy as np
 
 from paint_deposition.diagnosis.evidence import NullModel
+from paint_deposition.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.parameters import FreeParameters
@@ -71,7 +74,21 @@ def fit_linear(
 
 def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
     """The null hypothesis around a fit, with nuisance directions (P, n) or none."""
-    return NullModel.around(fit, frozenset(), fit.nuisance if nuisance is None else nuisance)
+    return NullModel.around(fit, fit.nuisance if nuisance is None else nuisance)
+
+
+def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
+    """Curves of unit size over a covariate, for readings of which each has one value.
+
+    Args:
+        place: (P,) values, in knots from the first on.
+        knots: of the curve.
+        length: of correlation, in standard deviations of the values.
+    """
+    spread = float(np.std(place))
+    at = np.arange(knots)[:, np.newaxis] / spread
+    basis = Basis(CURVES['height_fraction'], {}, hat_weights(place, knots), at, 1.0 / spread)
+    return basis.random(1.0, length)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

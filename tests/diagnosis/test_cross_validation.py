@@ -1,18 +1,29 @@
 """Leaving out blocks by moving the fit linearly is refitting, where the model is linear."""
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from diagnosis.linear import KNOWN, PARAMETERS, bounds, fit_linear, linear_fit, null_of
-from paint_deposition.diagnosis import cross_validation
-from paint_deposition.diagnosis.cross_validation import hold_out, nested_rmse_um
+from diagnosis.linear import (
+    KNOWN,
+    PARAMETERS,
+    bounds,
+    fit_linear,
+    linear_fit,
+    null_of,
+    smooth_curves,
+)
+from paint_deposition.diagnosis import cross_validation, learning
+from paint_deposition.diagnosis.cross_validation import Stage, hold_out, left_out, nested_rmse_um
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.diagnosis.learning import MOST_LAWS
 from paint_deposition.diagnosis.model_space import ModelSpace
 from paint_deposition.diagnosis.sensitivities import Sensitivity
-from paint_deposition.diagnosis.smooth_laws import CurveBasis
-from paint_deposition.effects.learned import LEARNED
+from paint_deposition.diagnosis.smooth_laws import RandomLaw
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.readings.residuals import root_mean_square
 
@@ -60,69 +71,117 @@ def test_readings_left_out_are_predicted_worse_than_fitted_ones():
     assert worse == 20
 
 
-# Choosing causes and curves without the points left out.
+# Choosing causes and laws without the points left out.
 
-POINTS, SIGMA_UM = 80, 0.7
+POINTS, SIGMA_UM, KNOTS = 80, 0.7, 8
 PATCHES = np.arange(POINTS) // 8
-
-
-def space_of(change: np.ndarray, form: np.ndarray, seed: int = 0) -> ModelSpace:
-    """An effect of this form (P,) and curves over the place, on readings moved by a change."""
-    fit = linear_fit(np.random.default_rng(seed), POINTS)
-    base = null_of(fit)
-    null = NullModel.of(base.columns, base.raw + change)
-    law = Sensitivity(EdgeBuild(), ('peak',), form[:, np.newaxis], *bounds([1]))
-    knots = 8
-    at = np.linspace(0.0, knots - 1.0, POINTS)
-    film = np.maximum(0.0, 1.0 - np.abs(at[:, np.newaxis] - np.arange(knots)))
-    basis = CurveBasis(LEARNED['height_fraction'], 'factor', 0.0, 1.0, film, at.std())
-    values = basis.root(0.5)
-    curve = Explanation(
-        UNKNOWN, film @ values, np.zeros(values.shape[1]), 1.0, curve=(basis, values)
-    )
-    return ModelSpace(
-        null, [Explanation(EdgeBuild.id, law.columns, law.sides, 1.0, law), curve], np.inf
-    )
-
-
+PLACE = np.linspace(0.0, KNOTS - 1.0, POINTS)
 FORM = np.where(np.arange(POINTS) % 4 == 0, 2.0, 0.2)
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
 
 
-def nested(space: ModelSpace, curves: bool) -> float:
-    """In standard deviations of the noise."""
-    return nested_rmse_um(space, PATCHES, np.full(POINTS, SIGMA_UM), curves) / SIGMA_UM
+@dataclass(frozen=True)
+class Points:
+    """What the nested search reads of a study."""
+
+    sigma_um: np.ndarray
+
+    def patches(self) -> np.ndarray:
+        return PATCHES
 
 
-@pytest.mark.parametrize('curves', [False, True])
-def test_on_noise_the_nested_error_is_larger_than_the_fitted_one(curves):
+def learnable(random: RandomLaw) -> Explanation:
+    columns = random.change_um
+    return Explanation(UNKNOWN, columns, np.zeros(columns.shape[1]), 1.0, random=random)
+
+
+def space_of(change: np.ndarray, seed: int = 0, more: Sequence[Explanation] = ()) -> ModelSpace:
+    """Edge build and curves over the place, on readings of noise that a change (P,) moved."""
+    base = null_of(linear_fit(np.random.default_rng(seed), POINTS))
+    null = NullModel.of(base.columns, base.raw + change)
+    law = Sensitivity(EdgeBuild(), ('peak',), FORM[:, np.newaxis], *bounds([1]))
+    edge = Explanation(EdgeBuild.id, law.columns, law.sides, 1.0, law)
+    curves = learnable(smooth_curves(PLACE, KNOTS, 0.5))
+    return ModelSpace(null, [edge, curves, *more], np.inf)
+
+
+def nested(space: ModelSpace) -> np.ndarray:
+    """By the number of laws learned, in standard deviations of the noise."""
+    study = Points(np.full(POINTS, SIGMA_UM))
+    return nested_rmse_um([Stage(space, space.null)], study) / SIGMA_UM
+
+
+def test_on_noise_the_nested_errors_are_larger_than_the_fitted_one():
     for seed in range(5):
-        space = space_of(np.zeros(POINTS), FORM, seed)
         fitted = linear_fit(np.random.default_rng(seed), POINTS).residual
-        assert nested(space, curves) > root_mean_square(fitted)
+        assert nested(space_of(np.zeros(POINTS), seed)).min() > root_mean_square(fitted)
 
 
 def test_what_acts_lowers_the_nested_error_to_the_noise():
-    """The effect by its law; the wave, which no law has, by a learned curve only."""
-    effect = space_of(2.0 * FORM, FORM)
-    assert nested(effect, curves=False) == pytest.approx(1.0, abs=0.25)
-    wave = space_of(WAVE, FORM)
-    assert nested(wave, curves=False) > 1.7
-    assert nested(wave, curves=True) == pytest.approx(1.0, abs=0.3)
-    both = space_of(WAVE + 2.0 * FORM, FORM)
-    assert nested(both, curves=True) < 0.8 * nested(both, curves=False)
+    """The effect by its law; the wave, which no law has, by one learned curve."""
+    assert nested(space_of(2.0 * FORM))[0] == pytest.approx(1.0, abs=0.25)
+    without, *with_laws = nested(space_of(WAVE))
+    assert without > 1.7
+    assert with_laws == pytest.approx([1.0] * MOST_LAWS, abs=0.3)
+    without, *with_laws = nested(space_of(WAVE + 2.0 * FORM))
+    assert max(with_laws) < 0.8 * without
+
+
+def test_laws_chosen_on_all_points_flatter_and_nested_ones_do_not(monkeypatch):
+    """On noise alone, of thirty laws that explain nothing, the best one must be learned."""
+    monkeypatch.setattr(learning, 'WORTH_LEARNING', -np.inf)
+    blocks = [patch == PATCHES for patch in np.unique(PATCHES)]
+    without, chosen_on_all, chosen_inside = [], [], []
+    for seed in range(24):
+        random = np.random.default_rng([7, seed])
+        none = [learnable(smooth_curves(random.permutation(PLACE), KNOTS, 0.5)) for _ in range(30)]
+        space = space_of(np.zeros(POINTS), seed, none)
+        ((k, size),) = learning.choose_laws(space.null, space.explanations, np.inf)
+        columns = [size * space.explanations[k].columns]
+        errors = np.concatenate([left_out(space.null, columns, block) for block in blocks])
+        chosen_on_all.append(root_mean_square(errors))
+        before, after, *_ = nested(space)
+        without.append(before)
+        chosen_inside.append(after)
+    gain, nested_gain = np.subtract(without, chosen_on_all), np.subtract(without, chosen_inside)
+    assert gain.mean() > 3.0 * gain.std() / np.sqrt(len(gain))
+    assert nested_gain.mean() < 0.0
+
+
+@pytest.mark.parametrize('goes_on', [True, False])
+def test_the_search_goes_on_where_the_other_points_call_for_the_same(goes_on):
+    """Of two stages, each fold reaches the second if it accepts what was accepted at the first."""
+    first, second = space_of(2.0 * FORM), space_of(np.zeros(POINTS))
+    accepted = frozenset([EdgeBuild.id] if goes_on else [])
+    both = [Stage(first, first.null, accepted), Stage(second, second.null)]
+    errors = nested_rmse_um(both, Points(np.ones(POINTS)))
+    assert errors == pytest.approx(nested(second if goes_on else first), rel=1e-12)
+    assert nested(first) != pytest.approx(nested(second), rel=1e-3)
 
 
 def test_a_point_left_out_has_no_part_in_its_own_prediction(monkeypatch):
-    """However wrong a block is, what is predicted there stays as it is."""
+    """However wrong a block is, what is predicted there stays as it is.
+
+    Then the error there is that of before plus what was added, and its square is a parabola.
+    """
     monkeypatch.setattr(cross_validation, 'FOLDS', len(np.unique(PATCHES)))
     out = PATCHES == 3
-    errors = []
-    for amount in (0.0, 100.0):
-        space = space_of(2.0 * FORM + amount * out, FORM)
-        part = space.select(~out)
-        errors.append(part.inclusion(EdgeBuild.id))
-        rest = cross_validation._chosen_columns(space, ~out, True)
-        errors.append(np.linalg.norm(np.hstack(rest)))
-    assert errors[:2] == pytest.approx(errors[2:], rel=1e-12)
-    assert errors[0] > 0.9
+    only_there = Points(out.astype(float))
+
+    def square(added: float) -> np.ndarray:
+        space = space_of(WAVE + 2.0 * FORM + added * out)
+        return POINTS * nested_rmse_um([Stage(space, space.null)], only_there) ** 2
+
+    curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
+    assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)
+    assert square(0.0)[1] != pytest.approx(square(0.0)[0], rel=1e-3)
+
+
+def test_levels_of_a_part_do_not_help_to_predict_it():
+    """Nuisance directions explain the points kept, but predict nothing of those left out."""
+    level, out = np.ones((POINTS, 1)), PATCHES == 3
+    raw = np.random.default_rng(1).normal(size=POINTS) + 5.0
+    as_nuisance = NullModel.of(10.0 * level, raw, nuisance=1)
+    as_pattern = NullModel.of(10.0 * level, raw)
+    assert left_out(as_nuisance, [], out) == pytest.approx(raw[out])
+    assert abs(left_out(as_pattern, [], out).mean()) < 1.0

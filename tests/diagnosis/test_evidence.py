@@ -75,11 +75,11 @@ def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart(of_t
     jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
     data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(parameters)))
     fit = fit_linear(jacobian, data, parameters)
-    apart = NullModel.around(fit, frozenset(['corner_slowdown']), fit.nuisance)
+    apart = NullModel.around(fit, fit.nuisance, frozenset(['corner_slowdown']))
     without = fit_linear(jacobian[:, : len(PATTERN)], data, of_the_pattern)
     assert apart.raw == pytest.approx(deviation(without))
     assert apart.lower @ apart.lower.T == pytest.approx(covariance_of(without))
-    kept = NullModel.around(fit, frozenset(), fit.nuisance)
+    kept = NullModel.around(fit, fit.nuisance)
     assert kept.lower @ kept.lower.T == pytest.approx(covariance_of(fit))
 
 

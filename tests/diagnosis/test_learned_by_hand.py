@@ -6,7 +6,8 @@ import pytest
 from paint_deposition.diagnosis.refit import refit
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LEARNED, LearnedLaw
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.integrator import FilmIntegrator
@@ -72,7 +73,7 @@ def test_the_error_falls_also_on_points_left_out(done):
 
 def test_the_curve_is_that_of_the_hidden_law_up_to_a_constant(done):
     law = done.model.effect('learned:time_s')
-    assert isinstance(law, LearnedLaw)
+    assert isinstance(law, LearnedCurve)
     times = np.linspace(law.low, law.high, 50)
     ratio = law.factor(times) / HIDDEN.factor(times)
     assert np.std(ratio) < 0.3 * np.std(HIDDEN.factor(times))

@@ -9,7 +9,7 @@ from pydantic import ValidationError
 
 from booth import MODEL, door, in_batches, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
-from paint_deposition.effects.learned import LEARNED, LearnedLaw, along_path, at_points
+from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, along_path, at_points
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
@@ -17,11 +17,13 @@ from paint_deposition.kernel.laws import in_precision
 from paint_deposition.kernel.ray import Ray
 from reference import reference_film_um
 
-LAW = pytest.mark.parametrize('law', LEARNED.values(), ids=LEARNED)
-RAY_LAWS = [law for law in LEARNED.values() if law.flux_factor is not None]
+LAW = pytest.mark.parametrize('law', CURVES.values(), ids=CURVES)
+RAY_LAWS = [law for law in CURVES.values() if law.flux_factor is not None]
 RAY_LAW = pytest.mark.parametrize('law', RAY_LAWS, ids=lambda law: law.covariate)
 PATH_LAWS = ('time_s', 'spray_pass', 'stroke_end_m', 'since_trigger_s', 'speed_m_per_s')
-SURFACE_LAWS = ('curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction')
+SURFACE_LAWS = (
+    'curvature_per_m', 'edge_distance_m', 'sky_view_factor', 'height_fraction', 'across_m',
+)  # fmt: skip
 # A range of each covariate inside what the scenes below have.
 RANGES = {
     'incidence_deg': (10.0, 50.0),
@@ -35,13 +37,15 @@ RANGES = {
     'edge_distance_m': (0.02, 0.1),
     'sky_view_factor': (0.6, 0.9),
     'height_fraction': (0.2, 0.6),
+    'across_m': (-0.1, 0.2),
+    'film_um': (2.0, 12.0),
 }
 VALUES = (0.3, -0.2, 0.1, 0.4)
 
 
-def law_over(covariate: str, learned=VALUES, **more) -> LearnedLaw:
+def law_over(covariate: str, learned=VALUES, **more) -> LearnedCurve:
     low, high = RANGES[covariate]
-    return LEARNED[covariate](low=low, high=high, learned=learned, **more)
+    return CURVES[covariate](low=low, high=high, learned=learned, **more)
 
 
 @pytest.fixture(scope='module')
@@ -96,7 +100,7 @@ def test_a_factor_never_takes_all_film_away():
 def test_a_law_over_the_path_scales_the_flow_where_the_covariate_is_in_range(covariate, passes):
     law = law_over(covariate, (0.2, 0.2))
     if covariate == 'spray_pass':
-        law = LEARNED[covariate](low=1.0, high=2.0, learned=(0.2, 0.2))
+        law = CURVES[covariate](low=1.0, high=2.0, learned=(0.2, 0.2))
     value = along_path(passes)[covariate]
     step = law.high - law.low
     inside = (value >= law.low) & (value <= law.high)
@@ -119,7 +123,7 @@ def test_a_law_over_the_surface_changes_the_film_where_the_covariate_is_in_range
     points = door().points()
     value = at_points(points)[covariate]()
     low, high = np.quantile(value, 0.3), np.quantile(value, 0.5) + 1e-6
-    law = LEARNED[covariate](low=low, high=high, learned=(0.5, 0.5), kind=kind)
+    law = CURVES[covariate](low=low, high=high, learned=(0.5, 0.5), kind=kind)
     position = (law.axis(value) - law.axis(low)) / (law.axis(high) - law.axis(low))
     inside, outside = (position >= 0.0) & (position <= 1.0), (position <= -1.0) | (position >= 2.0)
     assert inside.any()
@@ -131,10 +135,19 @@ def test_a_law_over_the_surface_changes_the_film_where_the_covariate_is_in_range
     assert np.array_equal(changed[outside], film[outside])
 
 
+def test_a_law_over_the_film_changes_film_of_that_build():
+    points = panel().points()
+    film = np.linspace(0.0, 40.0, len(points))
+    changed = law_over('film_um', (0.25, 0.25)).on_film(film, points)
+    inside, outside = (film >= 2.0) & (film <= 12.0), film >= 22.0
+    np.testing.assert_allclose(changed[inside], 1.25 * film[inside])
+    assert np.array_equal(changed[outside], film[outside])
+
+
 def test_an_addition_leaves_bare_metal_bare_and_takes_no_more_than_is_there():
     points = door().points()
     film = np.where(points.height_fraction > 0.5, 0.3, 0.0)
-    law = LEARNED['height_fraction'](learned=(-1.0, -1.0), kind='addition')
+    law = CURVES['height_fraction'](learned=(-1.0, -1.0), kind='addition')
     assert law.on_film(film, points).tolist() == [0.0] * len(film)
 
 
@@ -224,7 +237,7 @@ def test_a_stream_paints_what_the_recording_does(law, poses):
 @pytest.mark.parametrize('covariate', ['time_s', 'spray_pass'])
 def test_a_pass_by_itself_knows_no_time_and_no_number(covariate):
     across = np.linspace(-0.2, 0.2, 9)
-    law = LEARNED[covariate](low=0.0, high=5.0, learned=(0.5, 0.5))
+    law = CURVES[covariate](low=0.0, high=5.0, learned=(0.5, 0.5))
     plain = collapse_um(MODEL, across, 0.3)
     with_law = collapse_um(MODEL.with_effect(law), across, 0.3)
     np.testing.assert_allclose(with_law, plain, rtol=0.0, atol=2e-6 * plain.max())
@@ -269,4 +282,4 @@ def test_an_unknown_covariate_is_told_the_nearest():
 )
 def test_what_is_no_curve_is_refused(covariate, values, words):
     with pytest.raises(ValidationError, match=words):
-        LEARNED[covariate](**values)
+        CURVES[covariate](**values)

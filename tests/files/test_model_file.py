@@ -11,7 +11,10 @@ from hypothesis import strategies as st
 from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LEARNED
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.footprint import LearnedFootprint
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned.place import LearnedMap
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
@@ -125,12 +128,22 @@ def test_a_users_effect_is_found_beside_the_model_file(tmp_path: Path):
     assert read_model(path) == model
 
 
+def learned(law: type[LearnedLaw]) -> LearnedLaw:
+    """One whose numbers are none that a short decimal says."""
+    third, kind = 1.0 / 3.0, law.kinds[-1]
+    if law is LearnedMap:
+        places = {'low_m': (-third, 0.0), 'high_m': (0.1, third), 'part_m': (1.0, third, 2.0)}
+        return law(columns=3, kind=kind, learned=(0.1, -third, 1e-7) * 2, **places)
+    if law is LearnedFootprint:
+        return law(reach_m=third, learned=(0.1, -third, 1e-7, 0.0, 2.0) * 3)
+    return law(low=0.1, high=0.2 + 1e-9, kind=kind, learned=(0.1, -third, 1e-7))
+
+
 @pytest.mark.parametrize('law', LEARNED.values(), ids=LEARNED)
 def test_a_learned_law_reads_back_to_the_bit(law, tmp_path: Path):
-    curve = law(low=0.1, high=0.2 + 1e-9, kind=law.kinds[-1], learned=(0.1, -1.0 / 3.0, 1e-7))
     path = tmp_path / 'model.yaml'
-    write_model(path, DepositionModel(effects=(curve,)))
-    assert read_model(path).effects == (curve,)
+    write_model(path, DepositionModel(effects=(learned(law),)))
+    assert read_model(path).effects == (learned(law),)
     (entry,) = yaml.safe_load(path.read_text())['effects']
     assert entry['id'] == 'learned'
     assert entry['covariate'] == law.covariate
@@ -157,6 +170,16 @@ def test_two_learned_laws_stand_beside_each_other_and_what_they_leave_out_is_neu
         ('covariate: time_s, learned: a', "learned is 'a'; expected a list of numbers"),
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: time_s, heigh: 1', "unknown key 'heigh'; did you mean 'high'?"),
+        ('covariate: plce', "'plce'; did you mean 'place'?"),
+        ('covariate: place, learned: [1, 2, 3]', 'has 3 values; give two or more rows of 2'),
+        ('covariate: place, learned: [1, 2]', 'has 2 values; give two or more rows of 2'),
+        ('covariate: place, columns: 1', 'columns is 1; expected 2 or more knots in a row'),
+        ('covariate: place, low_m: [0.6, 0]', 'high_m is (0.5, 0.5); it must be above low_m'),
+        ('covariate: place, low_m: 0', 'low_m is 0; expected two numbers'),
+        ('covariate: footprint, learned: [1, 2]', 'has 2 values; give 5 for each of some radii'),
+        ('covariate: footprint, learned: [1, 2, 3, 4, 5]', 'give 5 for each of some radii'),
+        ('covariate: footprint, reach_m: 0', 'reach_m is 0; expected a number above 0'),
+        ('covariate: footprint, kind: addition', "kind is 'addition'; over footprint give factor"),
     ],
 )
 def test_what_is_no_learned_law_is_said_in_one_line(written, entry: str, message: str):

@@ -7,7 +7,7 @@ import pytest
 
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned import LEARNED
+from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange

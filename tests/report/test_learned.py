@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.learned import LEARNED
+from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.report.page.learned import nearest_law
 
 KNOTS = 24

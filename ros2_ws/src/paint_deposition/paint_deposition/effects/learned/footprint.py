@@ -30,7 +30,7 @@ def _flux_factor() -> Callable[..., float]:
     def flux_factor(ray: Ray, steps_per_m: float, *values: float) -> float:
         radius = np.sqrt(ray.x_m * ray.x_m + ray.y_m * ray.y_m + TINY_M2)
         cos, sin = ray.x_m / radius, ray.y_m / radius
-        wave = (cos * cos + sin * sin, cos, sin, cos * cos - sin * sin, 2.0 * cos * sin)
+        wave = (1.0, cos, sin, cos * cos - sin * sin, 2.0 * cos * sin)
         away = radius * steps_per_m
         factor = 1.0
         for knot in range(first, len(values), count):

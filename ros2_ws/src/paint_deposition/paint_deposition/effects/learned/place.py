@@ -31,11 +31,16 @@ class LearnedMap(LearnedLaw):
     kinds = ('factor', 'addition')
 
     part_m: tuple[float, float, float] = Field(
-        (1.0, 1.0, 1.0), description='sides of the bounding box of the part it was learned on [m]'
+        (1.0, 1.0, 1.0),
+        description='three numbers: sides of the bounding box of the part it was learned on [m]',
     )
-    low_m: Pair = Field((-0.5, -0.5), description='lower left knot, from the centre [m]')
-    high_m: Pair = Field((0.5, 0.5), description='upper right knot, from the centre [m]')
-    columns: int = Field(2, ge=2, description='knots in a row')
+    low_m: Pair = Field(
+        (-0.5, -0.5), description='two numbers: lower left knot, from the centre [m]'
+    )
+    high_m: Pair = Field(
+        (0.5, 0.5), description='two numbers: upper right knot, from the centre [m]'
+    )
+    columns: int = Field(2, ge=2, description='2 or more knots in a row')
     learned: tuple[float, ...] = Field((0.0,) * 4, description='a list of numbers: h at the knots')
 
     @model_validator(mode='after')

@@ -1,0 +1,157 @@
+"""A learned footprint: what the spray pattern deposits deviates over the model plane."""
+
+import numpy as np
+import pytest
+from numba import float32, float64, njit
+
+from booth import MODEL, STANDOFF_M, door, in_batches, painted, panel, path_of, serpentine, spot
+from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
+from paint_deposition.effects.learned.law import LEAST_FACTOR
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.kernel.laws import in_precision
+from paint_deposition.kernel.ray import Ray
+from reference import reference_film_um
+
+REACH_M = 0.2
+STEP_M = REACH_M / 4
+# At each of five radii, of which the innermost has no direction.
+RINGS = np.random.default_rng(2).uniform(-0.15, 0.15, size=(5, WAVES))
+RINGS[0, 1:] = 0.0
+LAW = LearnedFootprint(reach_m=REACH_M, learned=tuple(RINGS.ravel()))
+
+
+def constant(h: float, rings: int = 5) -> LearnedFootprint:
+    """The same relative deviation everywhere within reach."""
+    return LearnedFootprint(reach_m=REACH_M, learned=(h, 0.0, 0.0, 0.0, 0.0) * rings)
+
+
+def at(x_m: float, y_m: float) -> Ray:
+    """A ray that pierces the model plane here."""
+    return Ray(x_m, y_m, 1.1, 0.9, 0.4)
+
+
+@pytest.mark.parametrize(('real', 'tolerance'), [(np.float64, 1e-12), (np.float32, 1e-5)])
+def test_the_compiled_factor_is_one_plus_h_in_its_own_precision(real, tolerance):
+    compiled = njit(in_precision(LAW.flux_factor, real))
+    values = np.array(LAW.values(), real)
+    x_m, y_m = np.random.default_rng(3).uniform(-1.3 * REACH_M, 1.3 * REACH_M, size=(2, 60))
+    found = [
+        compiled(Ray(*np.array(at(x, y), real)), *values) for x, y in zip(x_m, y_m, strict=True)
+    ]
+    np.testing.assert_allclose(found, 1.0 + LAW.h(x_m, y_m), rtol=tolerance)
+    (signature,) = compiled.nopython_signatures
+    assert signature.return_type == {np.float64: float64, np.float32: float32}[real]
+
+
+def test_at_its_radii_it_has_the_mean_and_the_harmonics_that_were_given():
+    angle = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+    table = [np.ones(12), np.cos(angle), np.sin(angle), np.cos(2 * angle), np.sin(2 * angle)]
+    for ring, values in enumerate(RINGS):
+        radius = ring * STEP_M
+        found = LAW.h(radius * np.cos(angle), radius * np.sin(angle))
+        np.testing.assert_allclose(found, values @ table, atol=1e-9)
+
+
+def test_between_two_radii_it_is_linear_and_one_step_beyond_reach_nothing():
+    along = LAW.h(np.array([1.0, 1.25, 2.0]) * STEP_M, np.zeros(3))
+    assert along[1] == pytest.approx(0.75 * along[0] + 0.25 * along[2])
+    beyond = np.array([REACH_M + STEP_M, 3.0 * REACH_M])
+    assert LAW.h(beyond, np.zeros(2)).tolist() == [0.0, 0.0]
+    for radius in beyond:
+        assert LAW.flux_factor(at(0.0, radius), *LAW.values()) == 1.0
+
+
+@pytest.mark.parametrize('x_m', [0.0, 1e-12])
+def test_at_the_very_centre_it_is_finite(x_m):
+    assert LAW.flux_factor(at(x_m, 0.0), *LAW.values()) == pytest.approx(1.0 + RINGS[0, 0])
+
+
+def test_it_never_takes_all_that_arrives_away():
+    assert constant(-3.0).flux_factor(at(0.1, 0.0), *constant(-3.0).values()) == LEAST_FACTOR
+
+
+@pytest.mark.slow
+def test_no_deviation_is_the_same_film_to_the_bit():
+    path = path_of(serpentine((0.08, -0.08)))
+    neutral = constant(0.0)
+    assert neutral.is_neutral
+    assert neutral.flux_factor(at(0.03, 0.04), *neutral.values()) == 1.0
+    film = painted(door(), path, neutral)
+    assert np.array_equal(film.gauge_um, painted(door(), path).gauge_um)
+
+
+@pytest.mark.slow
+def test_the_kernel_computes_the_law():
+    points = door().points().select(slice(None, None, 7))
+    path = path_of(spot(z_m=0.45, standoff_m=0.35))
+    model = MODEL.with_effect(LAW)
+    integrator = FilmIntegrator(points, model, 'double')
+    integrator.add(path)
+    expected = reference_film_um(points, path, model)
+    plain = reference_film_um(points, path, MODEL)
+    assert np.abs(expected - plain).max() > 0.02 * plain.max()
+    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
+
+
+def volume_um_m2(*effects) -> float:
+    """Paint on the panel in front of a gun that stands still for a second."""
+    surface = panel(0.5, 0.01)
+    return float(painted(surface, spot(), *effects).raw_um.sum())
+
+
+def of_the_pattern(h) -> float:
+    """Integral over the model plane of the pattern times a function of the place."""
+    line = np.linspace(-0.6, 0.6, 801)
+    x, y = np.meshgrid(line, line)
+    return float((MODEL.planar.flux_um_per_s(x, y) * h(x, y)).sum())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('law', [LAW, constant(0.3)], ids=['any', 'constant'])
+def test_the_paint_on_a_flat_panel_changes_as_the_integral_of_the_pattern(law):
+    """All that passes the model plane lands on the panel, wherever it passes."""
+    expected = of_the_pattern(lambda x, y: 1.0 + law.h(x, y)) / of_the_pattern(lambda x, y: 1.0)
+    assert abs(expected - 1.0) > 0.01
+    assert volume_um_m2(law) / volume_um_m2() == pytest.approx(expected, abs=3e-4)
+
+
+@pytest.mark.slow
+def test_harmonics_move_paint_and_make_none_where_the_pattern_is_round():
+    """A pattern without offset ring or asymmetry: cosine and sine integrate to nothing."""
+    turned = LearnedFootprint(reach_m=REACH_M, learned=(0.0, 0.3, -0.2, 0.1, 0.2) * 5)
+    round_pattern = MODEL.planar.model_copy(update={'K3': 0.0})
+    model = MODEL.model_copy(update={'planar': round_pattern})
+    points = panel(0.5, 0.01)
+    plain = painted(points, spot(), model=model).raw_um
+    film = painted(points, spot(), turned, model=model).raw_um
+    assert np.abs(film - plain).max() > 0.1 * plain.max()
+    assert film.sum() == pytest.approx(plain.sum(), rel=1e-4)
+
+
+@pytest.mark.slow
+def test_its_axes_are_those_of_the_tool_on_the_model_plane():
+    """More to the tool's +x, which the booth's gun has along the world's x."""
+    towards_x = LearnedFootprint(reach_m=REACH_M, learned=(0.0, 0.2, 0.0, 0.0, 0.0) * 5)
+    surface = panel()
+    film, plain = painted(surface, spot(), towards_x).raw_um, painted(surface, spot()).raw_um
+    place = surface.points().positions_m
+    # The emission point lies behind the gun, and rays spread up to the model plane from there.
+    emission_m = MODEL.projection.emission_offset_m
+    onto_plane = MODEL.projection.model_plane_m / (STANDOFF_M + emission_m)
+    radius = onto_plane * np.hypot(place[:, 0], place[:, 2])
+    near = (radius > STEP_M) & (radius < REACH_M)
+    cos = place[near, 0] / np.hypot(place[near, 0], place[near, 2])
+    np.testing.assert_allclose(film[near], (1.0 + 0.2 * cos) * plain[near], rtol=1e-6)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('poses', [1, 40])
+def test_a_stream_paints_what_the_recording_does(poses):
+    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
+    surface = panel(0.3, 0.05)
+    whole = painted(surface, trajectory, LAW)
+    live = FilmIntegrator(surface.points(), MODEL.with_effect(LAW), 'double', surface.occluder)
+    for piece in in_batches(trajectory, poses, LAW.needs_whole_strokes):
+        live.add(piece)
+    assert np.array_equal(live.gauge_um, whole.gauge_um)
+    assert not np.array_equal(whole.gauge_um, painted(surface, trajectory).gauge_um)
