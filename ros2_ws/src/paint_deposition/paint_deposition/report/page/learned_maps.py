@@ -59,7 +59,8 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     panels, marks = [], []
     for k, law in enumerate(laws, start=1):
         parts = [e for e in data.experiments if law.is_of(e.measured_points)]
-        values, neutral = np.reshape(law.learned, (law.rows, law.columns)), 0.0
+        values: np.ndarray = np.reshape(law.learned, (law.rows, law.columns))
+        neutral = 0.0
         if law.kind == 'factor':
             values, neutral = np.maximum(1.0 + values, LEAST_FACTOR), 1.0
         x = np.linspace(law.low_m[0], law.high_m[0], law.columns)
