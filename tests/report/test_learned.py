@@ -1,11 +1,19 @@
-"""A learned law is shown beside the law of the library that is nearest."""
+"""Learned laws are shown: curves beside the nearest law of the library, all others as maps."""
 
 import numpy as np
 import pytest
 
+from paint_deposition.comparison.comparison import compare
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
+from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.fitting.study import Study
+from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import nearest_law
+from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
+from small_campaign import small_campaign
 
 KNOTS = 24
 
@@ -62,3 +70,47 @@ def test_a_curve_that_no_effect_has_stands_alone():
 def test_laws_over_the_path_stand_alone(covariate):
     law = like(covariate, 0.0, 1.0, lambda value: 0.2 * value)
     assert nearest_law(law, EFFECTS, np.linspace(0.0, 1.0, 101)) is None
+
+
+@pytest.fixture(scope='module')
+def study(tmp_path_factory):
+    return Study.of(small_campaign(tmp_path_factory.mktemp('campaign')))
+
+
+def shown(study: Study, *effects) -> ReportData:
+    return ReportData((compare(study, DepositionModel(effects=effects)),))
+
+
+@pytest.mark.slow
+def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
+    door = study.campaign.experiments[1].measured_points
+    settings = {
+        'part_m': tuple(door.extent_m.tolist()), 'low_m': (-0.4, -0.3), 'high_m': (0.4, 0.3),
+        'columns': 3, 'learned': (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3),
+    }  # fmt: skip
+    factor = LearnedMap(**settings)
+    addition = LearnedMap(**settings | {'kind': 'addition', 'part_m': (9.0, 9.0, 9.0)})
+    assert map_figure(shown(study)) is None
+    maps = map_figure(shown(study, factor, addition))
+    first, second, dots = maps['data']
+    assert first['z'] == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
+    assert second['z'] == pytest.approx(np.array([[-2.0, -2.0, -2.0], [0.1, 0.2, 0.3]]))
+    # Neutral is the middle of the colours.
+    assert first['zmin'] + first['zmax'] == pytest.approx(2.0)
+    assert second['zmin'] + second['zmax'] == pytest.approx(0.0)
+    assert len(dots['x']) == len(door.positions_m)
+    titles = [note['text'] for note in maps['layout']['annotations']]
+    assert titles == ['factor on door', 'addition [µm] on a part that was not measured here']
+
+
+@pytest.mark.slow
+def test_a_footprint_is_the_pattern_times_its_factor(study):
+    heavier_right = (0.0,) * WAVES + (0.1, 0.2, 0.0, 0.0, 0.0)
+    footprint = LearnedFootprint(reach_m=0.2, learned=heavier_right)
+    assert footprint_figure(shown(study)) is None
+    plain, learned, factor = footprint_figure(shown(study, footprint))['data'][:3]
+    assert learned['z'] == pytest.approx(plain['z'] * factor['z'])
+    x, y = np.meshgrid(factor['x'], factor['y'])
+    at = np.argmin(np.hypot(x - 0.2, y))
+    assert factor['z'].flat[at] == pytest.approx(1.3, abs=0.03)
+    assert factor['z'][np.hypot(x, y) > 0.41] == pytest.approx(1.0)

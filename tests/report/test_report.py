@@ -19,10 +19,13 @@ from paint_deposition.diagnosis.refit import refit
 from paint_deposition.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
+from paint_deposition.report.words import learned_range
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
@@ -313,3 +316,28 @@ def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
     assert f'How it shows: {wake.signature}.' in text
     assert 'loss 2 × 10⁻⁹ per m/s (1 × 10⁻⁹ to 3 × 10⁻⁹)' in text
     assert 'loss 0.05 per m/s' in text
+
+
+def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
+    campaign = diagnosis.study.campaign
+    done = refit(campaign, DepositionModel(), learned_law('height_fraction'))
+    write_report(tmp_path / 'report.html', ReportData.of(done))
+    page = page_of(tmp_path / 'report.html')
+    law = done.model.effect('learned:height_fraction')
+    assert 'Added as asked' in page.text
+    assert 'no known effect' not in page.text
+    assert learned_range(law) in page.text
+    assert f'goes from {done.history[0].holdout_rmse_um:.2f} µm' in page.text
+    assert page.open == page.clashes == []
+
+
+def test_readings_left_out_and_levels_of_parts_are_shown(tmp_path, diagnosis, comparisons):
+    slip = Slip('door: P007', 312.0, 30.9, 1.2)
+    study = replace(diagnosis.study, slips=(slip,))
+    told = replace(diagnosis, study=study)
+    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
+    tell(tmp_path / 'report.html', told, beside)
+    text = page_of(tmp_path / 'report.html').text
+    assert '312.00 µm at door P007, where 30.90 µm is expected (was it 31.20 µm?)' in text
+    for amount in diagnosis.random_effects:
+        assert f'{amount.kind} of {amount.of}' in text

@@ -1,6 +1,7 @@
 """What the report calls a user's own effect: it reads as well as one of the library."""
 
 from booth import SAMPLES
+from paint_deposition.diagnosis.verdict import EffectClass
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -10,10 +11,12 @@ from paint_deposition.report.words import (
     effect_name,
     in_unit,
     is_learned,
+    learned_range,
     learned_words,
     number,
     parameter_words,
     step_words,
+    sureness,
 )
 
 
@@ -68,3 +71,25 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
     assert learned_words(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
     assert learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
+    map_ = LEARNED['place'](low_m=(-0.5, -0.2), high_m=(0.5, 0.2), learned=(0.1, 0.0, 0.0, -0.2))
+    assert learned_words(map_) == [
+        ('factor', '0.8 to 1.1', ''), ('over', '1000 × 400', 'mm of the part'),
+    ]  # fmt: skip
+    # Mean and first harmonic add up on the heavier side.
+    ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
+    assert learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
+
+
+def test_a_learned_law_says_where_it_is_neutral():
+    passes = LEARNED['spray_pass'](low=0.0, high=5.0)
+    assert learned_range(passes) == (
+        "Learned law over the number of the pass: neutral outside the readings' range, 1 to 6."
+    )
+    assert 'on any other part' in learned_range(LEARNED['place']())
+    assert '300 mm from the axis' in learned_range(LEARNED['footprint'](reach_m=0.3))
+
+
+def test_a_law_that_was_kept_for_what_it_predicts_has_no_probability():
+    assert sureness(EffectClass(('learned:time_s',), 1.0, 'learned:time_s')) == 'kept'
+    assert sureness(EffectClass(('learned:time_s',), 0.7, 'learned:time_s')) == '70 %'
+    assert sureness(EffectClass(('edge_build',), 1.0, 'edge_build')) == '> 99 %'

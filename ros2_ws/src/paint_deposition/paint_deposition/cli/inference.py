@@ -158,9 +158,8 @@ def _write(
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
-    from paint_deposition.diagnosis.verdict import percent
     from paint_deposition.effects.learned.law import LearnedLaw
-    from paint_deposition.report.words import apart_words, effect_name, learned_words
+    from paint_deposition.report.words import apart_words, effect_name, learned_words, sureness
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -168,7 +167,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
-        yield f'  {label}{effects.best}: {percent(effects.probability)}{others}'
+        yield f'  {label}{effects.best}: {sureness(effects)}{others}'
         law = diagnosis.model.effect(effects.best)
         if isinstance(law, LearnedLaw):
             shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
@@ -179,7 +178,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     yield (
         f'RMSE {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the fitted points, '
         f'{before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on points left out; '
-        f'gauge noise {diagnosis.noise_floor_um:.2f} µm'
+        f'gauge and texture {diagnosis.noise_floor_um:.2f} µm'
     )
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'

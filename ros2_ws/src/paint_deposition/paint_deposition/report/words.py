@@ -8,11 +8,13 @@ import numpy as np
 
 from paint_deposition.diagnosis.explanations import UNKNOWN
 from paint_deposition.diagnosis.next_experiment import Spray
-from paint_deposition.diagnosis.verdict import percent
+from paint_deposition.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
+from paint_deposition.effects.learned.place import LearnedMap
 from paint_deposition.fitting.study import Study
 from paint_deposition.results.fitted_model import PATTERN, REFIT
 
@@ -106,6 +108,9 @@ def effect_meaning(effect: type[Effect] | None) -> str:
 def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
     """A learned law's values and its range as (words, value, unit)."""
     curve = np.array(law.learned)
+    if isinstance(law, LearnedFootprint):
+        along = np.linspace(-law.reach_m, law.reach_m, 101)
+        curve = law.h(*np.meshgrid(along, along))
     if law.kind == 'factor':
         curve = np.maximum(1.0 + curve, LEAST_FACTOR)
     least, most = number(float(curve.min())), number(float(curve.max()))
@@ -115,7 +120,31 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
         first = 1.0 if law.covariate == 'spray_pass' else 0.0
         low, high = (number(end + first) for end in (law.low, law.high))
         words.append(('over', f'{low} to {high}', unit_words(law.unit)))
+    elif isinstance(law, LearnedMap):
+        sides = (1e3 * (high - low) for low, high in zip(law.low_m, law.high_m, strict=True))
+        words.append(('over', ' × '.join(f'{side:.0f}' for side in sides), 'mm of the part'))
+    elif isinstance(law, LearnedFootprint):
+        words.append(('out to', number(1e3 * law.reach_m), 'mm from the axis on the model plane'))
     return words
+
+
+def learned_range(law: LearnedLaw) -> str:
+    """Where a learned law holds, and that it is neutral elsewhere, as a sentence."""
+    name = capital(effect_name(law.id))
+    if isinstance(law, LearnedMap):
+        return f'{name}: neutral outside the area of the readings, and on any other part.'
+    if isinstance(law, LearnedFootprint):
+        reach = f'{number(1e3 * law.reach_m)} mm'
+        return f'{name}: neutral farther than {reach} from the axis on the model plane.'
+    _, ends, unit = learned_words(law)[1]
+    return f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
+
+
+def sureness(found: EffectClass) -> str:
+    """The probability of a group; a learned law that was kept for what it predicts has none."""
+    if is_learned(found.best) and found.probability == 1.0:
+        return 'kept'
+    return percent(found.probability)
 
 
 def parameter_words(name: str, unit: str) -> str:

@@ -1,6 +1,7 @@
 """Flat charts of the report: parity, covariates, history, the unexplained."""
 
 from collections.abc import Iterable, Iterator
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,8 @@ MOST_COVARIATES = 8
 BINS = 6
 # Conditions that differ by less than this share say nothing of the model.
 LEAST_SPREAD = 0.01
+# Characters in a line below a bar.
+LABEL = 24
 AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
@@ -38,7 +41,7 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     traces = [
         scatter(ends, ends + spread, 'lines', **bound),
         scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
-                fillcolor='rgba(154,165,177,0.25)', name='95 % gauge noise'),
+                fillcolor='rgba(154,165,177,0.25)', name='95 % gauge and texture'),
         scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
     ]  # fmt: skip
     for name, values, colour in _before_and_after(data, predicted):
@@ -123,7 +126,7 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     if data.diagnosis is None or len(data.diagnosis.history) < 2:
         return None
     steps = data.diagnosis.history
-    names = [step_words(step) for step in data.history[-len(steps) :]]
+    names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, INK),
         ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
@@ -140,13 +143,13 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     layout = base_layout(
         margin={'l': 56, 'r': 64, 't': 48, 'b': 48}, barmode='group',
         bargap=0.45, bargroupgap=0.06,
-        xaxis=axis('', ticks='', tickfont={'size': 12, 'color': INK}),
+        xaxis=axis('', ticks='', tickangle=0, tickfont={'size': 12, 'color': INK}),
         yaxis=axis('RMSE [µm]', range=[0, top]),
         shapes=[{'type': 'line', 'xref': 'paper', 'x0': 0, 'x1': 1, 'y0': floor, 'y1': floor,
                  'line': {'color': INK, 'width': 1.5, 'dash': 'dash'}}],
         annotations=[{
             'xref': 'paper', 'x': 1.01, 'y': floor, 'xanchor': 'left', 'yanchor': 'middle',
-            'showarrow': False, 'text': f'gauge<br>noise<br>{floor:.2f} µm',
+            'showarrow': False, 'text': f'gauge and<br>texture<br>{floor:.2f} µm',
             'font': {'size': 11, 'color': INK}, 'align': 'left',
         }],
     )  # fmt: skip

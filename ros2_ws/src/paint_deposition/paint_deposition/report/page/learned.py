@@ -18,7 +18,7 @@ from paint_deposition.report.page.layout import (
     grid_domains,
 )
 from paint_deposition.report.style import ACCENT, INK, MUTED
-from paint_deposition.report.words import covariate_label, effect_name
+from paint_deposition.report.words import capital, covariate_label, effect_name
 
 CHARTS_A_ROW = 2
 CURVE_POINTS = 201
@@ -46,7 +46,7 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
         layout[f'yaxis{k}'] = axis(
             'factor' if law.kind == 'factor' else 'addition [µm]', domain=y, anchor=f'x{k}'
         )
-        layout['annotations'].append(chart_title(effect_name(law.id), k))
+        layout['annotations'].append(chart_title(capital(effect_name(law.id)), k))
         layout['shapes'] += [
             {'type': 'line', 'xref': f'x{k}', 'yref': f'y{k} domain', 'x0': end, 'x1': end,
              'y0': 0, 'y1': 1, 'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}

@@ -97,7 +97,7 @@ def _film_traces(data: ReportData, p: Profile, first: bool) -> list[dict]:
             'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',
         })  # fmt: skip
     traces.append(
-        scatter(at_mm, measured, 'markers', name='measured, bars: 95 % gauge noise',
+        scatter(at_mm, measured, 'markers', name='measured, bars: 95 % gauge and texture',
                 legendgroup='measured', showlegend=first, legendrank=1,
                 marker={'size': 5, 'color': INK}, error_y=_bars(data, p, INK),
                 hovertemplate='measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>')

@@ -19,6 +19,7 @@ from paint_deposition.report.page import figures as charts
 from paint_deposition.report.page import tables
 from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.learned import learned_figure
+from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
 from paint_deposition.report.page.profiles import profile_figure
 from paint_deposition.report.page.scene import places_scene, scene_data
 
@@ -46,6 +47,7 @@ def report_html(data: ReportData) -> str:
         'whole': lambda value: words.minus(f'{value:.0f}'),
         'p': words.p_words,
         'percent': percent,
+        'sureness': words.sureness,
         'in_print': words.in_print,
         'effect': words.effect_name,
         'capital': words.capital,
@@ -61,6 +63,8 @@ def report_html(data: ReportData) -> str:
         charts.history_figure(data),
         charts.unknown_figure(data),
         learned_figure(data),
+        map_figure(data),
+        footprint_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
     content = {
@@ -78,7 +82,11 @@ def report_html(data: ReportData) -> str:
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
         pattern=tables.pattern_rows(data),
-        knowledge=tables.knowledge_rows(data),
+        learned=tables.learned_rows(data),
+        left_out=data.study.left_out,
+        noise=tables.noise_rows(data),
+        levels=tables.level_rows(data),
+        shift=data.diagnosis and data.diagnosis.pattern_shift,
         blind=tables.blind_rows(data),
         misfits=tables.misfit_rows(data),
         places=places,

@@ -15,10 +15,15 @@ from paint_deposition.report.words import (
     effect_meaning,
     effect_name,
     in_unit,
+    learned_range,
     learned_words,
+    micrometres,
     number,
     parameter_words,
 )
+
+# A value below this share of its interval is printed as none.
+NEGLIGIBLE = 1e-4
 
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -52,6 +57,8 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
     """A parameter in words: its value, and the ends of its 95 % interval if there is one."""
     unit = effect.parameters()[name]['unit'] if effect else ''
+    if abs(values[0]) < NEGLIGIBLE * np.ptp(values):
+        values = (0.0, *values[1:])
     printed = zip(('unit', 'value', 'low', 'high'), in_unit(unit, *values), strict=False)
     return {'words': parameter_words(name, unit)} | dict(printed)
 
@@ -81,17 +88,37 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     return rows
 
 
-def knowledge_rows(data: ReportData) -> list[tuple[str, str]]:
-    """How far the pattern moved from the calibration, and how parts and sessions differ."""
-    diagnosis = data.diagnosis
-    if diagnosis is None:
-        return []
-    rows = []
-    if diagnosis.pattern_shift:
-        rows.append(('The pattern moved', str(diagnosis.pattern_shift)))
-    if diagnosis.random_effects:
-        rows.append(('Parts and gauge sessions', '; '.join(map(str, diagnosis.random_effects))))
-    return rows
+def learned_rows(data: ReportData) -> list[str]:
+    """Where each learned law of the best model holds."""
+    return [learned_range(law) for law in data.model.effects if isinstance(law, LearnedLaw)]
+
+
+def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
+    """What the readings scatter by: what, how much, and how that is known."""
+    noise, texture = data.study.noise, data.study.texture
+    known = {'repeats': 'from repeats', 'stated': 'as stated', 'neighbours': 'from neighbours'}
+    return [
+        (what, amount, known.get(source, source))
+        for what, amount, source in (
+            ('noise of the gauge, one reading', micrometres(noise.typical_um), noise.source),
+            ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
+        )
+    ]
+
+
+def level_rows(data: ReportData) -> list[dict[str, Any]]:
+    """By how much parts and gauge sessions differ."""
+    amounts = data.diagnosis.random_effects if data.diagnosis else ()
+    return [
+        {
+            'what': f'{amount.kind} of {amount.of}',
+            'value': f'{amount.value:+.2f}',
+            'sd': f'{amount.sd:.2f}',
+            'unit': amount.unit,
+            'notable': amount.is_notable,
+        }
+        for amount in amounts
+    ]
 
 
 def effect_rows(data: ReportData) -> list[dict[str, Any]]:

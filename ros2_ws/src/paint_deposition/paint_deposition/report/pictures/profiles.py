@@ -51,7 +51,7 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
     measured = data.study.measured_um[profile.rows]
     axes.errorbar(
         at_mm, measured, TWO_SIDED_95 * data.study.sigma_um[profile.rows], fmt='o', ms=3,
-        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge noise', zorder=5,
+        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge and texture', zorder=5,
     )  # fmt: skip
     for k, label in enumerate(data.model_names):
         last = k == len(data.models) - 1

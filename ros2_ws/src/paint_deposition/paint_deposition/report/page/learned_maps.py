@@ -1,0 +1,155 @@
+"""Heat maps of learned laws that are no curves: maps over a part, and footprints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.learned.footprint import LearnedFootprint
+from paint_deposition.effects.learned.law import LEAST_FACTOR
+from paint_deposition.effects.learned.place import LearnedMap, places_m
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import (
+    FILM_COLOURS,
+    RESIDUAL_COLOURS,
+    axis,
+    base_layout,
+    chart_title,
+    figure,
+    grid_domains,
+    scatter,
+)
+from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.words import joined
+
+HEIGHT_PX, GAP_PX = 400, 120
+MARGIN_PX = {'l': 56, 'r': 72, 't': 32, 'b': 48}
+# Cells of a footprint from one side to the other, and how far out the pattern matters: where it
+# is above this share of its peak.
+CELLS, FAINT = 81, 0.02
+# Contours of the pattern of eq. (1), as shares of its peak.
+CONTOURS = (0.1, 0.5, 0.9)
+
+
+@dataclass(frozen=True)
+class _Panel:
+    """One heat map.
+
+    Attributes:
+        title, across, up: of the chart and its axes.
+        x, y: (X,) and (Y,) places. values: (Y, X) there.
+        scale: colours. low, high: their range.
+    """
+
+    title: str
+    across: str
+    up: str
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+    scale: list[list[Any]]
+    low: float
+    high: float
+
+
+def map_figure(data: ReportData) -> dict[str, Any] | None:
+    """Each map over a part that the best model has learned, the part as the gun sees it."""
+    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedMap)]
+    panels, marks = [], []
+    for k, law in enumerate(laws, start=1):
+        parts = [e for e in data.experiments if law.is_of(e.measured_points)]
+        values: np.ndarray = np.reshape(law.learned, (law.rows, law.columns))
+        neutral = 0.0
+        if law.kind == 'factor':
+            values, neutral = np.maximum(1.0 + values, LEAST_FACTOR), 1.0
+        x = np.linspace(law.low_m[0], law.high_m[0], law.columns)
+        y = np.linspace(law.low_m[1], law.high_m[1], law.rows)
+        title = 'factor' if law.kind == 'factor' else 'addition [µm]'
+        title += ' on ' + (joined([e.name for e in parts]) or 'a part that was not measured here')
+        panels.append(
+            _about(neutral, values, title, 'right of the centre [m]', 'above it [m]', x, y)
+        )
+        for part in parts:
+            place = places_m(part.measured_points)
+            dots = {'size': 3, 'color': INK}
+            marks.append(
+                scatter(place[:, 0], place[:, 1], 'markers', marker=dots, hoverinfo='skip')
+                | _axes(k)
+            )
+    return _figure('maps', panels, marks)
+
+
+def footprint_figure(data: ReportData) -> dict[str, Any] | None:
+    """The pattern of eq. (1), the pattern as learned, and the factor between the two."""
+    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedFootprint)]
+    if not laws:
+        return None
+    reach = data.model.planar.radius_of_flux_m(FAINT)
+    along = np.linspace(-reach, reach, CELLS)
+    x, y = np.meshgrid(along, along)
+    plain = data.model.planar.flux_um_per_s(x, y)
+    factor = np.maximum(1.0 + laws[0].h(x, y), LEAST_FACTOR)
+    top = float(max(plain.max(), (plain * factor).max()))
+    panels = [
+        _Panel(title, 'tool x [m]', 'tool y [m]', along, along, values, FILM_COLOURS, 0.0, top)
+        for title, values in (
+            ('pattern of eq. (1) [µm/s]', plain),
+            ('pattern as learned [µm/s]', plain * factor),
+        )
+    ]
+    title = 'factor, with contours of eq. (1)'
+    panels.append(_about(1.0, factor, title, 'tool x [m]', 'tool y [m]', along, along))
+    contours = [
+        _axes(3) | {
+            'type': 'contour', 'x': along, 'y': along, 'z': plain, 'showscale': False,
+            'autocontour': False, 'hoverinfo': 'skip', 'line': {'color': MUTED, 'width': 1},
+            'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain.max()},
+            'showlegend': False,
+        }
+        for share in CONTOURS
+    ]  # fmt: skip
+    return _figure('footprint', panels, contours)
+
+
+def _about(neutral: float, values: np.ndarray, *where: Any) -> _Panel:
+    """A panel coloured by how far values are from the neutral one."""
+    title, across, up, x, y = where
+    away = max(float(np.abs(values - neutral).max()), 1e-3)
+    return _Panel(
+        title, across, up, x, y, values, RESIDUAL_COLOURS, neutral - away, neutral + away
+    )
+
+
+def _axes(number: int) -> dict[str, str]:
+    return {'xaxis': f'x{number}', 'yaxis': f'y{number}'}
+
+
+def _figure(name: str, panels: Sequence[_Panel], above: Sequence[dict]) -> dict[str, Any] | None:
+    """Panels in rows of three, with further traces above them; None without any."""
+    if not panels:
+        return None
+    rows = -(-len(panels) // 3)
+    height = rows * HEIGHT_PX
+    layout, traces = base_layout(margin=MARGIN_PX, annotations=[]), []
+    plot_px = height - MARGIN_PX['t'] - MARGIN_PX['b']
+    domains = grid_domains(max(len(panels), 2), 3, plot_px, (GAP_PX, 90))
+    for k, (panel, (x, y)) in enumerate(zip(panels, domains, strict=False), start=1):
+        layout[f'xaxis{k}'] = axis(
+            panel.across, domain=x, anchor=f'y{k}', showgrid=False, nticks=6,
+            constrain='domain', range=[panel.x[0], panel.x[-1]],
+        )  # fmt: skip
+        layout[f'yaxis{k}'] = axis(
+            panel.up, domain=y, anchor=f'x{k}', showgrid=False, nticks=6, constrain='domain',
+            range=[panel.y[0], panel.y[-1]], scaleanchor='x' if k == 1 else f'x{k}',
+        )  # fmt: skip
+        layout['annotations'].append(chart_title(panel.title, k))
+        traces.append(_axes(k) | {
+            'type': 'heatmap', 'x': panel.x, 'y': panel.y, 'z': panel.values,
+            'zmin': panel.low, 'zmax': panel.high, 'colorscale': panel.scale, 'zsmooth': 'best',
+            'hovertemplate': '%{z:.3g} at %{x:.2f}, %{y:.2f} m<extra></extra>',
+            'colorbar': {'x': x[1] + 0.005, 'xanchor': 'left', 'thickness': 10, 'y': sum(y) / 2,
+                         'len': y[1] - y[0], 'outlinewidth': 0,
+                         'tickfont': {'size': 11, 'color': MUTED}},
+        })  # fmt: skip
+    return figure(name, [*traces, *above], layout, height)
