@@ -9,17 +9,19 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 from scipy.special import expit, logsumexp
-from scipy.stats import norm
 
 from paint_deposition.diagnosis.evidence import (
     KNOWN_NOISE,
     NullModel,
     log_bayes_factor,
+    log_bayes_factors,
+    principal,
     simulated,
 )
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
@@ -65,6 +67,28 @@ class Model:
     log_weight: float = 0.0
 
 
+class Directions(NamedTuple):
+    """The directions of all explanations, whitened, those of each orthogonal to each other.
+
+    Attributes:
+        gram: (N, N) their products. scores: (N,) products with the deviations.
+        square: of the deviations' length.
+        start: (K + 1,) first direction of each explanation, and N.
+        signed: (q, N) sums of each explanation's amplitudes whose sign is known.
+        sides: (K, q) that sign, +1 or -1; 0 where an explanation has fewer.
+        freedom: degrees of freedom of the noise estimate. count: of readings.
+    """
+
+    gram: np.ndarray
+    scores: np.ndarray
+    square: float
+    start: np.ndarray
+    signed: np.ndarray
+    sides: np.ndarray
+    freedom: float
+    count: int
+
+
 class ModelSpace:
     """All models around a null model.
 
@@ -84,19 +108,13 @@ class ModelSpace:
         names = [e.cause for e in self.explanations]
         self._first = np.array([names.index(c) for c in self.causes])
         self._last = np.append(self._first[1:], len(names))
-        self.columns = [null.whiten(e.columns) for e in self.explanations]
-        self._start = np.cumsum([0, *(c.shape[1] for c in self.columns)])
-        together = np.hstack(self.columns)
-        self._gram = together.T @ together
-        self._scores = together.T @ null.deviation
-        self._square = float(null.deviation @ null.deviation)
-        self._sides = np.concatenate([e.sides for e in self.explanations])
+        turned = [principal(null.whiten(e.columns)) for e in self.explanations]
+        self.columns = [columns for columns, _ in turned]
+        self._axes = [axes for _, axes in turned]
+        self._directions = self._products()
         shares = np.log([e.share / len(SIZES) for e in self.explanations])
-        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
-        for k in range(len(self.explanations)):
-            for s, size in enumerate(SIZES):
-                if not self._is_physical(k, float(size)):
-                    self._log_share[k, s] = NEVER
+        physical = np.array([self._are_physical(k) for k in range(len(names))])
+        self._log_share = np.where(physical, shares[:, np.newaxis], NEVER)
         odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
         self._log_odds = np.log(odds / (1.0 - odds))
 
@@ -163,22 +181,41 @@ class ModelSpace:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
-    def _is_physical(self, k: int, size: float) -> bool:
-        """Whether an explanation, alone at some size, is what its cause can be.
+    def _products(self) -> Directions:
+        together = np.hstack(self.columns)
+        sided = [axes[e.sides != 0.0] for e, axes in zip(self.explanations, self._axes, strict=True)]
+        start = np.cumsum([0, *(c.shape[1] for c in self.columns)])
+        signed = np.zeros((max(map(len, sided)), together.shape[1]))
+        sides = np.zeros((len(sided), len(signed)))
+        for k, rows in enumerate(sided):
+            signed[: len(rows), start[k] : start[k + 1]] = rows
+            sides[k, : len(rows)] = self._sides(k)
+        deviation = self.null.deviation
+        return Directions(
+            together.T @ together, together.T @ deviation, float(deviation @ deviation), start,
+            signed, sides, min(self.freedom, 2.0 * KNOWN_NOISE), len(deviation),
+        )  # fmt: skip
+
+    def _sides(self, k: int) -> np.ndarray:
+        sides = self.explanations[k].sides
+        return sides[sides != 0.0]
+
+    def _are_physical(self, k: int) -> np.ndarray:
+        """(S,) whether an explanation, alone at each size, is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
-        explanation = self.explanations[k]
+        explanation, columns, axes = self.explanations[k], self.columns[k], self._axes[k]
         if explanation.sensitivity is None and not explanation.directions:
-            return True
-        (amounts,) = self.amplitudes(Model((), (k,), (size,)))
+            return np.full(len(SIZES), True)
+        precision = 1.0 / SIZES**2 + np.sum(columns**2, axis=0)[:, np.newaxis]
+        amounts = axes @ ((columns.T @ self.null.deviation)[:, np.newaxis] / precision)
         if explanation.sensitivity is None:
-            return explanation.goes_right(amounts)
+            return np.array([explanation.goes_right(a) for a in amounts.T])
         of_law = len(explanation.sensitivity.names)
-        columns = self.columns[k]
-        law = np.linalg.norm(columns[:, :of_law] @ amounts[:of_law])
-        error = np.linalg.norm(columns[:, of_law:] @ amounts[of_law:])
-        return bool(error <= max(NOTICED, LARGEST_ERROR * law))
+        law = np.linalg.norm(columns @ (axes[:of_law].T @ amounts[:of_law]), axis=0)
+        error = np.linalg.norm(columns @ (axes[of_law:].T @ amounts[of_law:]), axis=0)
+        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
     @property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -191,7 +228,7 @@ class ModelSpace:
             return []
         amounts = self.amplitudes(best)
         moved = {
-            cause: float(np.sum((self.columns[k] @ part) ** 2))
+            cause: float(np.sum((self.columns[k] @ self._axes[k].T @ part) ** 2))
             for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
         }
         least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
@@ -214,8 +251,10 @@ class ModelSpace:
         mean = np.linalg.solve(precision, columns.T @ self.null.deviation)
         ends = np.cumsum([part.shape[1] for part in parts])
         return [
-            size * amounts
-            for size, amounts in zip(model.sizes, np.split(mean, ends[:-1]), strict=True)
+            size * self._axes[k] @ part
+            for k, size, part in zip(
+                model.chosen, model.sizes, np.split(mean, ends[:-1]), strict=True
+            )
         ]
 
     def p_value(self, seed: int) -> float:
@@ -247,25 +286,30 @@ class ModelSpace:
         terms = []
         for k in range(len(self.explanations)) if chosen is None else chosen:
             explanation = self.explanations[k]
-            evidence = _by_size(self.columns[k], explanation.sides, deviations, self.freedom)
             odds = self._log_odds[self.causes.index(explanation.cause)]
             share = np.log(explanation.share / len(SIZES))
-            terms.append(logsumexp(evidence, axis=0) + share + odds)
+            terms.append(logsumexp(self._by_size(k, deviations), axis=0) + share + odds)
         return logsumexp(terms, axis=0)
+
+    def _by_size(self, k: int, deviations: np.ndarray) -> np.ndarray:
+        """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
+        signed = self._axes[k][self.explanations[k].sides != 0.0]
+        return log_bayes_factors(
+            self.columns[k], signed, self._sides(k), SIZES, deviations, self.freedom
+        )
 
     @cached_property
     def _alone(self) -> list[Model]:
         """One cause each: its evidence averaged, and its best explanation."""
         found = []
+        deviation = self.null.deviation[:, np.newaxis]
         for number, cause in enumerate(self.causes):
-            options = [
-                (self._log_evidence((k,), (size,)) + self._log_share[k, s], k, size)
-                for k in range(self._first[number], self._last[number])
-                for s, size in enumerate(SIZES)
-            ]
-            _, k, size = max(options)
-            weight = float(logsumexp([value for value, _, _ in options])) + self._log_odds[number]
-            found.append(Model((cause,), (k,), (float(size),), weight))
+            numbers = range(self._first[number], self._last[number])
+            values = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
+            values += self._log_share[numbers]
+            k, s = np.unravel_index(values.argmax(), values.shape)
+            weight = float(logsumexp(values)) + self._log_odds[number]
+            found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
         return found
 
     @cached_property
@@ -293,9 +337,8 @@ class ModelSpace:
         numbers = np.array([self.causes.index(c) for c in model.causes])
         chosen, sizes = np.array(model.chosen), np.array(model.sizes)
         _refine(
-            self._gram, self._scores, self._square, self._sides, self._start, self._log_share,
-            self._first[numbers], self._last[numbers], SIZES, chosen, sizes, self._freedom,
-            len(self.null.deviation), SWEEPS,
+            self._directions, self._log_share, self._first[numbers], self._last[numbers], SIZES,
+            chosen, sizes,
         )  # fmt: skip
         weight = self._log_evidence(chosen, sizes)
         alone = {m.causes[0]: m for m in self._alone}
@@ -306,16 +349,7 @@ class ModelSpace:
         return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
 
     def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
-        numbers = np.asarray(chosen, dtype=np.int64)
-        rows, scale = _rows(self._start, numbers, np.asarray(sizes, dtype=float))
-        return log_bayes_factor(
-            self._gram[np.ix_(rows, rows)], self._scores[rows], self._square, self._sides[rows],
-            scale, self._freedom, len(self.null.deviation),
-        )  # fmt: skip
-
-    @property
-    def _freedom(self) -> float:
-        return min(self.freedom, 2.0 * KNOWN_NOISE)
+        return float(_log_evidence(self._directions, np.asarray(chosen), np.atleast_2d(sizes))[0])
 
 
 def _joined(first: Model, second: Model) -> Model:
@@ -332,74 +366,66 @@ def _joined(first: Model, second: Model) -> Model:
     return Model(causes, chosen, sizes)
 
 
-def _by_size(
-    columns: np.ndarray, sides: np.ndarray, deviations: np.ndarray, freedom: float
-) -> np.ndarray:
-    """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
-    left, singular, right = np.linalg.svd(columns, full_matrices=False)
-    scores = left.T @ deviations
-    squares, found = np.sum(deviations**2, axis=0), []
-    for size in SIZES:
-        ratio = (size * singular) ** 2
-        shrink = ratio / (1.0 + ratio)
-        explained, log_det = shrink @ scores**2, float(np.log1p(ratio).sum())
-        if np.isfinite(freedom):
-            count = freedom + len(deviations)
-            factor = -0.5 * count * np.log1p(-explained / (freedom + squares)) - 0.5 * log_det
-        else:
-            factor = 0.5 * (explained - log_det)
-        mean = right.T @ ((size * singular / (1.0 + ratio))[:, np.newaxis] * scores)
-        variance = 1.0 - (right.T**2) @ shrink
-        for i in np.flatnonzero(sides):
-            factor = factor + np.log(2.0) + norm.logcdf(sides[i] * mean[i] / np.sqrt(variance[i]))
-        found.append(factor)
-    return np.array(found)
+@njit(cache=True, nogil=True)
+def _log_evidence(directions, chosen, sizes):
+    """(S,) log Bayes factors of chosen explanations (c,) together, at S sets of sizes (S, c)."""
+    start, gram = directions.start, directions.gram
+    # The widest comes first: its directions are orthogonal, so that they cost least.
+    widths = start[chosen + 1] - start[chosen]
+    order = np.argsort(-widths)
+    orthogonal, n = widths[order[0]], widths.sum()
+    rows, member = np.empty(n, np.int64), np.empty(n, np.int64)
+    most = len(chosen) * directions.sides.shape[1]
+    signed, sides = np.zeros((most, n)), np.empty(most)
+    at = known = 0
+    for m in order:
+        k, width = chosen[m], widths[m]
+        rows[at : at + width] = np.arange(start[k], start[k + 1])
+        member[at : at + width] = m
+        for q in range(directions.sides.shape[1]):
+            if directions.sides[k, q] != 0.0:
+                signed[known, at : at + width] = directions.signed[q, start[k] : start[k + 1]]
+                sides[known] = directions.sides[k, q]
+                known += 1
+        at += width
+    products = np.empty((n, n))
+    for i in range(n):
+        products[i, i] = gram[rows[i], rows[i]]
+        for j in range(i if i >= orthogonal else 0):
+            products[i, j] = gram[rows[i], rows[j]]
+    scores, found = directions.scores[rows], np.empty(len(sizes))
+    for s in range(len(sizes)):
+        found[s] = log_bayes_factor(
+            products, scores, directions.square, signed[:known], sides[:known], sizes[s][member],
+            directions.freedom, directions.count, orthogonal,
+        )  # fmt: skip
+    return found
 
 
-@njit(cache=True)
-def _rows(start, chosen, sizes):
-    """Rows of the chosen explanations among all directions, and the size of each."""
-    count = 0
-    for k in chosen:
-        count += start[k + 1] - start[k]
-    rows, scale = np.empty(count, np.int64), np.empty(count)
-    at = 0
-    for number, k in enumerate(chosen):
-        for row in range(start[k], start[k + 1]):
-            rows[at], scale[at] = row, sizes[number]
-            at += 1
-    return rows, scale
+@njit(cache=True, nogil=True)
+def _refine(directions, log_share, first, last, all_sizes, chosen, sizes):
+    """Choose the best explanation and size of one cause after the other, in place.
 
-
-@njit(cache=True)
-def _refine(
-    gram, scores, square, sides, start, log_share, first, last, all_sizes, chosen, sizes, freedom,
-    count, sweeps,
-):  # fmt: skip
-    """Choose the best explanation and size of one cause after the other, in place."""
-    best = -np.inf
-    for _ in range(sweeps):
-        before = best
-        for member in range(len(chosen)):
-            kept, kept_size = chosen[member], sizes[member]
-            for k in range(first[member], last[member]):
-                chosen[member] = k
-                for s, size in enumerate(all_sizes):
-                    if log_share[k, s] <= NEVER:
-                        continue
-                    sizes[member] = size
-                    rows, scale = _rows(start, chosen, sizes)
-                    n = len(rows)
-                    products, along, sided = np.empty((n, n)), np.empty(n), np.empty(n)
-                    for i in range(n):
-                        along[i], sided[i] = scores[rows[i]], sides[rows[i]]
-                        for j in range(n):
-                            products[i, j] = gram[rows[i], rows[j]]
-                    value = log_bayes_factor(products, along, square, sided, scale, freedom, count)
-                    for other in chosen:
-                        value += log_share[other].max()
-                    if value > best:
-                        best, kept, kept_size = value, k, size
-            chosen[member], sizes[member] = kept, kept_size
-        if best < before + 0.1:
+    Until none of them changes any more, but ``SWEEPS`` times each at the most.
+    """
+    best, unchanged = -np.inf, 0
+    for step in range(SWEEPS * len(chosen)):
+        member = step % len(chosen)
+        kept, kept_size = chosen[member], sizes[member]
+        unchanged += 1
+        tried = np.empty((len(all_sizes), len(chosen)))
+        tried[:] = sizes
+        tried[:, member] = all_sizes
+        for k in range(first[member], last[member]):
+            chosen[member] = k
+            values = _log_evidence(directions, chosen, tried)
+            for other in chosen:
+                values += log_share[other].max()
+            for s, size in enumerate(all_sizes):
+                if log_share[k, s] > NEVER and values[s] > best:
+                    best = values[s]
+                    if k != kept or size != kept_size:
+                        kept, kept_size, unchanged = k, size, 0
+        chosen[member], sizes[member] = kept, kept_size
+        if unchanged >= len(chosen) - 1 and step >= len(chosen) - 1:
             break
