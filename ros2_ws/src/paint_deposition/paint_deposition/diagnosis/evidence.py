@@ -74,44 +74,63 @@ class NullModel:
         return NullModel.of(self.columns[rows], self.raw[rows], self.nuisance)
 
 
-def principal(columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions (P, n), turned to be orthogonal to each other, and the rotation (n, n)."""
-    _, axes = eigh(columns.T @ columns)
-    return columns @ axes, axes
+@dataclass(frozen=True)
+class Principal:
+    """Whitened directions of one explanation, turned to be orthogonal to each other.
 
-
-def log_bayes_factors(
-    columns: np.ndarray,
-    signed: np.ndarray,
-    sides: np.ndarray,
-    sizes: np.ndarray,
-    deviations: np.ndarray,
-    freedom: float,
-) -> np.ndarray:
-    """(S, D) log Bayes factors of one explanation, at S sizes, for (P, D) deviations.
-
-    Args:
-        columns: (P, n) its whitened directions, orthogonal to each other.
-        signed: (q, n) sums of amplitudes whose sign is known. sides: (q,) +1 or -1.
-        sizes: (S,) standard deviations of the amplitudes.
-        deviations: whitened.
-        freedom: degrees of freedom of the noise estimate.
+    Attributes:
+        columns: (P, n) the directions.
+        axes: (n, n) what each amplitude, a row, is along them.
+        signed: (q, n) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
     """
-    scores, squares = columns.T @ deviations, np.sum(deviations**2, axis=0)
-    sizes = sizes[:, np.newaxis]
-    precision = 1.0 + sizes**2 * np.sum(columns**2, axis=0)
-    explained = (sizes**2 / precision) @ scores**2
-    factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
-    if np.isfinite(freedom):
-        count = freedom + len(deviations)
-        factors = factors - 0.5 * count * np.log1p(-explained / (freedom + squares))
-    else:
-        factors = factors + 0.5 * explained
-    for row, side in zip(signed, sides, strict=True):
-        mean = (sizes * row / precision) @ scores
-        deviation = np.sqrt((row**2 / precision).sum(axis=1, keepdims=True))
-        factors += np.log(2.0) + log_ndtr(side * mean / deviation)
-    return factors
+
+    columns: np.ndarray
+    axes: np.ndarray
+    signed: np.ndarray
+    sides: np.ndarray
+
+    @staticmethod
+    def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':
+        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known."""
+        _, axes = eigh(columns.T @ columns)
+        known = sides != 0.0
+        return Principal(columns @ axes, axes, axes[known], sides[known])
+
+    def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """(S, n) posterior means of the original amplitudes at each of S sizes.
+
+        Args:
+            deviation: (P,) whitened.
+            sizes: (S,) standard deviations of the amplitudes before the readings.
+        """
+        precision = sizes[:, np.newaxis] ** -2.0 + np.sum(self.columns**2, axis=0)
+        return (self.columns.T @ deviation / precision) @ self.axes.T
+
+    def log_bayes_factors(
+        self, deviations: np.ndarray, sizes: np.ndarray, freedom: float
+    ) -> np.ndarray:
+        """(S, D) log Bayes factors against the null hypothesis, at S sizes, for D deviations.
+
+        Args:
+            deviations: (P, D) whitened.
+            sizes: (S,) standard deviations of the amplitudes before the readings.
+            freedom: degrees of freedom of the noise estimate.
+        """
+        scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
+        sizes = sizes[:, np.newaxis]
+        precision = 1.0 + sizes**2 * np.sum(self.columns**2, axis=0)
+        explained = (sizes**2 / precision) @ scores**2
+        factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
+        if np.isfinite(freedom):
+            count = freedom + len(deviations)
+            factors = factors - 0.5 * count * np.log1p(-explained / (freedom + squares))
+        else:
+            factors = factors + 0.5 * explained
+        for row, side in zip(self.signed, self.sides, strict=True):
+            mean = (sizes * row / precision) @ scores
+            deviation = np.sqrt((row**2 / precision).sum(axis=1, keepdims=True))
+            factors += np.log(2.0) + log_ndtr(side * mean / deviation)
+        return factors
 
 
 def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:

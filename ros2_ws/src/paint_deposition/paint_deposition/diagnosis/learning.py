@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.diagnosis.evidence import NullModel, log_bayes_factors, principal
+from paint_deposition.diagnosis.evidence import NullModel, Principal
 from paint_deposition.diagnosis.explanations import Explanation
 from paint_deposition.diagnosis.model_space import SIZES
 
@@ -50,7 +50,5 @@ def choose_laws(
 
 def _by_size(null: NullModel, explanation: Explanation, freedom: float) -> np.ndarray:
     """(S,) log Bayes factor of a law at every size."""
-    columns, _ = principal(null.whiten(explanation.columns))
-    none = np.empty((0, columns.shape[1])), np.empty(0)
-    deviation = null.deviation[:, np.newaxis]
-    return log_bayes_factors(columns, *none, SIZES, deviation, freedom)[:, 0]
+    found = Principal.of(null.whiten(explanation.columns), explanation.sides)
+    return found.log_bayes_factors(null.deviation[:, np.newaxis], SIZES, freedom)[:, 0]

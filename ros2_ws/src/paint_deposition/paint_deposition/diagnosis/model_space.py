@@ -9,22 +9,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.special import expit, logsumexp
 
-from paint_deposition.diagnosis.evidence import (
-    KNOWN_NOISE,
-    NullModel,
-    log_bayes_factor,
-    log_bayes_factors,
-    principal,
-    simulated,
-)
+from paint_deposition.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
+from paint_deposition.diagnosis.joint_evidence import NEVER, Directions, log_evidence, refine
 
 # Prior probability that a cause is missing: an effect of the library, something outside it, and
 # a pattern that is no two Gaussians. No measured pattern is exactly one.
@@ -41,8 +33,6 @@ CREDIBLE = 0.95
 DRAWS = 2000
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
-# Log prior share of an explanation that contradicts physics.
-NEVER = -1e6
 # The error of a law is at most this large beside the law; a smaller one, in standard deviations
 # of the noise, may be noise.
 LARGEST_ERROR, NOTICED = 0.6, 3.0
@@ -67,28 +57,6 @@ class Model:
     log_weight: float = 0.0
 
 
-class Directions(NamedTuple):
-    """The directions of all explanations, whitened, those of each orthogonal to each other.
-
-    Attributes:
-        gram: (N, N) their products. scores: (N,) products with the deviations.
-        square: of the deviations' length.
-        start: (K + 1,) first direction of each explanation, and N.
-        signed: (q, N) sums of each explanation's amplitudes whose sign is known.
-        sides: (K, q) that sign, +1 or -1; 0 where an explanation has fewer.
-        freedom: degrees of freedom of the noise estimate. count: of readings.
-    """
-
-    gram: np.ndarray
-    scores: np.ndarray
-    square: float
-    start: np.ndarray
-    signed: np.ndarray
-    sides: np.ndarray
-    freedom: float
-    count: int
-
-
 class ModelSpace:
     """All models around a null model.
 
@@ -108,10 +76,8 @@ class ModelSpace:
         names = [e.cause for e in self.explanations]
         self._first = np.array([names.index(c) for c in self.causes])
         self._last = np.append(self._first[1:], len(names))
-        turned = [principal(null.whiten(e.columns)) for e in self.explanations]
-        self.columns = [columns for columns, _ in turned]
-        self._axes = [axes for _, axes in turned]
-        self._directions = self._products()
+        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
+        self._directions = Directions.of(self.principal, null.deviation, freedom)
         shares = np.log([e.share / len(SIZES) for e in self.explanations])
         physical = np.array([self._are_physical(k) for k in range(len(names))])
         self._log_share = np.where(physical, shares[:, np.newaxis], NEVER)
@@ -181,40 +147,21 @@ class ModelSpace:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
-    def _products(self) -> Directions:
-        together = np.hstack(self.columns)
-        sided = [axes[e.sides != 0.0] for e, axes in zip(self.explanations, self._axes, strict=True)]
-        start = np.cumsum([0, *(c.shape[1] for c in self.columns)])
-        signed = np.zeros((max(map(len, sided)), together.shape[1]))
-        sides = np.zeros((len(sided), len(signed)))
-        for k, rows in enumerate(sided):
-            signed[: len(rows), start[k] : start[k + 1]] = rows
-            sides[k, : len(rows)] = self._sides(k)
-        deviation = self.null.deviation
-        return Directions(
-            together.T @ together, together.T @ deviation, float(deviation @ deviation), start,
-            signed, sides, min(self.freedom, 2.0 * KNOWN_NOISE), len(deviation),
-        )  # fmt: skip
-
-    def _sides(self, k: int) -> np.ndarray:
-        sides = self.explanations[k].sides
-        return sides[sides != 0.0]
-
     def _are_physical(self, k: int) -> np.ndarray:
         """(S,) whether an explanation, alone at each size, is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
-        explanation, columns, axes = self.explanations[k], self.columns[k], self._axes[k]
+        explanation, own = self.explanations[k], self.principal[k]
         if explanation.sensitivity is None and not explanation.directions:
             return np.full(len(SIZES), True)
-        precision = 1.0 / SIZES**2 + np.sum(columns**2, axis=0)[:, np.newaxis]
-        amounts = axes @ ((columns.T @ self.null.deviation)[:, np.newaxis] / precision)
+        amounts = own.amplitudes(self.null.deviation, SIZES)
         if explanation.sensitivity is None:
-            return np.array([explanation.goes_right(a) for a in amounts.T])
+            return np.array([explanation.goes_right(a) for a in amounts])
         of_law = len(explanation.sensitivity.names)
-        law = np.linalg.norm(columns @ (axes[:of_law].T @ amounts[:of_law]), axis=0)
-        error = np.linalg.norm(columns @ (axes[of_law:].T @ amounts[of_law:]), axis=0)
+        columns = own.columns @ own.axes.T
+        law = np.linalg.norm(columns[:, :of_law] @ amounts[:, :of_law].T, axis=0)
+        error = np.linalg.norm(columns[:, of_law:] @ amounts[:, of_law:].T, axis=0)
         return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
     @property
@@ -226,9 +173,9 @@ class ModelSpace:
         best = self.models[0]
         if not best.causes:
             return []
-        amounts = self.amplitudes(best)
+        amounts, own = self.amplitudes(best), self.principal
         moved = {
-            cause: float(np.sum((self.columns[k] @ self._axes[k].T @ part) ** 2))
+            cause: float(np.sum((own[k].columns @ own[k].axes.T @ part) ** 2))
             for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
         }
         least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
@@ -245,13 +192,16 @@ class ModelSpace:
 
     def amplitudes(self, model: Model) -> list[np.ndarray]:
         """Posterior mean amplitudes of each of a model's explanations, in their own units."""
-        parts = [size * self.columns[k] for k, size in zip(model.chosen, model.sizes, strict=True)]
+        parts = [
+            size * self.principal[k].columns
+            for k, size in zip(model.chosen, model.sizes, strict=True)
+        ]
         columns = np.hstack(parts)
         precision = np.eye(columns.shape[1]) + columns.T @ columns
         mean = np.linalg.solve(precision, columns.T @ self.null.deviation)
         ends = np.cumsum([part.shape[1] for part in parts])
         return [
-            size * self._axes[k] @ part
+            size * self.principal[k].axes @ part
             for k, size, part in zip(
                 model.chosen, model.sizes, np.split(mean, ends[:-1]), strict=True
             )
@@ -293,10 +243,7 @@ class ModelSpace:
 
     def _by_size(self, k: int, deviations: np.ndarray) -> np.ndarray:
         """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
-        signed = self._axes[k][self.explanations[k].sides != 0.0]
-        return log_bayes_factors(
-            self.columns[k], signed, self._sides(k), SIZES, deviations, self.freedom
-        )
+        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom)
 
     @cached_property
     def _alone(self) -> list[Model]:
@@ -336,9 +283,9 @@ class ModelSpace:
         """The same causes with the explanations and sizes that are best together."""
         numbers = np.array([self.causes.index(c) for c in model.causes])
         chosen, sizes = np.array(model.chosen), np.array(model.sizes)
-        _refine(
+        refine(
             self._directions, self._log_share, self._first[numbers], self._last[numbers], SIZES,
-            chosen, sizes,
+            chosen, sizes, SWEEPS,
         )  # fmt: skip
         weight = self._log_evidence(chosen, sizes)
         alone = {m.causes[0]: m for m in self._alone}
@@ -349,7 +296,7 @@ class ModelSpace:
         return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
 
     def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
-        return float(_log_evidence(self._directions, np.asarray(chosen), np.atleast_2d(sizes))[0])
+        return float(log_evidence(self._directions, np.asarray(chosen), np.atleast_2d(sizes))[0])
 
 
 def _joined(first: Model, second: Model) -> Model:
@@ -364,68 +311,3 @@ def _joined(first: Model, second: Model) -> Model:
     )
     causes, chosen, sizes = zip(*members, strict=True)
     return Model(causes, chosen, sizes)
-
-
-@njit(cache=True, nogil=True)
-def _log_evidence(directions, chosen, sizes):
-    """(S,) log Bayes factors of chosen explanations (c,) together, at S sets of sizes (S, c)."""
-    start, gram = directions.start, directions.gram
-    # The widest comes first: its directions are orthogonal, so that they cost least.
-    widths = start[chosen + 1] - start[chosen]
-    order = np.argsort(-widths)
-    orthogonal, n = widths[order[0]], widths.sum()
-    rows, member = np.empty(n, np.int64), np.empty(n, np.int64)
-    most = len(chosen) * directions.sides.shape[1]
-    signed, sides = np.zeros((most, n)), np.empty(most)
-    at = known = 0
-    for m in order:
-        k, width = chosen[m], widths[m]
-        rows[at : at + width] = np.arange(start[k], start[k + 1])
-        member[at : at + width] = m
-        for q in range(directions.sides.shape[1]):
-            if directions.sides[k, q] != 0.0:
-                signed[known, at : at + width] = directions.signed[q, start[k] : start[k + 1]]
-                sides[known] = directions.sides[k, q]
-                known += 1
-        at += width
-    products = np.empty((n, n))
-    for i in range(n):
-        products[i, i] = gram[rows[i], rows[i]]
-        for j in range(i if i >= orthogonal else 0):
-            products[i, j] = gram[rows[i], rows[j]]
-    scores, found = directions.scores[rows], np.empty(len(sizes))
-    for s in range(len(sizes)):
-        found[s] = log_bayes_factor(
-            products, scores, directions.square, signed[:known], sides[:known], sizes[s][member],
-            directions.freedom, directions.count, orthogonal,
-        )  # fmt: skip
-    return found
-
-
-@njit(cache=True, nogil=True)
-def _refine(directions, log_share, first, last, all_sizes, chosen, sizes):
-    """Choose the best explanation and size of one cause after the other, in place.
-
-    Until none of them changes any more, but ``SWEEPS`` times each at the most.
-    """
-    best, unchanged = -np.inf, 0
-    for step in range(SWEEPS * len(chosen)):
-        member = step % len(chosen)
-        kept, kept_size = chosen[member], sizes[member]
-        unchanged += 1
-        tried = np.empty((len(all_sizes), len(chosen)))
-        tried[:] = sizes
-        tried[:, member] = all_sizes
-        for k in range(first[member], last[member]):
-            chosen[member] = k
-            values = _log_evidence(directions, chosen, tried)
-            for other in chosen:
-                values += log_share[other].max()
-            for s, size in enumerate(all_sizes):
-                if log_share[k, s] > NEVER and values[s] > best:
-                    best = values[s]
-                    if k != kept or size != kept_size:
-                        kept, kept_size, unchanged = k, size, 0
-        chosen[member], sizes[member] = kept, kept_size
-        if unchanged >= len(chosen) - 1 and step >= len(chosen) - 1:
-            break
