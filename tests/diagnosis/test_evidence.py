@@ -11,11 +11,12 @@ from diagnosis.linear import prior_covariance as covariance_of
 from paint_deposition.diagnosis.evidence import (
     KNOWN_NOISE,
     NullModel,
+    Principal,
     log_bayes_factor,
     log_normal_cdf,
     simulated,
 )
-from paint_deposition.diagnosis.model_space import SIZES, _by_size
+from paint_deposition.diagnosis.model_space import SIZES
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.fitting.parameters import PATTERN, FreeParameters
@@ -36,11 +37,13 @@ def columns():
 def log_factor(columns, deviations, sides=None, sizes=None, freedom=np.inf) -> float:
     """The log Bayes factor of whitened directions (P, n) for whitened deviations (P,)."""
     count = columns.shape[1]
+    known = np.zeros(count) if sides is None else np.array(sides, dtype=float)
     return log_bayes_factor(
         columns.T @ columns,
         columns.T @ deviations,
         float(deviations @ deviations),
-        np.zeros(count) if sides is None else np.array(sides, dtype=float),
+        np.eye(count)[known != 0.0],
+        known[known != 0.0],
         np.ones(count) if sizes is None else np.array(sizes, dtype=float),
         min(freedom, 2.0 * KNOWN_NOISE),
         len(deviations),
@@ -168,11 +171,20 @@ def test_simulated_deviations_are_weighed_like_the_readings(columns, freedom, si
     """Of many deviations at once and of one, at every size."""
     draws = simulated(READINGS, freedom, 5, seed=1)
     sides = np.array(sides, dtype=float)
-    together = _by_size(columns, sides, draws, freedom)
+    together = Principal.of(columns, sides).log_bayes_factors(draws, SIZES, freedom)
     assert together.shape == (len(SIZES), 5)
     for size, row in zip(SIZES, together, strict=True):
         one_by_one = [log_factor(columns, draw, sides, [size] * 3, freedom) for draw in draws.T]
         assert row == pytest.approx(one_by_one, rel=1e-6)
+
+
+@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, -1)])
+def test_amplitudes_are_the_posterior_means_of_the_directions_as_they_were(columns, sides):
+    data = np.random.default_rng(9).normal(size=READINGS)
+    found = Principal.of(columns, np.array(sides, dtype=float)).amplitudes(data, SIZES)
+    for size, amounts in zip(SIZES, found, strict=True):
+        precision = columns.T @ columns + np.eye(3) / size**2
+        assert amounts == pytest.approx(np.linalg.solve(precision, columns.T @ data))
 
 
 def test_directions_that_nearly_coincide_are_no_trouble():
@@ -185,7 +197,8 @@ def test_directions_that_nearly_coincide_are_no_trouble():
 def test_a_factor_averages_to_one_where_nothing_is_missing(columns):
     """The defining property of a Bayes factor, whatever the sides and the noise."""
     draws = simulated(READINGS, np.inf, 40_000, seed=2)
-    factors = np.exp(_by_size(0.1 * columns[:, :2], np.array([1.0, 0.0]), draws, np.inf)[1])
+    principal = Principal.of(0.1 * columns[:, :2], np.array([1.0, 0.0]))
+    (factors,) = np.exp(principal.log_bayes_factors(draws, SIZES[1:2], np.inf))
     assert factors.mean() == pytest.approx(1.0, abs=4.0 * factors.std() / 200.0)
 
 

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.linalg import solve_triangular
+from scipy.linalg import eigh, solve_triangular
+from scipy.special import log_ndtr
 
 from paint_deposition.fitting.least_squares import Fit, covariance_factor
 
@@ -73,6 +74,65 @@ class NullModel:
         return NullModel.of(self.columns[rows], self.raw[rows], self.nuisance)
 
 
+@dataclass(frozen=True)
+class Principal:
+    """Whitened directions of one explanation, turned to be orthogonal to each other.
+
+    Attributes:
+        columns: (P, n) the directions.
+        axes: (n, n) what each amplitude, a row, is along them.
+        signed: (q, n) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
+    """
+
+    columns: np.ndarray
+    axes: np.ndarray
+    signed: np.ndarray
+    sides: np.ndarray
+
+    @staticmethod
+    def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':
+        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known."""
+        _, axes = eigh(columns.T @ columns)
+        known = sides != 0.0
+        return Principal(columns @ axes, axes, axes[known], sides[known])
+
+    def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
+        """(S, n) posterior means of the original amplitudes at each of S sizes.
+
+        Args:
+            deviation: (P,) whitened.
+            sizes: (S,) standard deviations of the amplitudes before the readings.
+        """
+        precision = sizes[:, np.newaxis] ** -2.0 + np.sum(self.columns**2, axis=0)
+        return (self.columns.T @ deviation / precision) @ self.axes.T
+
+    def log_bayes_factors(
+        self, deviations: np.ndarray, sizes: np.ndarray, freedom: float
+    ) -> np.ndarray:
+        """(S, D) log Bayes factors against the null hypothesis, at S sizes, for D deviations.
+
+        Args:
+            deviations: (P, D) whitened.
+            sizes: (S,) standard deviations of the amplitudes before the readings.
+            freedom: degrees of freedom of the noise estimate.
+        """
+        scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
+        sizes = sizes[:, np.newaxis]
+        precision = 1.0 + sizes**2 * np.sum(self.columns**2, axis=0)
+        explained = (sizes**2 / precision) @ scores**2
+        factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
+        if np.isfinite(freedom):
+            count = freedom + len(deviations)
+            factors = factors - 0.5 * count * np.log1p(-explained / (freedom + squares))
+        else:
+            factors = factors + 0.5 * explained
+        for row, side in zip(self.signed, self.sides, strict=True):
+            mean = (sizes * row / precision) @ scores
+            deviation = np.sqrt((row**2 / precision).sum(axis=1, keepdims=True))
+            factors += np.log(2.0) + log_ndtr(side * mean / deviation)
+        return factors
+
+
 def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
     """(count, draws) whitened deviations under the null hypothesis.
 
@@ -86,7 +146,7 @@ def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
     return deviations
 
 
-@njit(cache=True)
+@njit(cache=True, nogil=True)
 def log_normal_cdf(x):
     """Logarithm of the standard normal distribution function."""
     if x > -30.0:
@@ -94,62 +154,67 @@ def log_normal_cdf(x):
     return -0.5 * x * x - math.log(-x * math.sqrt(2.0 * math.pi))
 
 
-@njit(cache=True)
-def log_bayes_factor(gram, scores, square, sides, scale, freedom, count):
+@njit(cache=True, nogil=True, fastmath={'reassoc', 'contract'})
+def log_bayes_factor(gram, scores, square, signed, sides, scale, freedom, count, orthogonal=0):
     """Log Bayes factor of explanations together against the null hypothesis.
 
     Args:
-        gram: (n, n) products of their whitened directions. scores: (n,) products with the
-            deviations. square: of the deviations' length.
-        sides: (n,) +1 or -1 where the sign of an amplitude is known, else 0; several such
-            amplitudes count as independent in the posterior.
+        gram: (n, n) products of their whitened directions; of those that are orthogonal to each
+            other only the diagonal is read.
+        scores: (n,) products with the deviations. square: of the deviations' length.
+        signed: (q, n) sums of amplitudes, each in units of its standard deviation, whose sign is
+            known; they count as independent in the posterior. sides: (q,) +1 or -1.
         scale: (n,) standard deviation of each amplitude, in units of its direction.
         freedom: degrees of freedom of the noise estimate; the evidence integrates over the
             noise's unknown scale, so with few a misfit counts less.
         count: of readings.
+        orthogonal: how many of the directions, the first ones, are orthogonal to each other.
     """
     n = len(scores)
-    lower, half = np.zeros((n, n)), np.empty(n)
+    # Cholesky factor of the amplitudes' posterior precision; its first rows are diagonal.
+    lower, pivot, half = np.empty((n, n)), np.empty(n), np.empty(n)
     log_det = explained = 0.0
     for i in range(n):
-        for j in range(i + 1):
+        for j in range(orthogonal if i >= orthogonal else 0):
+            lower[i, j] = gram[i, j] * scale[i] * scale[j] / pivot[j]
+        for j in range(orthogonal, i):
             value = gram[i, j] * scale[i] * scale[j]
             for k in range(j):
                 value -= lower[i, k] * lower[j, k]
-            if i == j:
-                lower[i, i] = math.sqrt(max(value + 1.0, 1e-12))
-                log_det += 2.0 * math.log(lower[i, i])
-            else:
-                lower[i, j] = value / lower[j, j]
-        value = scores[i] * scale[i]
-        for k in range(i):
-            value -= lower[i, k] * half[k]
-        half[i] = value / lower[i, i]
-        explained += half[i] * half[i]
+            lower[i, j] = value / pivot[j]
+        value = 1.0 + gram[i, i] * scale[i] ** 2
+        for k in range(i if i >= orthogonal else 0):
+            value -= lower[i, k] ** 2
+        pivot[i] = math.sqrt(max(value, 1e-12))
+        log_det += 2.0 * math.log(pivot[i])
+        half[i] = scores[i] * scale[i]
+    _solve(lower, pivot, half, orthogonal)
+    for i in range(n):
+        explained += half[i] ** 2
     if freedom < KNOWN_NOISE:
         share = min(explained / (freedom + square), 1.0 - 1e-12)
         factor = -0.5 * (freedom + count) * math.log1p(-share) - 0.5 * log_det
     else:
         factor = 0.5 * (explained - log_det)
-    if not sides.any():
-        return factor
-    mean, column = np.empty(n), np.empty(n)
-    for i in range(n - 1, -1, -1):
-        value = half[i]
-        for k in range(i + 1, n):
-            value -= lower[k, i] * mean[k]
-        mean[i] = value / lower[i, i]
-    for i in range(n):
-        if sides[i] != 0.0:
-            variance = 0.0
-            for row in range(i, n):
-                value = 1.0 if row == i else 0.0
-                for k in range(i, row):
-                    value -= lower[row, k] * column[k]
-                column[row] = value / lower[row, row]
-                variance += column[row] * column[row]
-            factor += math.log(2.0) + log_normal_cdf(sides[i] * mean[i] / math.sqrt(variance))
+    for q in range(len(sides)):
+        column = signed[q].copy()
+        _solve(lower, pivot, column, orthogonal)
+        mean = variance = 0.0
+        for i in range(n):
+            mean += column[i] * half[i]
+            variance += column[i] ** 2
+        factor += math.log(2.0) + log_normal_cdf(sides[q] * mean / math.sqrt(variance))
     return factor
+
+
+@njit(cache=True, nogil=True, fastmath={'reassoc', 'contract'})
+def _solve(lower, pivot, column, orthogonal):
+    """Divide a column (n,) by a lower triangle, in place; its first rows are diagonal."""
+    for i in range(len(column)):
+        value = column[i]
+        for k in range(i if i >= orthogonal else 0):
+            value -= lower[i, k] * column[k]
+        column[i] = value / pivot[i]
 
 
 def evidence(columns: np.ndarray, null: NullModel, freedom: float) -> float:
@@ -157,5 +222,6 @@ def evidence(columns: np.ndarray, null: NullModel, freedom: float) -> float:
     count = columns.shape[1]
     return log_bayes_factor(
         columns.T @ columns, columns.T @ null.deviation, float(null.deviation @ null.deviation),
-        np.zeros(count), np.ones(count), min(freedom, 2.0 * KNOWN_NOISE), len(null.deviation),
+        np.empty((0, count)), np.empty(0), np.ones(count), min(freedom, 2.0 * KNOWN_NOISE),
+        len(null.deviation),
     )  # fmt: skip

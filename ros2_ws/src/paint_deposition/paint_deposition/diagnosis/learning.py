@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.diagnosis.evidence import NullModel, evidence
+from paint_deposition.diagnosis.evidence import NullModel, Principal
 from paint_deposition.diagnosis.explanations import Explanation
 from paint_deposition.diagnosis.model_space import SIZES
 
@@ -30,24 +30,25 @@ def choose_laws(
     Returns:
         The number of each explanation, and the standard deviation of its amplitudes.
     """
-    left = {
-        k: (explanation.random.basis.law, null.whiten(explanation.columns))
-        for k, explanation in enumerate(explanations)
-        if explanation.random is not None
-    }
+    left = {k: (e, e.random.basis.law) for k, e in enumerate(explanations) if e.random is not None}
     chosen: list[tuple[int, float]] = []
-    taken: np.ndarray = np.empty((len(null.deviation), 0))
-    value = 0.0
     while left and len(chosen) < MOST_LAWS:
-        best, k, size = max(
-            (evidence(np.hstack([taken, size * columns]), null, freedom), k, float(size))
-            for k, (_, columns) in left.items()
-            for size in SIZES
+        gain, k, size = max(
+            (float(value), k, float(size))
+            for k, (explanation, _) in left.items()
+            for value, size in zip(_by_size(null, explanation, freedom), SIZES, strict=True)
         )
-        if best < value + WORTH_LEARNING:
+        if gain < WORTH_LEARNING:
             break
-        law, columns = left[k]
-        value, taken = best, np.hstack([taken, size * columns])
         chosen.append((k, size))
-        left = {number: entry for number, entry in left.items() if entry[0] is not law}
+        explanation, law = left[k]
+        # What was chosen may vary from now on, too.
+        null = NullModel.of(np.hstack([null.columns, size * explanation.columns]), null.raw)
+        left = {number: entry for number, entry in left.items() if entry[1] is not law}
     return chosen
+
+
+def _by_size(null: NullModel, explanation: Explanation, freedom: float) -> np.ndarray:
+    """(S,) log Bayes factor of a law at every size."""
+    found = Principal.of(null.whiten(explanation.columns), explanation.sides)
+    return found.log_bayes_factors(null.deviation[:, np.newaxis], SIZES, freedom)[:, 0]

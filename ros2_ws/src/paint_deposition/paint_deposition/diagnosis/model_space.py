@@ -11,18 +11,12 @@ from functools import cached_property
 from itertools import combinations
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike
 from scipy.special import expit, logsumexp
-from scipy.stats import norm
 
-from paint_deposition.diagnosis.evidence import (
-    KNOWN_NOISE,
-    NullModel,
-    log_bayes_factor,
-    simulated,
-)
+from paint_deposition.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
+from paint_deposition.diagnosis.joint_evidence import NEVER, Directions, log_evidence, refine
 
 # Prior probability that a cause is missing: an effect of the library, something outside it, and
 # a pattern that is no two Gaussians. No measured pattern is exactly one.
@@ -39,8 +33,6 @@ CREDIBLE = 0.95
 DRAWS = 2000
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
-# Log prior share of an explanation that contradicts physics.
-NEVER = -1e6
 # The error of a law is at most this large beside the law; a smaller one, in standard deviations
 # of the noise, may be noise.
 LARGEST_ERROR, NOTICED = 0.6, 3.0
@@ -84,19 +76,11 @@ class ModelSpace:
         names = [e.cause for e in self.explanations]
         self._first = np.array([names.index(c) for c in self.causes])
         self._last = np.append(self._first[1:], len(names))
-        self.columns = [null.whiten(e.columns) for e in self.explanations]
-        self._start = np.cumsum([0, *(c.shape[1] for c in self.columns)])
-        together = np.hstack(self.columns)
-        self._gram = together.T @ together
-        self._scores = together.T @ null.deviation
-        self._square = float(null.deviation @ null.deviation)
-        self._sides = np.concatenate([e.sides for e in self.explanations])
+        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
+        self._directions = Directions.of(self.principal, null.deviation, freedom)
         shares = np.log([e.share / len(SIZES) for e in self.explanations])
-        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
-        for k in range(len(self.explanations)):
-            for s, size in enumerate(SIZES):
-                if not self._is_physical(k, float(size)):
-                    self._log_share[k, s] = NEVER
+        physical = np.array([self._are_physical(k) for k in range(len(names))])
+        self._log_share = np.where(physical, shares[:, np.newaxis], NEVER)
         odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
         self._log_odds = np.log(odds / (1.0 - odds))
 
@@ -163,22 +147,22 @@ class ModelSpace:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
-    def _is_physical(self, k: int, size: float) -> bool:
-        """Whether an explanation, alone at some size, is what its cause can be.
+    def _are_physical(self, k: int) -> np.ndarray:
+        """(S,) whether an explanation, alone at each size, is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
-        explanation = self.explanations[k]
+        explanation, own = self.explanations[k], self.principal[k]
         if explanation.sensitivity is None and not explanation.directions:
-            return True
-        (amounts,) = self.amplitudes(Model((), (k,), (size,)))
+            return np.full(len(SIZES), True)
+        amounts = own.amplitudes(self.null.deviation, SIZES)
         if explanation.sensitivity is None:
-            return explanation.goes_right(amounts)
+            return np.array([explanation.goes_right(a) for a in amounts])
         of_law = len(explanation.sensitivity.names)
-        columns = self.columns[k]
-        law = np.linalg.norm(columns[:, :of_law] @ amounts[:of_law])
-        error = np.linalg.norm(columns[:, of_law:] @ amounts[of_law:])
-        return bool(error <= max(NOTICED, LARGEST_ERROR * law))
+        columns = own.columns @ own.axes.T
+        law = np.linalg.norm(columns[:, :of_law] @ amounts[:, :of_law].T, axis=0)
+        error = np.linalg.norm(columns[:, of_law:] @ amounts[:, of_law:].T, axis=0)
+        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
     @property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -189,9 +173,9 @@ class ModelSpace:
         best = self.models[0]
         if not best.causes:
             return []
-        amounts = self.amplitudes(best)
+        amounts, own = self.amplitudes(best), self.principal
         moved = {
-            cause: float(np.sum((self.columns[k] @ part) ** 2))
+            cause: float(np.sum((own[k].columns @ own[k].axes.T @ part) ** 2))
             for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
         }
         least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
@@ -208,14 +192,19 @@ class ModelSpace:
 
     def amplitudes(self, model: Model) -> list[np.ndarray]:
         """Posterior mean amplitudes of each of a model's explanations, in their own units."""
-        parts = [size * self.columns[k] for k, size in zip(model.chosen, model.sizes, strict=True)]
+        parts = [
+            size * self.principal[k].columns
+            for k, size in zip(model.chosen, model.sizes, strict=True)
+        ]
         columns = np.hstack(parts)
         precision = np.eye(columns.shape[1]) + columns.T @ columns
         mean = np.linalg.solve(precision, columns.T @ self.null.deviation)
         ends = np.cumsum([part.shape[1] for part in parts])
         return [
-            size * amounts
-            for size, amounts in zip(model.sizes, np.split(mean, ends[:-1]), strict=True)
+            size * self.principal[k].axes @ part
+            for k, size, part in zip(
+                model.chosen, model.sizes, np.split(mean, ends[:-1]), strict=True
+            )
         ]
 
     def p_value(self, seed: int) -> float:
@@ -247,25 +236,27 @@ class ModelSpace:
         terms = []
         for k in range(len(self.explanations)) if chosen is None else chosen:
             explanation = self.explanations[k]
-            evidence = _by_size(self.columns[k], explanation.sides, deviations, self.freedom)
             odds = self._log_odds[self.causes.index(explanation.cause)]
             share = np.log(explanation.share / len(SIZES))
-            terms.append(logsumexp(evidence, axis=0) + share + odds)
+            terms.append(logsumexp(self._by_size(k, deviations), axis=0) + share + odds)
         return logsumexp(terms, axis=0)
+
+    def _by_size(self, k: int, deviations: np.ndarray) -> np.ndarray:
+        """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
+        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom)
 
     @cached_property
     def _alone(self) -> list[Model]:
         """One cause each: its evidence averaged, and its best explanation."""
         found = []
+        deviation = self.null.deviation[:, np.newaxis]
         for number, cause in enumerate(self.causes):
-            options = [
-                (self._log_evidence((k,), (size,)) + self._log_share[k, s], k, size)
-                for k in range(self._first[number], self._last[number])
-                for s, size in enumerate(SIZES)
-            ]
-            _, k, size = max(options)
-            weight = float(logsumexp([value for value, _, _ in options])) + self._log_odds[number]
-            found.append(Model((cause,), (k,), (float(size),), weight))
+            numbers = range(self._first[number], self._last[number])
+            values = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
+            values += self._log_share[numbers]
+            k, s = np.unravel_index(values.argmax(), values.shape)
+            weight = float(logsumexp(values)) + self._log_odds[number]
+            found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
         return found
 
     @cached_property
@@ -292,10 +283,9 @@ class ModelSpace:
         """The same causes with the explanations and sizes that are best together."""
         numbers = np.array([self.causes.index(c) for c in model.causes])
         chosen, sizes = np.array(model.chosen), np.array(model.sizes)
-        _refine(
-            self._gram, self._scores, self._square, self._sides, self._start, self._log_share,
-            self._first[numbers], self._last[numbers], SIZES, chosen, sizes, self._freedom,
-            len(self.null.deviation), SWEEPS,
+        refine(
+            self._directions, self._log_share, self._first[numbers], self._last[numbers], SIZES,
+            chosen, sizes, SWEEPS,
         )  # fmt: skip
         weight = self._log_evidence(chosen, sizes)
         alone = {m.causes[0]: m for m in self._alone}
@@ -306,16 +296,7 @@ class ModelSpace:
         return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
 
     def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
-        numbers = np.asarray(chosen, dtype=np.int64)
-        rows, scale = _rows(self._start, numbers, np.asarray(sizes, dtype=float))
-        return log_bayes_factor(
-            self._gram[np.ix_(rows, rows)], self._scores[rows], self._square, self._sides[rows],
-            scale, self._freedom, len(self.null.deviation),
-        )  # fmt: skip
-
-    @property
-    def _freedom(self) -> float:
-        return min(self.freedom, 2.0 * KNOWN_NOISE)
+        return float(log_evidence(self._directions, np.asarray(chosen), np.atleast_2d(sizes))[0])
 
 
 def _joined(first: Model, second: Model) -> Model:
@@ -330,76 +311,3 @@ def _joined(first: Model, second: Model) -> Model:
     )
     causes, chosen, sizes = zip(*members, strict=True)
     return Model(causes, chosen, sizes)
-
-
-def _by_size(
-    columns: np.ndarray, sides: np.ndarray, deviations: np.ndarray, freedom: float
-) -> np.ndarray:
-    """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
-    left, singular, right = np.linalg.svd(columns, full_matrices=False)
-    scores = left.T @ deviations
-    squares, found = np.sum(deviations**2, axis=0), []
-    for size in SIZES:
-        ratio = (size * singular) ** 2
-        shrink = ratio / (1.0 + ratio)
-        explained, log_det = shrink @ scores**2, float(np.log1p(ratio).sum())
-        if np.isfinite(freedom):
-            count = freedom + len(deviations)
-            factor = -0.5 * count * np.log1p(-explained / (freedom + squares)) - 0.5 * log_det
-        else:
-            factor = 0.5 * (explained - log_det)
-        mean = right.T @ ((size * singular / (1.0 + ratio))[:, np.newaxis] * scores)
-        variance = 1.0 - (right.T**2) @ shrink
-        for i in np.flatnonzero(sides):
-            factor = factor + np.log(2.0) + norm.logcdf(sides[i] * mean[i] / np.sqrt(variance[i]))
-        found.append(factor)
-    return np.array(found)
-
-
-@njit(cache=True)
-def _rows(start, chosen, sizes):
-    """Rows of the chosen explanations among all directions, and the size of each."""
-    count = 0
-    for k in chosen:
-        count += start[k + 1] - start[k]
-    rows, scale = np.empty(count, np.int64), np.empty(count)
-    at = 0
-    for number, k in enumerate(chosen):
-        for row in range(start[k], start[k + 1]):
-            rows[at], scale[at] = row, sizes[number]
-            at += 1
-    return rows, scale
-
-
-@njit(cache=True)
-def _refine(
-    gram, scores, square, sides, start, log_share, first, last, all_sizes, chosen, sizes, freedom,
-    count, sweeps,
-):  # fmt: skip
-    """Choose the best explanation and size of one cause after the other, in place."""
-    best = -np.inf
-    for _ in range(sweeps):
-        before = best
-        for member in range(len(chosen)):
-            kept, kept_size = chosen[member], sizes[member]
-            for k in range(first[member], last[member]):
-                chosen[member] = k
-                for s, size in enumerate(all_sizes):
-                    if log_share[k, s] <= NEVER:
-                        continue
-                    sizes[member] = size
-                    rows, scale = _rows(start, chosen, sizes)
-                    n = len(rows)
-                    products, along, sided = np.empty((n, n)), np.empty(n), np.empty(n)
-                    for i in range(n):
-                        along[i], sided[i] = scores[rows[i]], sides[rows[i]]
-                        for j in range(n):
-                            products[i, j] = gram[rows[i], rows[j]]
-                    value = log_bayes_factor(products, along, square, sided, scale, freedom, count)
-                    for other in chosen:
-                        value += log_share[other].max()
-                    if value > best:
-                        best, kept, kept_size = value, k, size
-            chosen[member], sizes[member] = kept, kept_size
-        if best < before + 0.1:
-            break

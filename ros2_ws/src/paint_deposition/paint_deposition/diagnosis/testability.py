@@ -86,9 +86,8 @@ def detectable_ratio(space: ModelSpace, direction: np.ndarray, seed: int) -> flo
 
 def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
     """Numbers of the explanations that take up most of a direction."""
-    taken = []
-    for columns in space.columns:
-        left, singular, _ = np.linalg.svd(columns, full_matrices=False)
-        shrink = singular**2 / (1.0 + singular**2)
-        taken.append(float(shrink @ (left.T @ direction) ** 2))
+    taken = [
+        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + np.sum(own.columns**2, axis=0))))
+        for own in space.principal
+    ]
     return np.argsort(taken)[::-1][:FOLLOWING].tolist()
