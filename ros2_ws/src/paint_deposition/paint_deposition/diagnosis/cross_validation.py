@@ -8,50 +8,19 @@ import numpy as np
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.learning import MOST_LAWS, choose_laws
 from paint_deposition.diagnosis.model_space import ModelSpace
-from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.study import Study
 
 # How many times some of the blocks are left out.
 FOLDS = 6
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """Predictions of points while their block was left out.
-
-    Attributes:
-        deviation: (P,) measured minus predicted, over the standard deviation of the reading.
-        log_score: mean log predictive density of the points left out.
-    """
-
-    deviation: np.ndarray
-    log_score: float
-
-
-def hold_out(fit: Fit, blocks: np.ndarray) -> HeldOut:
-    """Leave out one block after the other and refit in the linear approximation, prior included.
-
-    Args:
-        fit: around which the model is linear.
-        blocks: (P,) block of each point.
-    """
-    prior = fit.parameters.prior
-    target = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
-    directions = fit.jacobian @ prior.factor
-    deviation = np.empty_like(target)
-    score = 0.0
+def hold_out(null: NullModel, blocks: np.ndarray) -> np.ndarray:
+    """(P,) deviations over the noise of points while their block (P,) was left out."""
+    deviation = np.empty(len(blocks))
     for block in np.unique(blocks):
         out = blocks == block
-        kept = directions[~out]
-        precision = np.eye(directions.shape[1]) + kept.T @ kept
-        amounts = np.linalg.solve(precision, kept.T @ target[~out])
-        deviation[out] = target[out] - directions[out] @ amounts
-        spread = np.linalg.solve(precision, directions[out].T)
-        covariance = np.eye(out.sum()) + directions[out] @ spread
-        _, log_det = np.linalg.slogdet(2.0 * np.pi * covariance)
-        solved = np.linalg.solve(covariance, deviation[out])
-        score -= 0.5 * (log_det + deviation[out] @ solved)
-    return HeldOut(deviation, score / len(target))
+        deviation[out] = left_out(null, [], out)
+    return deviation
 
 
 @dataclass(frozen=True)
@@ -99,7 +68,7 @@ def nested_rmse_um(stages: Sequence[Stage], study: Study) -> np.ndarray:
 
 
 def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
-    """Deviations of points from what the others predict; levels of parts do not help.
+    """Deviations of points from what the others predict, by the model and the levels of parts.
 
     Args:
         null: what the model varies. added: directions (P, n) of what it has besides.
@@ -109,6 +78,4 @@ def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> n
     kept = columns[~out]
     precision = np.eye(columns.shape[1]) + kept.T @ kept
     amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
-    stop = null.columns.shape[1]
-    amounts[stop - null.nuisance : stop] = 0.0
     return null.raw[out] - columns[out] @ amounts

@@ -27,23 +27,21 @@ class NullModel:
     Attributes:
         columns: (P, m) directions in which the base model and the nuisance vary, for unit
             amplitudes, over the noise.
-        nuisance: how many of them, the last ones, are nuisance.
         raw: (P,) deviations over the noise from the base model at the centre of its priors.
         lower: (P, P) Cholesky factor of the deviations' covariance.
         deviation: (P,) whitened deviations; standard normal if nothing is missing.
     """
 
     columns: np.ndarray
-    nuisance: int
     raw: np.ndarray
     lower: np.ndarray
     deviation: np.ndarray
 
     @staticmethod
-    def of(columns: np.ndarray, raw: np.ndarray, nuisance: int = 0) -> 'NullModel':
-        """From directions (P, m), the last of which are nuisance, and deviations (P,)."""
+    def of(columns: np.ndarray, raw: np.ndarray) -> 'NullModel':
+        """From directions (P, m) and deviations (P,)."""
         lower = covariance_factor(columns)
-        return NullModel(columns, nuisance, raw, lower, solve_triangular(lower, raw, lower=True))
+        return NullModel(columns, raw, lower, solve_triangular(lower, raw, lower=True))
 
     @staticmethod
     def around(fit: Fit, nuisance: np.ndarray, apart: frozenset[str] = frozenset()) -> 'NullModel':
@@ -63,7 +61,7 @@ class NullModel:
         counted = kept | ~shape
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
         directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
-        return NullModel.of(np.hstack([directions, nuisance]), raw, nuisance.shape[1])
+        return NullModel.of(np.hstack([directions, nuisance]), raw)
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
@@ -71,7 +69,7 @@ class NullModel:
 
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The same for some of the readings."""
-        return NullModel.of(self.columns[rows], self.raw[rows], self.nuisance)
+        return NullModel.of(self.columns[rows], self.raw[rows])
 
 
 @dataclass(frozen=True)

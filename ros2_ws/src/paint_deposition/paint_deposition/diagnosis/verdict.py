@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from paint_deposition.comparison.comparison import Comparison, compare
 from paint_deposition.diagnosis.cross_validation import hold_out
+from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.pattern_shift import PatternShift
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -102,7 +103,8 @@ class Step:
     @staticmethod
     def of(study: Study, added: str, fit: Fit) -> Step:
         """Compute the errors of a fit, those on points left out by patches."""
-        left_out_um = hold_out(fit, study.patches()).deviation * study.sigma_um
+        null = NullModel.around(fit, study.nuisance)
+        left_out_um = hold_out(null, study.patches()) * study.sigma_um
         fitted = study.residuals(fit.predicted_um)
         return Step(added, fit, fitted.rmse_um, root_mean_square(left_out_um))
 
