@@ -190,7 +190,9 @@ def _of_effect(
     """By the law in each shape, its error included, and by free laws."""
     effect = type(shapes[0])
     own = [name for name in effect.covariates if name in roots]
-    free = _free_laws(study, fit.model, effect) if effect.free_law else []
+    # A law of any form acts on all parts; an effect may be switched off on some.
+    wanted = effect.free_law and study.has(effect).all()
+    free = _free_laws(study, fit.model, effect) if wanted else []
     law_share = LAW_SHARE if free else 1.0
     for shape in shapes:
         law = sensitivity(study.forward, fit, shape, study.sigma_um)
@@ -204,9 +206,7 @@ def _of_effect(
         yield Explanation(effect.id, columns, sides, law_share / len(shapes), law)
     for random in free:
         direction = effect.covariates[random.basis.law.covariate]
-        share = (1.0 - law_share) / len(free)
-        found = of_random(effect.id, study, random, share, (direction,))
-        yield replace(found, columns=found.columns * study.has(effect)[:, np.newaxis])
+        yield of_random(effect.id, study, random, (1.0 - law_share) / len(free), (direction,))
 
 
 def _free_laws(study: Study, model: DepositionModel, effect: type[Effect]) -> list[RandomLaw]:
