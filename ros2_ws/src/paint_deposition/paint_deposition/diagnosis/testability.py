@@ -34,17 +34,20 @@ def testability(space: ModelSpace, seed: int) -> Testability:
     for explanation in space.explanations:
         if explanation.sensitivity is not None:
             shapes.setdefault(explanation.cause, []).append(explanation.sensitivity)
+    null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]
     not_testable, detectable = [], {}
     for effect_id, found in shapes.items():
         # Along the combination of amplitudes that shows most.
         if max(np.linalg.norm(space.null.whiten(s.columns), 2) for s in found) >= TESTABLE:
-            detectable[effect_id] = _detectable(space, found, seed)
+            detectable[effect_id] = _detectable(space, found, null, draws)
         else:
             not_testable.append(effect_id)
     return tuple(not_testable), detectable
 
 
-def _detectable(space: ModelSpace, shapes: list[Sensitivity], seed: int) -> dict[str, float]:
+def _detectable(
+    space: ModelSpace, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
+) -> dict[str, float]:
     """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
     info = type(shapes[0].effect).parameters()
     found = {}
@@ -55,7 +58,7 @@ def _detectable(space: ModelSpace, shapes: list[Sensitivity], seed: int) -> dict
         if strength < 1e-9:
             continue
         backward = shapes[0].sides[k] < 0.0
-        ratio = detectable_ratio(space, (-best if backward else best) / strength, seed)
+        ratio = _ratio(space, (-best if backward else best) / strength, null, draws)
         amount = ratio * info[name]['typical'] / strength
         room = max(abs(info[name][end] - info[name]['neutral']) for end in ('low', 'high'))
         if amount <= room:
@@ -63,16 +66,14 @@ def _detectable(space: ModelSpace, shapes: list[Sensitivity], seed: int) -> dict
     return found
 
 
-def detectable_ratio(space: ModelSpace, direction: np.ndarray, seed: int) -> float:
+def _ratio(space: ModelSpace, direction: np.ndarray, null: np.ndarray, draws: np.ndarray) -> float:
     """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried.
 
     Args:
         space: its test is simulated.
         direction: (P,) unit vector of whitened deviations.
-        seed: of simulated deviations.
+        null: simulated evidence if no cause acted. draws: (P, DRAWS) deviations behind the first.
     """
-    null = space.null_evidence(seed)
-    draws = space.null_draws(seed)[:, :DRAWS]
     chosen = _following(space, direction)
     rest = np.exp(null[:DRAWS]) - np.exp(space.evidence(draws, chosen))
     moved = draws[:, np.newaxis] + np.multiply.outer(direction, RATIOS)[:, :, np.newaxis]
