@@ -96,8 +96,7 @@ def test_what_does_not_vary_cannot_be_learned(tmp_path):
 
 
 def test_the_report_tells_the_law_and_draws_it(done):
-    models = list(zip((step.model for step in done.history), done.comparisons, strict=True))
-    data = ReportData.of(done.study, models, done)
+    data = ReportData.of(done)
     page = report_html(data)
     assert 'no known effect explains; its law was learned' in page
     assert 'learned law over the time since the motion began' in page
@@ -109,7 +108,7 @@ def test_the_report_tells_the_law_and_draws_it(done):
     np.testing.assert_allclose(curve['y'][within], law.factor(curve['x'][within]))
     assert curve['x'][0] < law.low
     assert curve['y'][[0, -1]] == pytest.approx([1.0, 1.0], abs=1e-9)
-    assert learned_figure(ReportData.of(done.study, models[:1])) is None
+    assert learned_figure(ReportData.of(done.comparisons[0])) is None
 
 
 def test_other_effects_can_be_found_beside_a_learned_law(done, campaign):

@@ -155,7 +155,8 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
             else:
                 relative = change if effect.free_law == 'addition' else change / film
                 size = scale * float(np.quantile(np.abs(relative), LARGEST))
-                columns = basis.random(size, LAW_LENGTH).change_um
+                has = study.has(type(effect))[:, np.newaxis]
+                columns = has * basis.random(size, LAW_LENGTH).change_um
             found.append(columns / study.sigma_um[:, np.newaxis])
     return np.hstack(found)
 
