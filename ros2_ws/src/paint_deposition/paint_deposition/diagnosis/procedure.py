@@ -32,7 +32,7 @@ ROUNDS = 4
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
 # Share by which learned laws must lower the error on points left out.
-LEAST_GAIN = 0.02
+LEAST_GAIN = 0.005
 
 
 def diagnose(
