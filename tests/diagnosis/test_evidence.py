@@ -1,5 +1,7 @@
 """Log Bayes factors in closed form against the densities they stand for."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
@@ -206,3 +208,16 @@ def test_simulated_deviations_are_as_wide_as_the_noise_is_uncertain():
     squares = (simulated(1, 8.0, 4000, seed=3) ** 2).ravel()
     assert kstest(squares, f(1, 8).cdf).pvalue > 0.01
     assert np.std(simulated(50, np.inf, 400, seed=3)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
+    """The fit would go on if it could: what it leaves is a deviation, not the pattern's."""
+    _, high = fit.parameters.bounds
+    last = len(fit.vector) - 1
+    stopped = replace(fit, vector=np.where(np.arange(last + 1) == last, high, fit.vector))
+    null = null_of(stopped)
+    rest, prior = slice(0, last), fit.parameters.prior
+    columns = fit.jacobian[:, rest] @ prior.factor[rest, rest]
+    assert null.columns == pytest.approx(columns)
+    away = (stopped.vector - prior.centre)[rest]
+    assert null.raw == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)

@@ -262,12 +262,17 @@ def test_where_nothing_acts_alternatives_are_the_single_causes(null, found):
     assert set(members).isdisjoint(PRIOR)
 
 
-def test_beside_the_most_causes_there_is_no_room_for_another(null, found):
-    causes = ('air_drift', 'edge_build', 'faraday_shielding')
-    changes = [1.5 * of_cause(found, cause)[0].columns[:, 0] for cause in causes]
-    space = space_of(shifted(null, *changes), found)
-    assert space.alternatives('corner_slowdown') == {}
-    assert space.group('corner_slowdown') == ((), 0.0)
+def test_the_twin_of_a_cause_stands_in_its_place_and_not_beside_it(null, found):
+    """Whichever of the two the best model has: each is an alternative of the other."""
+    (edge,) = of_cause(found, 'edge_build')
+    twin = law(OversprayFog(), 0.9 * edge.columns[:, 0], sides=(1,))
+    space = space_of(shifted(null, 1.5 * edge.columns[:, 0]), [*found, twin])
+    both = {'edge_build', 'overspray_fog'}
+    assert len(both & set(space.models[0].causes)) == 1
+    for cause in both:
+        members, probability = space.group(cause)
+        assert set(members) == both
+        assert probability > SURE
 
 
 def test_an_unknown_cause_is_no_effect(null, found):

@@ -18,6 +18,8 @@ from paint_deposition.fitting.least_squares import Fit, covariance_factor
 
 # More degrees of freedom than this count as a noise that is known.
 KNOWN_NOISE = 1e9
+# An entry of a fit this close to a bound has been stopped by it.
+AT_BOUND = 1e-6
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,13 @@ class NullModel:
         prior, entries = fit.parameters.prior, fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)
         kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
+        # What the fit has driven to a bound of physics does not go on beyond it.
+        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=AT_BOUND)
+        free = ~ends.any(axis=0)
         # The shape of an effect that is not there contributes nothing; its amplitude does.
         shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
-        counted = kept | ~shape
+        counted = free & (kept | ~shape)
+        kept &= free
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
         directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
         return NullModel.of(np.hstack([directions, nuisance]), raw)

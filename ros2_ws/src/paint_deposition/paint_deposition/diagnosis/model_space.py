@@ -117,13 +117,14 @@ class ModelSpace:
         return float(expit(self._alone[number].log_weight - self._log_odds[number]))
 
     def alternatives(self, cause: str) -> dict[str, float]:
-        """What could stand in the place of one cause beside the others of the best model.
+        """What could stand in the place of one cause beside the others of its best model.
 
         The causes and their probabilities, which sum to one, all other causes being as they are;
         this is the single-effect posterior of Wang et al. (JRSS-B 82, 2020). Empty where the
         other causes are as many as a model can hold.
         """
-        others = set(self.models[0].causes) - {cause}
+        best = next((m for m in self.models if cause in m.causes), self.models[0])
+        others = set(best.causes) - {cause}
         found: dict[str, float] = {}
         for model, probability in zip(self.models, self.probabilities, strict=True):
             if len(model.causes) == len(others) + 1 and others < set(model.causes):
