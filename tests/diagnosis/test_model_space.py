@@ -93,7 +93,7 @@ def test_the_p_value_is_uniform_where_nothing_is_missing(null, found, monkeypatc
     monkeypatch.setattr(model_space, 'DRAWS', 99)
     values = [
         space_of(
-            NullModel(null.columns, 0, null.lower @ deviation, null.lower, deviation),
+            NullModel(null.columns, null.lower @ deviation, null.lower, deviation),
             found,
             freedom,
         ).p_value(seed)

@@ -71,6 +71,8 @@ class ModelSpace:
     ) -> None:
         self.null, self.freedom = null, freedom
         self._simulated: dict[int, np.ndarray] = {}
+        # By how much a cause's averaged log evidence, with its odds, exceeds that of its best.
+        self._averaging: dict[str, float] = {}
         self.explanations = sorted(explanations, key=lambda e: e.cause)
         self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
         names = [e.cause for e in self.explanations]
@@ -79,8 +81,9 @@ class ModelSpace:
         self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
         self._directions = Directions.of(self.principal, null.deviation, freedom)
         shares = np.log([e.share / len(SIZES) for e in self.explanations])
-        physical = np.array([self._are_physical(k) for k in range(len(names))])
-        self._log_share = np.where(physical, shares[:, np.newaxis], NEVER)
+        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
+        physical = np.array([self._physical_sizes(k) for k in range(len(names))])
+        self._log_share_alone = np.where(physical, self._log_share, NEVER)
         odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
         self._log_odds = np.log(odds / (1.0 - odds))
 
@@ -148,22 +151,23 @@ class ModelSpace:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
-    def _are_physical(self, k: int) -> np.ndarray:
-        """(S,) whether an explanation, alone at each size, is what its cause can be.
+    def _physical_sizes(self, k: int) -> np.ndarray:
+        """(S,) whether an explanation, alone at each size, is what its cause can be."""
+        amounts = self.principal[k].amplitudes(self.null.deviation, SIZES)
+        return np.array([self._is_physical(k, a) for a in amounts])
+
+    def _is_physical(self, k: int, amounts: np.ndarray) -> bool:
+        """Whether an explanation with these amplitudes is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
         explanation, own = self.explanations[k], self.principal[k]
-        if explanation.sensitivity is None and not explanation.directions:
-            return np.full(len(SIZES), True)
-        amounts = own.amplitudes(self.null.deviation, SIZES)
         if explanation.sensitivity is None:
-            return np.array([explanation.goes_right(a) for a in amounts])
+            return explanation.goes_right(amounts)
         of_law = len(explanation.sensitivity.names)
-        columns = own.columns @ own.axes.T
-        law = np.linalg.norm(columns[:, :of_law] @ amounts[:, :of_law].T, axis=0)
-        error = np.linalg.norm(columns[:, of_law:] @ amounts[:, of_law:].T, axis=0)
-        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
+        law = np.linalg.norm(own.columns @ (own.axes[:of_law].T @ amounts[:of_law]))
+        error = np.linalg.norm(own.columns @ (own.axes[of_law:].T @ amounts[of_law:]))
+        return bool(error <= max(NOTICED, LARGEST_ERROR * law))
 
     @property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -253,20 +257,15 @@ class ModelSpace:
         deviation = self.null.deviation[:, np.newaxis]
         for number, cause in enumerate(self.causes):
             numbers = range(self._first[number], self._last[number])
-            values = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
-            values += self._log_share[numbers]
+            factors = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
+            values = factors + self._log_share_alone[numbers]
             k, s = np.unravel_index(values.argmax(), values.shape)
             weight = float(logsumexp(values)) + self._log_odds[number]
+            any_form = factors + self._log_share[numbers]
+            best = factors.flat[any_form.argmax()]
+            self._averaging[cause] = float(logsumexp(any_form)) + self._log_odds[number] - best
             found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
         return found
-
-    @cached_property
-    def _averaging(self) -> dict[str, float]:
-        """By how much a cause's averaged log evidence, with its odds, exceeds that of its best."""
-        return {
-            model.causes[0]: model.log_weight - self._log_evidence(model.chosen, model.sizes)
-            for model in self._alone
-        }
 
     def _most_probable(self, models: Iterable[Model], count: int) -> list[Model]:
         """The best ones, weighed with the explanations that they have."""
@@ -283,11 +282,20 @@ class ModelSpace:
     def _refined(self, model: Model) -> Model:
         """The same causes with the explanations and sizes that are best together."""
         numbers = np.array([self.causes.index(c) for c in model.causes])
-        chosen, sizes = np.array(model.chosen), np.array(model.sizes)
-        refine(
-            self._directions, self._log_share, self._first[numbers], self._last[numbers], SIZES,
-            chosen, sizes, SWEEPS,
-        )  # fmt: skip
+        # Beside other effects an explanation may be physical that is not so alone; beside what has
+        # no shape it would be too easily.
+        shares = (self._log_share, self._log_share_alone)
+        for log_share in shares[1:] if PRIOR.keys() & set(model.causes) else shares:
+            chosen, sizes = np.array(model.chosen), np.array(model.sizes)
+            refine(
+                self._directions, log_share, self._first[numbers], self._last[numbers], SIZES,
+                chosen, sizes, SWEEPS,
+            )  # fmt: skip
+            amounts = self.amplitudes(Model(model.causes, tuple(chosen), tuple(sizes)))
+            if all(self._is_physical(k, a) for k, a in zip(chosen, amounts, strict=True)):
+                break
+        else:
+            return replace(model, log_weight=NEVER)
         weight = self._log_evidence(chosen, sizes)
         alone = {m.causes[0]: m for m in self._alone}
         for cause, k in zip(model.causes, chosen, strict=True):
