@@ -292,7 +292,8 @@ class ModelSpace:
                 chosen, sizes, SWEEPS,
             )  # fmt: skip
             amounts = self.amplitudes(Model(model.causes, tuple(chosen), tuple(sizes)))
-            if all(self._is_physical(k, a) for k, a in zip(chosen, amounts, strict=True)):
+            allowed = log_share[chosen, np.searchsorted(SIZES, sizes)].min() > NEVER
+            if allowed and all(map(self._is_physical, chosen, amounts)):
                 break
         else:
             return replace(model, log_weight=NEVER)
