@@ -80,10 +80,12 @@ def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):
     campaign = small_campaign(
         tmp_path, **DOOR | {'seed': 22, 'truth': 'convex_attraction', 'amplitude': 0.3}
     )
-    library = {key: effect for key, effect in EFFECTS.items() if key != 'convex_attraction'}
+    # Those that look alike on these readings, as the effect itself declares, would be right, too.
+    alike = {'convex_attraction', *EFFECTS['convex_attraction'].rivals}
+    library = {key: effect for key, effect in EFFECTS.items() if key not in alike}
     diagnosis = diagnose(campaign, DepositionModel(), library)
     assert diagnosis.verdict in ('unknown_effect', 'undecided')
-    assert diagnosis.accepted == ()
+    assert all(name.startswith('learned:') for name in diagnosis.accepted)
     assert diagnosis.p_value < 0.01
 
 

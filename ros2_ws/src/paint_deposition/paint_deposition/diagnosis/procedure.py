@@ -72,7 +72,7 @@ def diagnose(
     if len(groups) < sum(len(stage.accepted) for stage in stages):
         space = run.linearise()
     errors_um = nested_rmse_um([*stages, Stage(space, run.plain)], run.study)
-    _accept(run, groups, errors_um[0])
+    _accept(run, groups, float(errors_um[0]))
     progress('learning what the laws leave unexplained')
     _learn(run, space, errors_um)
     return _conclude(run, space, p_value)
@@ -148,7 +148,7 @@ def _learn(run: Run, space: ModelSpace, errors_um: np.ndarray) -> None:
         e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
     ]
     before = run.history[-1]
-    run.record(' and '.join(laws), fit, errors_um[len(chosen)])
+    run.record(' and '.join(laws), fit, float(errors_um[len(chosen)]))
     run.accepted += [run.described((law,), 1.0, before) for law in laws]
 
 
