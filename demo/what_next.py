@@ -17,6 +17,8 @@ from tests.virtual_paint_shop.respray import sprayed_again
 from tests.virtual_paint_shop.shop import generate
 from tests.virtual_paint_shop.truths import choose
 
+from paint_deposition.diagnosis.verdict import percent
+
 SEED, HIDDEN, SCALE = 930700, 'faraday_shielding', 2.0
 PARCELS = 4_000_000
 
@@ -71,4 +73,4 @@ def _leading(diagnosis: dict) -> str:
     if not diagnosis['classes']:
         return diagnosis['verdict'].replace('_', ' ')
     group = diagnosis['classes'][0]
-    return f'{" or ".join(group["members"])} ({100 * group["probability"]:.0f} %)'
+    return f'{" or ".join(group["members"])} ({percent(group["probability"])})'

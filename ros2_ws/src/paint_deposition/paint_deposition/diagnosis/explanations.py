@@ -178,6 +178,7 @@ def of_random(
     directions: tuple[int, ...] = (),
     description: str = '',
 ) -> Explanation:
+    """A random law as an explanation, its directions over the noise of the study."""
     columns = random.change_um / study.sigma_um[:, np.newaxis]
     return Explanation(
         cause, columns, np.zeros(columns.shape[1]), share, random=random,
