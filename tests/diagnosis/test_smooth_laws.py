@@ -96,7 +96,7 @@ def test_where_a_law_is_to_be_zero_it_is():
 
 def test_harmonics_of_a_footprint_are_independent_and_absent_at_the_centre(study):
     basis = footprint_basis(study, MODEL)
-    *orders, everything = footprint_kinds(basis)
+    *orders, everything = footprint_kinds()
     assert np.array_equal(np.sum(orders, axis=0).astype(bool), everything)
     assert [int(kind[:5].sum()) for kind in orders] == [1, 0, 0]
     random = basis.random(1.0, 2.0, everything)

@@ -119,7 +119,7 @@ def explanations(
     kinds = [
         basis.random(FOOTPRINT_SHARE, length, among)
         for length in LENGTHS['footprint']
-        for among in footprint_kinds(basis)
+        for among in footprint_kinds()
     ]
     found += [of_random(FOOTPRINT, study, random, 1.0 / len(kinds)) for random in kinds]
     # A model has each learned law once.

@@ -21,7 +21,7 @@ from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import Fit, derivatives
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign, Experiment
-from paint_deposition.readings.covariates import Covariate, Rays, covariates
+from paint_deposition.readings.covariates import Covariate, Rays
 
 # Effects that compete at the most.
 MOST_RIVALS = 6
@@ -215,7 +215,7 @@ def _covariates(experiment: Experiment, fit: Fit) -> list[Covariate]:
     thin = path.select(slice(None, None, THINNED))
     thin = thin.with_(dwell_s=THINNED * thin.dwell_s)
     thinned = replace(experiment, path=thin)
-    return covariates(thinned, fit.model, Rays.of(thinned, fit.model))
+    return Rays.of(thinned, fit.model).covariates
 
 
 def _bell(at: np.ndarray, knots: np.ndarray) -> np.ndarray:

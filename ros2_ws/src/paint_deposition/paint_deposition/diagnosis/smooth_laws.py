@@ -140,7 +140,8 @@ def curve_basis(
     """
     law = CURVES[covariate]
     knots = TIME_KNOTS if covariate == 'time_s' else KNOTS
-    rays, values = study.rays(model), [along[covariate] for along in study.along_rays(model)]
+    rays = study.rays(model)
+    values = [part.along[covariate] for part in rays]
     low, high = _range(rays, values)
     if not law.axis(high) - law.axis(low) > 1e-9:
         return None
@@ -218,8 +219,8 @@ def footprint_basis(study: Study, model: DepositionModel) -> Basis:
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
 
 
-def footprint_kinds(basis: Basis) -> list[np.ndarray]:
-    """(K,) knots of the mean over the angle, of each harmonic, and of all.
+def footprint_kinds() -> list[np.ndarray]:
+    """(K,) knots of a footprint: those of the mean over the angle, of each harmonic, and of all.
 
     At the centre the angle means nothing.
     """

@@ -15,7 +15,7 @@ from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.random_effects import RandomEffects, random_effects
 from paint_deposition.fitting.slips import Slip
 from paint_deposition.readings.campaign import Campaign
-from paint_deposition.readings.covariates import Covariate, Rays, along_rays, covariates
+from paint_deposition.readings.covariates import Covariate, Rays
 from paint_deposition.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.readings.plausibility import check_unit
 from paint_deposition.readings.residuals import Residuals, root_mean_square
@@ -207,20 +207,11 @@ class Study:
             self._rays[key] = [Rays.of(e, model) for e in self.campaign.experiments]
         return self._rays[key]
 
-    def along_rays(self, model: DepositionModel) -> list[dict[str, np.ndarray]]:
-        """Covariates along the rays of each experiment."""
-        parts = zip(self.campaign.experiments, self.rays(model), strict=True)
-        return [along_rays(experiment, model, rays) for experiment, rays in parts]
-
     def covariates(self, model: DepositionModel) -> list[Covariate]:
         """Covariates of all points."""
-        parts = [
-            covariates(experiment, model, rays)
-            for experiment, rays in zip(self.campaign.experiments, self.rays(model), strict=True)
-        ]
         return [
             Covariate(same[0].name, np.concatenate([part.values for part in same]))
-            for same in zip(*parts, strict=True)
+            for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
         ]
 
     def patches(self, seed: int = 0) -> np.ndarray:

@@ -1,6 +1,7 @@
 """Covariates: quantities that differ from point to point, against which a residual can show."""
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -41,6 +42,7 @@ class Rays:
         x_m, y_m: (M, P) where the ray pierces the model plane, tool axes [m].
         cos_incidence: (M, P). standoff_ratio: (M, P) distance along the axis over Omega.
         rows: (M,) rows of the experiment's path.
+        experiment: whose path and points they join.
     """
 
     share: np.ndarray
@@ -49,6 +51,7 @@ class Rays:
     cos_incidence: np.ndarray
     standoff_ratio: np.ndarray
     rows: np.ndarray
+    experiment: Experiment
 
     @staticmethod
     def of(experiment: Experiment, model: DepositionModel) -> 'Rays':
@@ -71,36 +74,34 @@ class Rays:
         flux = model.planar.flux_um_per_s(x, y) * (omega / depth) ** 2 * facing / depth
         weight = (path.flow * path.dwell_s)[rows] * stride
         share = np.where(lit, flux, 0.0) * weight[:, np.newaxis]
-        return Rays(share, x, y, facing / np.maximum(distance, 1e-9), depth / omega, rows)
+        cos_incidence = facing / np.maximum(distance, 1e-9)
+        return Rays(share, x, y, cos_incidence, depth / omega, rows, experiment)
 
     def mean(self, values: np.ndarray) -> np.ndarray:
         """(P,) average of (M, P) or (M, 1) values, weighted by the film each ray left."""
         total = np.maximum(self.share.sum(axis=0), 1e-12)
         return (self.share * values).sum(axis=0) / total
 
+    @cached_property
+    def along(self) -> dict[str, np.ndarray]:
+        """Covariates by name, as arrays that broadcast to the M sub-steps and P points.
 
-def along_rays(
-    experiment: Experiment, model: DepositionModel, rays: Rays
-) -> dict[str, np.ndarray]:
-    """Covariates by name, as arrays that broadcast to the M sub-steps and P points.
+        (M, 1) what the path is like, (M, P) how a ray lands, (1, P) what the surface is like.
+        """
+        points, path = self.experiment.measured_points, self.experiment.path.select(self.rows)
+        of_path = {name: values[:, np.newaxis] for name, values in along_path(path).items()}
+        of_points = {name: values()[np.newaxis] for name, values in at_points(points).items()}
+        return {
+            'incidence_deg': np.degrees(np.arccos(np.clip(self.cos_incidence, -1.0, 1.0))),
+            'standoff_ratio': self.standoff_ratio,
+            **of_path,
+            **of_points,
+            'tool_x_m': self.x_m,
+            'tool_y_m': self.y_m,
+            'film_um': self.share.sum(axis=0)[np.newaxis],
+        }
 
-    (M, 1) what the path is like, (M, P) how a ray lands, (1, P) what the surface is like.
-    """
-    points, path = experiment.measured_points, experiment.path.select(rays.rows)
-    of_path = {name: values[:, np.newaxis] for name, values in along_path(path).items()}
-    of_points = {name: values()[np.newaxis] for name, values in at_points(points).items()}
-    return {
-        'incidence_deg': np.degrees(np.arccos(np.clip(rays.cos_incidence, -1.0, 1.0))),
-        'standoff_ratio': rays.standoff_ratio,
-        **of_path,
-        **of_points,
-        'tool_x_m': rays.x_m,
-        'tool_y_m': rays.y_m,
-        'film_um': rays.share.sum(axis=0)[np.newaxis],
-    }
-
-
-def covariates(experiment: Experiment, model: DepositionModel, rays: Rays) -> list[Covariate]:
-    """All covariates of an experiment's P points, on average over the film that arrived."""
-    found = along_rays(experiment, model, rays)
-    return [Covariate(name, rays.mean(values)) for name, values in found.items()]
+    @cached_property
+    def covariates(self) -> list[Covariate]:
+        """All covariates of the P points, on average over the film that arrived."""
+        return [Covariate(name, self.mean(values)) for name, values in self.along.items()]
