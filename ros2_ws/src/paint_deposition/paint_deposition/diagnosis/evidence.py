@@ -219,13 +219,3 @@ def _solve(lower, pivot, column, orthogonal):
         for k in range(i if i >= orthogonal else 0):
             value -= lower[i, k] * column[k]
         column[i] = value / pivot[i]
-
-
-def evidence(columns: np.ndarray, null: NullModel, freedom: float) -> float:
-    """Log Bayes factor of whitened directions (P, n), of unit variance each, against the null."""
-    count = columns.shape[1]
-    return log_bayes_factor(
-        columns.T @ columns, columns.T @ null.deviation, float(null.deviation @ null.deviation),
-        np.empty((0, count)), np.empty(0), np.ones(count), min(freedom, 2.0 * KNOWN_NOISE),
-        len(null.deviation),
-    )  # fmt: skip

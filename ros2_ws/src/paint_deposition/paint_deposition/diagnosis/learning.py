@@ -36,7 +36,7 @@ def choose_laws(
         gain, k, size = max(
             (float(value), k, float(size))
             for k, (explanation, _) in left.items()
-            for value, size in zip(_by_size(null, explanation, freedom), SIZES, strict=True)
+            for value, size in zip(by_size(null, explanation, freedom), SIZES, strict=True)
         )
         if gain < WORTH_LEARNING:
             break
@@ -48,7 +48,7 @@ def choose_laws(
     return chosen
 
 
-def _by_size(null: NullModel, explanation: Explanation, freedom: float) -> np.ndarray:
+def by_size(null: NullModel, explanation: Explanation, freedom: float) -> np.ndarray:
     """(S,) log Bayes factor of a law at every size."""
     found = Principal.of(null.whiten(explanation.columns), explanation.sides)
     return found.log_bayes_factors(null.deviation[:, np.newaxis], SIZES, freedom)[:, 0]

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.special import expit, logsumexp
 
 from paint_deposition.diagnosis.cross_validation import left_out
-from paint_deposition.diagnosis.evidence import NullModel, evidence
+from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import (
     FREE_ADDITION_UM,
     FREE_FACTOR,
@@ -18,6 +18,7 @@ from paint_deposition.diagnosis.explanations import (
     Explanation,
     of_random,
 )
+from paint_deposition.diagnosis.learning import by_size
 from paint_deposition.diagnosis.model_space import SIZES, SURE
 from paint_deposition.diagnosis.procedure import ALPHA
 from paint_deposition.diagnosis.run import Run
@@ -31,8 +32,6 @@ from paint_deposition.errors import ModelError
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.residuals import root_mean_square
-
-ALL = slice(None)
 
 
 def refit(
@@ -96,13 +95,11 @@ def refit(
 
 def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence."""
-    options = _options(run, law)
-    null = NullModel.around(run.fit, run.study.nuisance)
-    freedom = run.study.noise.degrees_of_freedom
-    weights = _log_bayes_factors(null, options, freedom)
-    probability = float(expit(logsumexp(weights) - np.log(len(weights))))
+    options, null = _options(run, law), run.plain
+    weights = _log_bayes_factors(run, null, options)
+    probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before = run.history[-1]
-    fit = run.learned([options[int(np.argmax(weights))]])
+    fit = run.learned([_best(options, weights)])
     run.record(law.id, fit, _holdout_um(run, null, options))
     run.accepted.append(run.described((law.id,), probability, before))
     reason = (
@@ -115,15 +112,14 @@ def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
 
 
-def _options(run: Run, law: type[LearnedLaw]) -> list[tuple[Explanation, float]]:
-    """Laws over the covariate of every kind, length of correlation and size."""
+def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
+    """Laws over the covariate of every kind and length of correlation."""
     found = [
-        (of_random(UNKNOWN, run.study, basis.random(unit, length), 1.0), float(size))
+        of_random(UNKNOWN, run.study, basis.random(unit, length), 1.0)
         for kind in law.kinds
         for basis in bases_over(run.study, run.fit.model, law, kind)
         for length in LENGTHS.get(law.covariate, (WIGGLY, *FREE_LENGTHS))
         for unit in (FREE_FACTOR if kind == 'factor' else FREE_ADDITION_UM,)
-        for size in SIZES
     ]
     if not found:
         raise ModelError(
@@ -133,29 +129,29 @@ def _options(run: Run, law: type[LearnedLaw]) -> list[tuple[Explanation, float]]
     return found
 
 
-def _log_bayes_factors(
-    null: NullModel,
-    options: Sequence[tuple[Explanation, float]],
-    freedom: float,
-    rows: slice | np.ndarray = ALL,
-) -> list[float]:
-    """Log Bayes factor of each law against the null hypothesis for some of the readings."""
-    return [
-        evidence(null.whiten(size * explanation.columns[rows]), null, freedom)
-        for explanation, size in options
-    ]
+def _log_bayes_factors(run: Run, null: NullModel, options: Sequence[Explanation]) -> np.ndarray:
+    """(n, S) log Bayes factor of each law at each size against the null hypothesis."""
+    freedom = run.study.noise.degrees_of_freedom
+    return np.array([by_size(null, explanation, freedom) for explanation in options])
 
 
-def _holdout_um(run: Run, null: NullModel, options: Sequence[tuple[Explanation, float]]) -> float:
+def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanation, float]:
+    """The law and the size of the greatest weight (n, S)."""
+    number, size = np.unravel_index(weights.argmax(), weights.shape)
+    return options[int(number)], float(SIZES[size])
+
+
+def _holdout_um(run: Run, null: NullModel, options: Sequence[Explanation]) -> float:
     """Error on points left out by patches, the law's kind, length and size chosen without them.
 
     In micrometres.
     """
-    blocks, freedom = run.study.patches(), run.study.noise.degrees_of_freedom
+    blocks = run.study.patches()
     deviation = np.empty(len(blocks))
     for block in np.unique(blocks):
         out = blocks == block
-        weights = _log_bayes_factors(null.select(~out), options, freedom, ~out)
-        explanation, size = options[int(np.argmax(weights))]
+        kept = [explanation.select(~out) for explanation in options]
+        weights = _log_bayes_factors(run, null.select(~out), kept)
+        explanation, size = _best(options, weights)
         deviation[out] = left_out(null, [size * explanation.columns], out)
     return root_mean_square(deviation * run.study.sigma_um)

@@ -20,7 +20,7 @@ class Sensitivity:
     """Sensitivity of the readings to one effect, for one choice of its shape parameters.
 
     Attributes:
-        effect: at the point of linearisation: neutral, or as fitted.
+        effect: at the point of linearisation.
         names: of the n amplitudes.
         columns: (P, n) derivative of the readings by each amplitude in its typical size, over the
             noise.
