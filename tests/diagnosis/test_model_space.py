@@ -14,11 +14,10 @@ from paint_deposition.diagnosis.explanations import (
     LAW_SHARE,
     UNKNOWN,
     Explanation,
-    _root,
 )
 from paint_deposition.diagnosis.model_space import PRIOR, PRIOR_EFFECT, SIZES, SURE, ModelSpace
 from paint_deposition.diagnosis.sensitivities import Sensitivity
-from paint_deposition.diagnosis.smooth_laws import Basis, RandomLaw
+from paint_deposition.diagnosis.smooth_laws import NEGLIGIBLE, Basis, RandomLaw
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -26,6 +25,7 @@ from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.fitting.smooth_fields import field_over_values
 
 READINGS = 60
 NULL_RUNS = 400
@@ -40,6 +40,11 @@ def law(effect: Effect, *columns, sides, errors=(), share=1.0) -> Explanation:
     both = np.hstack([stacked, *errors])
     free = np.zeros(both.shape[1] - stacked.shape[1])
     return Explanation(effect.id, both, np.append(of_law.sides, free), share, of_law)
+
+
+def smooth(covariate: np.ndarray, length: float) -> np.ndarray:
+    """(P, n) root of a random function of a covariate."""
+    return field_over_values(covariate / covariate.std(), length, NEGLIGIBLE)
 
 
 def field(cause: str, columns: np.ndarray, share: float = 1.0) -> Explanation:
@@ -314,13 +319,13 @@ def flat_null(count: int, change: np.ndarray, seed: int = 0) -> NullModel:
 
 def over(covariate: np.ndarray, form: np.ndarray) -> list[Explanation]:
     """An effect of this form (P,) with an error of its law, and shapeless fields."""
-    root = _root(covariate / covariate.std(), 1.0)
+    root = smooth(covariate, 1.0)
     film = 3.0 * np.ones(len(covariate))
     return [
         law(EdgeBuild(), form, sides=(1,), errors=[LAW_ERROR * form[:, np.newaxis] * root]),
         law(OversprayFog(), np.ones_like(form) + 0.3 * covariate, sides=(1,)),
-        field(UNKNOWN, film[:, np.newaxis] * _root(covariate / covariate.std(), 0.35), 0.5),
-        field(UNKNOWN, film[:, np.newaxis] * _root(covariate / covariate.std(), 1.0), 0.5),
+        field(UNKNOWN, film[:, np.newaxis] * smooth(covariate, 0.35), 0.5),
+        field(UNKNOWN, film[:, np.newaxis] * smooth(covariate, 1.0), 0.5),
     ]
 
 
@@ -372,7 +377,7 @@ def test_a_free_law_must_go_in_the_direction_of_its_effect(direction, accepted):
     found = [
         wrong_law,
         any_curve('edge_build', covariate, 2.0, (direction,), 1.0 - LAW_SHARE),
-        field(UNKNOWN, _root(covariate / covariate.std(), 0.35)),
+        field(UNKNOWN, smooth(covariate, 0.35)),
     ]
     space = space_of(flat_null(120, risen), found)
     assert (space.inclusion('edge_build') > SURE) == accepted

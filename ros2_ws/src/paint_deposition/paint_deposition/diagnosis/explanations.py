@@ -14,8 +14,8 @@ import numpy as np
 
 from paint_deposition.diagnosis.sensitivities import Sensitivity, sensitivity
 from paint_deposition.diagnosis.smooth_laws import (
+    NEGLIGIBLE,
     RandomLaw,
-    covariance_root,
     curve_basis,
     footprint_basis,
     footprint_kinds,
@@ -25,6 +25,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.smooth_fields import field_over_values, fields_over_parts
 from paint_deposition.fitting.study import Study
 
 UNKNOWN, FOOTPRINT = 'unknown', 'footprint'
@@ -105,7 +106,10 @@ def explanations(
     """
     model = fit.model
     covariates = _covariates(study, model)
-    roots = {name: _root(values, LAW_LENGTH) for name, values in covariates.items()}
+    roots = {
+        name: field_over_values(values, LAW_LENGTH, NEGLIGIBLE)
+        for name, values in covariates.items()
+    }
     found: list[Explanation] = []
     for name, shapes in candidates.items():
         if model.effect(name) is None:
@@ -151,7 +155,11 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
             if effect.free_law and name in CURVES:
                 basis = curve_basis(study, fit.model, name, effect.free_law)
             if basis is None:
-                columns = scale * change[:, np.newaxis] * _root(covariates[name], LAW_LENGTH)
+                columns = (
+                    scale
+                    * change[:, np.newaxis]
+                    * field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+                )
             else:
                 relative = change if effect.free_law == 'addition' else change / film
                 size = scale * float(np.quantile(np.abs(relative), LARGEST))
@@ -233,7 +241,10 @@ def _shapeless(
 ) -> Iterator[Explanation]:
     """Random fields over the part, and over covariates, in proportion to the film."""
     film = FIELD_SHARE * study.forward.predict_um(model) / study.sigma_um
-    roots = _part_roots(study)
+    campaign = study.campaign
+    roots = fields_over_parts(
+        campaign.experiment_of, campaign.positions_m, LENGTHS['place'], NEGLIGIBLE
+    )
     maps = [
         basis.random(size, length)
         for kind, size in (('factor', FIELD_SHARE), ('addition', FREE_ADDITION_UM))
@@ -250,7 +261,9 @@ def _shapeless(
         length = WIGGLY if name in owned else SMOOTH
         basis = curve_basis(study, model, name) if name in CURVES else None
         if basis is None:
-            yield _field(film[:, np.newaxis] * _root(values, length), share, name)
+            yield _field(
+                film[:, np.newaxis] * field_over_values(values, length, NEGLIGIBLE), share, name
+            )
         else:
             random = basis.random(FIELD_SHARE, length)
             yield of_random(UNKNOWN, study, random, share, owned.get(name, ()), name)
@@ -260,19 +273,3 @@ def _field(columns: np.ndarray, share: float, description: str) -> Explanation:
     return Explanation(
         UNKNOWN, columns, np.zeros(columns.shape[1]), share, description=description
     )
-
-
-def _part_roots(study: Study) -> list[np.ndarray]:
-    """Square roots (P, n) of covariances over each part; parts share no field."""
-    campaign = study.campaign
-    same = campaign.experiment_of[:, np.newaxis] == campaign.experiment_of
-    away = campaign.positions_m[:, np.newaxis] - campaign.positions_m
-    square = np.sum(away**2, axis=2)
-    return [
-        covariance_root(np.where(same, np.exp(-0.5 * square / length**2), 0.0))
-        for length in LENGTHS['place']
-    ]
-
-
-def _root(values: np.ndarray, length: float) -> np.ndarray:
-    return covariance_root(np.exp(-0.5 * ((values[:, np.newaxis] - values) / length) ** 2))

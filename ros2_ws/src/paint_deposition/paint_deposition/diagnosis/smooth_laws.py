@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -17,6 +16,7 @@ from paint_deposition.effects.learned.curves import CURVES, knot_weights
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
 from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, places_m
+from paint_deposition.fitting.smooth_fields import covariance_root
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.covariates import Rays
 
@@ -70,7 +70,9 @@ class Basis:
         """
         kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
         square = cdist(self.knots[kept], self.knots[kept], 'sqeuclidean')
-        small = covariance_root(np.exp(-0.5 * square / max(length, self.shortest) ** 2))
+        small = covariance_root(
+            np.exp(-0.5 * square / max(length, self.shortest) ** 2), NEGLIGIBLE
+        )
         root = np.zeros((len(self.knots), small.shape[1]))
         root[kept] = size * small
         return RandomLaw(self, root)
@@ -104,13 +106,6 @@ class RandomLaw:
         """The law with these amplitudes (n,)."""
         values = tuple(map(float, self.at_knots @ amplitudes))
         return self.basis.law(**self.basis.settings, learned=values)
-
-
-def covariance_root(covariance: np.ndarray) -> np.ndarray:
-    """(N, n) square root of a covariance (N, N), without negligible directions."""
-    values, vectors = eigh(covariance)
-    kept = values > NEGLIGIBLE * values[-1]
-    return vectors[:, kept] * np.sqrt(values[kept])
 
 
 def bases_over(

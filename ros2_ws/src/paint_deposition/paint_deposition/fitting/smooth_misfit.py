@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, eigh
+from scipy.linalg import cho_factor, cho_solve
 from scipy.special import logsumexp
 from scipy.stats import norm
 
+from paint_deposition.fitting.smooth_fields import field_over_values, fields_over_parts
 from paint_deposition.readings.covariates import Covariate
 
 # The film's texture, as a share of it: what is usual, within a factor, and what is considered.
@@ -148,24 +149,14 @@ def _fields(misfit: Misfit) -> Iterator[tuple[np.ndarray, float]]:
     film = np.hypot(
         misfit.predicted_um, THINNEST * np.mean(misfit.predicted_um)
     )[:, np.newaxis]  # fmt: skip
-    same = misfit.experiment_of[:, np.newaxis] == misfit.experiment_of
-    square = np.sum((misfit.positions_m[:, np.newaxis] - misfit.positions_m) ** 2, axis=2)
-    over_part = [_root(np.where(same, np.exp(-0.5 * square / s**2), 0.0)) for s in PART_LENGTHS_M]
-    scaled = [
-        (c.values - c.values.mean()) / c.values.std() / COVARIATE_LENGTH
-        for c in misfit.covariates
-        if c.varies
-    ]
-    over = [_root(np.exp(-0.5 * (values[:, np.newaxis] - values) ** 2)) for values in scaled]
+    over_part = fields_over_parts(
+        misfit.experiment_of, misfit.positions_m, PART_LENGTHS_M, NEGLIGIBLE
+    )
+    scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
+    over = [field_over_values(values, COVARIATE_LENGTH, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
     roots = [*over_part, *over, every]
     yield np.empty((len(film), 0)), np.log(0.5)
     for root in roots:
         for share in SHARES:
             yield share * film * root, np.log(0.5 / len(roots) / len(SHARES))
-
-
-def _root(covariance: np.ndarray) -> np.ndarray:
-    values, vectors = eigh(covariance)
-    kept = values > NEGLIGIBLE * values[-1]
-    return vectors[:, kept] * np.sqrt(values[kept])
