@@ -1,4 +1,4 @@
-"""Leaving out blocks by moving the fit linearly is refitting, where the model is linear."""
+"""Leaving out points by moving the fit linearly is refitting, where the model is linear."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from diagnosis.linear import (
     null_of,
     smooth_curves,
 )
-from paint_deposition.diagnosis import cross_validation, learning
+from paint_deposition.diagnosis import learning
 from paint_deposition.diagnosis.cross_validation import Stage, hold_out, left_out, nested_rmse_um
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import UNKNOWN, Explanation
@@ -64,7 +64,7 @@ def test_readings_left_out_are_predicted_worse_than_fitted_ones():
 # Choosing causes and laws without the points left out.
 
 POINTS, SIGMA_UM, KNOTS = 80, 0.7, 8
-PATCHES = np.arange(POINTS) // 8
+FOLDS = np.arange(POINTS) // 8
 PLACE = np.linspace(0.0, KNOTS - 1.0, POINTS)
 FORM = np.where(np.arange(POINTS) % 4 == 0, 2.0, 0.2)
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
@@ -76,8 +76,8 @@ class Points:
 
     sigma_um: np.ndarray
 
-    def patches(self) -> np.ndarray:
-        return PATCHES
+    def folds(self) -> np.ndarray:
+        return FOLDS
 
 
 def learnable(random: RandomLaw) -> Explanation:
@@ -120,7 +120,7 @@ def test_what_acts_lowers_the_nested_error_to_the_noise():
 def test_laws_chosen_on_all_points_flatter_and_nested_ones_do_not(monkeypatch):
     """On noise alone, of thirty laws that explain nothing, the best one must be learned."""
     monkeypatch.setattr(learning, 'WORTH_LEARNING', -np.inf)
-    blocks = [patch == PATCHES for patch in np.unique(PATCHES)]
+    folds = [fold == FOLDS for fold in np.unique(FOLDS)]
     without, chosen_on_all, chosen_inside = [], [], []
     for seed in range(24):
         random = np.random.default_rng([7, seed])
@@ -128,7 +128,7 @@ def test_laws_chosen_on_all_points_flatter_and_nested_ones_do_not(monkeypatch):
         space = space_of(np.zeros(POINTS), seed, none)
         ((k, size),) = learning.choose_laws(space.null, space.explanations, np.inf)
         columns = [size * space.explanations[k].columns]
-        errors = np.concatenate([left_out(space.null, columns, block) for block in blocks])
+        errors = np.concatenate([left_out(space.null, columns, out) for out in folds])
         chosen_on_all.append(root_mean_square(errors))
         before, after, *_ = nested(space)
         without.append(before)
@@ -149,13 +149,12 @@ def test_the_search_goes_on_where_the_other_points_call_for_the_same(goes_on):
     assert nested(first) != pytest.approx(nested(second), rel=1e-3)
 
 
-def test_a_point_left_out_has_no_part_in_its_own_prediction(monkeypatch):
-    """However wrong a block is, what is predicted there stays as it is.
+def test_a_point_left_out_has_no_part_in_its_own_prediction():
+    """However wrong a fold is, what is predicted there stays as it is.
 
     Then the error there is that of before plus what was added, and its square is a parabola.
     """
-    monkeypatch.setattr(cross_validation, 'FOLDS', len(np.unique(PATCHES)))
-    out = PATCHES == 3
+    out = FOLDS == 3
     only_there = Points(out.astype(float))
 
     def square(added: float) -> np.ndarray:
@@ -168,7 +167,7 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction(monkeypatch):
 
 
 def test_the_level_of_a_part_helps_to_predict_the_rest_of_it():
-    level, out = np.ones((POINTS, 1)), PATCHES == 3
+    level, out = np.ones((POINTS, 1)), FOLDS == 3
     raw = np.random.default_rng(1).normal(size=POINTS) + 5.0
     assert abs(left_out(NullModel.of(10.0 * level, raw), [], out).mean()) < 1.0
     assert left_out(NullModel.of(0.0 * level, raw), [], out) == pytest.approx(raw[out])

@@ -1,5 +1,7 @@
 """Laws of any form as changes of readings: what they are in a model is what they were in a fit."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -109,19 +111,45 @@ def test_harmonics_of_a_footprint_are_independent_and_absent_at_the_centre(study
 def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     study = study_of(on_door(count=12), on_panel('first'), on_panel('second'))
     owner = study.campaign.experiment_of
-    door, panel = map_bases(study, MODEL)
+    door, panel, both = map_bases(study, MODEL)
     assert door.film_um[owner == 0].any()
     assert not door.film_um[owner > 0].any()
     assert not panel.film_um[owner == 0].any()
     assert np.array_equal(panel.film_um[owner == 1], panel.film_um[owner == 2])
     # The laws say so themselves.
     points = [experiment.measured_points for experiment in study.campaign.experiments]
-    laws = [basis.law(**basis.settings, learned=(0.1,) * len(basis.knots))
-            for basis in (door, panel)]  # fmt: skip
-    assert [[law.is_of(p) for p in points] for law in laws] == [
+    grids = both.settings['maps']
+    assert grids == (*door.settings['maps'], *panel.settings['maps'])
+    assert [[grid.is_of(p) for p in points] for grid in grids] == [
         [True, False, False],
         [False, True, True],
     ]
+
+
+def test_a_map_over_several_parts_has_nothing_in_common_between_them():
+    door, panel, both = map_bases(study_of(on_door(count=12), on_panel()), MODEL)
+    random = both.random(0.1, 0.25)
+    covariance = random.at_knots @ random.at_knots.T
+    assert np.abs(covariance[: len(door.knots), len(door.knots) :]).max() < 1e-12
+    law = random.learned(np.ones(random.at_knots.shape[1]))
+    (_, on_its_door), (_, on_its_panel) = law.on_parts()
+    assert on_its_door.size == len(door.knots)
+    assert on_its_panel.size == len(panel.knots)
+    np.testing.assert_allclose(both.film_um, np.hstack([door.film_um, panel.film_um]))
+
+
+def test_a_map_bends_more_sharply_than_a_curve():
+    """Half a length from an edge it still knows less of the other side."""
+    curve = basis_on_a_line(knots=41, step=0.05)
+    over_map = replace(curve, edges=True)
+    near, middle = np.arange(41), 20
+    correlation = [
+        (random.at_knots @ random.at_knots.T)[middle, near]
+        for random in (curve.random(1.0, 1.0), over_map.random(1.0, 1.0))
+    ]
+    assert correlation[1][middle + 10] < correlation[0][middle + 10] - 0.05
+    d = np.sqrt(3.0) * 0.5
+    assert correlation[1][middle + 10] == pytest.approx((1.0 + d) * np.exp(-d), abs=0.03)
 
 
 @pytest.mark.parametrize('covariate', ['curvature_per_m', 'sky_view_factor', 'speed_m_per_s'])

@@ -4,44 +4,50 @@ import numpy as np
 import pytest
 
 from booth import MODEL, door, in_batches, painted, panel, path_of, serpentine
-from paint_deposition.effects.learned.place import SAME_PART, LearnedMap, places_m
+from paint_deposition.effects.learned.place import SAME_PART, LearnedMap, PartGrid, places_m
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.part.points import SurfacePoints
 
 PANEL = panel().points()
 # Three columns 0.3 m apart and two rows 0.2 m apart.
 GRID = np.array([[0.1, -0.2, 0.4], [0.3, 0.2, -0.1]])
 
 
-def on_panel(learned=GRID, kind: str = 'factor', **more) -> LearnedMap:
-    """A map learned on the panel of the booth."""
+def grid_on(points: SurfacePoints, **more) -> PartGrid:
+    """Knots of a map on a part."""
     values = {
-        'part_m': tuple(PANEL.extent_m), 'low_m': (-0.3, -0.1), 'high_m': (0.3, 0.1),
-        'columns': np.shape(learned)[1],
+        'part_m': tuple(points.extent_m), 'low_m': (-0.3, -0.1), 'high_m': (0.3, 0.1),
+        'columns': 3, 'rows': 2,
     }  # fmt: skip
-    return LearnedMap(**(values | more), kind=kind, learned=tuple(np.ravel(learned).tolist()))
+    return PartGrid(**values | more)
 
 
-def h_at(law: LearnedMap, *places: tuple[float, float]) -> np.ndarray:
-    return law.weights(np.array(places, dtype=float)) @ np.array(law.learned)
+def on_part(points: SurfacePoints = PANEL, learned=GRID, kind: str = 'factor') -> LearnedMap:
+    """A map learned on one part; by default the panel of the booth."""
+    return LearnedMap(
+        maps=(grid_on(points),), kind=kind, learned=tuple(np.ravel(learned).tolist())
+    )
+
+
+def h_at(*places: tuple[float, float]) -> np.ndarray:
+    return grid_on(PANEL).weights(np.array(places, dtype=float)) @ GRID.ravel()
 
 
 def test_at_its_knots_it_has_its_values_row_by_row_from_the_lowest():
     knots = [(x, y) for y in (-0.1, 0.1) for x in (-0.3, 0.0, 0.3)]
-    np.testing.assert_allclose(h_at(on_panel(), *knots), GRID.ravel(), atol=1e-12)
+    np.testing.assert_allclose(h_at(*knots), GRID.ravel(), atol=1e-12)
 
 
 def test_between_its_knots_it_is_linear_along_each_side():
-    law = on_panel()
-    assert h_at(law, (-0.15, -0.1)) == pytest.approx(GRID[0, :2].mean())
-    assert h_at(law, (0.0, 0.05)) == pytest.approx(0.25 * GRID[0, 1] + 0.75 * GRID[1, 1])
-    assert h_at(law, (0.15, 0.0)) == pytest.approx(GRID[:, 1:].mean())
+    assert h_at((-0.15, -0.1)) == pytest.approx(GRID[0, :2].mean())
+    assert h_at((0.0, 0.05)) == pytest.approx(0.25 * GRID[0, 1] + 0.75 * GRID[1, 1])
+    assert h_at((0.15, 0.0)) == pytest.approx(GRID[:, 1:].mean())
 
 
 def test_one_step_beyond_its_knots_it_is_neutral():
-    law = on_panel()
     beyond = [(-0.6, 0.0), (0.6, 0.0), (0.0, 0.3), (0.0, -0.3), (9.0, 9.0)]
-    np.testing.assert_allclose(h_at(law, *beyond), 0.0, atol=1e-12)
-    assert h_at(law, (0.45, 0.1)) == pytest.approx(0.5 * GRID[1, 2])
+    np.testing.assert_allclose(h_at(*beyond), 0.0, atol=1e-12)
+    assert h_at((0.45, 0.1)) == pytest.approx(0.5 * GRID[1, 2])
 
 
 def test_places_are_to_the_right_of_the_centre_and_above_it_as_the_gun_sees_the_part():
@@ -51,9 +57,9 @@ def test_places_are_to_the_right_of_the_centre_and_above_it_as_the_gun_sees_the_
 
 @pytest.mark.parametrize('kind', ['factor', 'addition'])
 def test_the_film_changes_by_the_map_where_the_part_is_its_own(kind):
-    law = on_panel(kind=kind)
+    law = on_part(kind=kind)
     film_um = np.linspace(5.0, 30.0, len(PANEL))
-    h = law.weights(places_m(PANEL)) @ GRID.ravel()
+    h = grid_on(PANEL).weights(places_m(PANEL)) @ GRID.ravel()
     expected = film_um * (1.0 + h) if kind == 'factor' else film_um + h
     np.testing.assert_allclose(law.on_film(film_um, PANEL), expected, rtol=1e-12)
     assert np.ptp(h) > 0.4
@@ -61,7 +67,7 @@ def test_the_film_changes_by_the_map_where_the_part_is_its_own(kind):
 
 def test_bare_metal_stays_bare_and_no_film_falls_below_zero():
     film_um = np.where(PANEL.positions_m[:, 0] > 0.0, 0.3, 0.0)
-    law = on_panel(np.full((2, 2), -1.0), 'addition')
+    law = on_part(learned=np.full((2, 3), -1.0), kind='addition')
     changed = law.on_film(film_um, PANEL)
     near = np.abs(places_m(PANEL)) <= [0.3, 0.1]
     assert changed[near.all(axis=1)].max() == 0.0
@@ -72,17 +78,17 @@ def test_bare_metal_stays_bare_and_no_film_falls_below_zero():
 def test_another_part_is_left_alone(surface):
     points = surface.points()
     film_um = np.ones(len(points))
-    assert on_panel().on_film(film_um, points) is film_um
+    assert on_part().on_film(film_um, points) is film_um
 
 
 def test_a_part_is_the_same_though_its_mesh_differs_a_little():
     sides = np.array(PANEL.extent_m)
-    assert on_panel(part_m=tuple(sides * (1.0 + 0.5 * SAME_PART))).is_of(PANEL)
-    assert not on_panel(part_m=tuple(sides * (1.0 + 3.0 * SAME_PART))).is_of(PANEL)
+    assert grid_on(PANEL, part_m=tuple(sides * (1.0 + 0.5 * SAME_PART))).is_of(PANEL)
+    assert not grid_on(PANEL, part_m=tuple(sides * (1.0 + 3.0 * SAME_PART))).is_of(PANEL)
 
 
 def test_a_map_of_zeros_changes_nothing_to_the_bit():
-    path, neutral = path_of(serpentine()), on_panel(np.zeros((2, 3)))
+    path, neutral = path_of(serpentine()), on_part(learned=np.zeros((2, 3)))
     assert neutral.is_neutral
     film = painted(panel(), path, neutral)
     assert np.array_equal(film.gauge_um, painted(panel(), path).gauge_um)
@@ -93,7 +99,7 @@ def test_a_map_of_zeros_changes_nothing_to_the_bit():
 def test_few_points_are_changed_as_they_are_among_many(kind, count):
     """To the bit: readings are predicted by themselves, the film of a part as a whole."""
     points, random = door().points(), np.random.default_rng(count)
-    law = on_panel(GRID, kind, part_m=tuple(points.extent_m))
+    law = on_part(points, GRID, kind)
     film_um = random.uniform(1.0, 30.0, len(points))
     rows = np.sort(random.choice(len(points), count, replace=False))
     whole = law.on_film(film_um, points)
@@ -104,7 +110,7 @@ def test_few_points_are_changed_as_they_are_among_many(kind, count):
 @pytest.mark.parametrize('poses', [1, 40])
 def test_a_stream_paints_what_the_recording_does(poses):
     trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
-    law = on_panel()
+    law = on_part()
     surface = panel()
     whole = painted(surface, trajectory, law)
     live = FilmIntegrator(surface.points(), MODEL.with_effect(law), 'double', surface.occluder)
@@ -112,3 +118,24 @@ def test_a_stream_paints_what_the_recording_does(poses):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
     assert not np.allclose(whole.gauge_um, painted(surface, trajectory).gauge_um, rtol=0.05)
+
+
+def test_each_part_follows_its_own_map():
+    door_points = door().points()
+    both = LearnedMap(
+        maps=(grid_on(PANEL), grid_on(door_points, columns=2)),
+        learned=(*GRID.ravel().tolist(), 0.1, 0.2, 0.3, 0.4),
+    )
+    film_um = np.full(len(PANEL), 20.0)
+    assert np.array_equal(both.on_film(film_um, PANEL), on_part().on_film(film_um, PANEL))
+    film_um = np.full(len(door_points), 20.0)
+    h = both.on_film(film_um, door_points) / 20.0 - 1.0
+    assert h.max() == pytest.approx(0.4, abs=0.02)
+    (_, first), (_, second) = both.on_parts()
+    assert np.array_equal(first, GRID)
+    assert second.tolist() == [[0.1, 0.2], [0.3, 0.4]]
+
+
+def test_values_that_do_not_fill_the_maps_are_refused():
+    with pytest.raises(ValueError, match='learned has 5 values; its maps have 6 knots'):
+        on_part(learned=GRID.ravel()[:5])

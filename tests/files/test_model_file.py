@@ -14,7 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
@@ -132,8 +132,10 @@ def learned(law: type[LearnedLaw]) -> LearnedLaw:
     """One whose numbers are none that a short decimal says."""
     third, kind = 1.0 / 3.0, law.kinds[-1]
     if law is LearnedMap:
-        places = {'low_m': (-third, 0.0), 'high_m': (0.1, third), 'part_m': (1.0, third, 2.0)}
-        return law(columns=3, kind=kind, learned=(0.1, -third, 1e-7) * 2, **places)
+        grid = PartGrid(
+            part_m=(1.0, third, 2.0), low_m=(-third, 0.0), high_m=(0.1, third), columns=3, rows=2
+        )
+        return law(maps=(grid, grid), kind=kind, learned=(0.1, -third, 1e-7) * 4)
     if law is LearnedFootprint:
         return law(reach_m=third, learned=(0.1, -third, 1e-7, 0.0, 2.0) * 3)
     return law(low=0.1, high=0.2 + 1e-9, kind=kind, learned=(0.1, -third, 1e-7))
@@ -159,6 +161,9 @@ def test_two_learned_laws_stand_beside_each_other_and_what_they_leave_out_is_neu
     assert all(effect.is_neutral for effect in effects)
 
 
+MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
+
+
 @pytest.mark.parametrize(
     ('entry', 'message'),
     [
@@ -171,11 +176,23 @@ def test_two_learned_laws_stand_beside_each_other_and_what_they_leave_out_is_neu
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: time_s, heigh: 1', "unknown key 'heigh'; did you mean 'high'?"),
         ('covariate: plce', "'plce'; did you mean 'place'?"),
-        ('covariate: place, learned: [1, 2, 3]', 'has 3 values; give two or more rows of 2'),
-        ('covariate: place, learned: [1, 2]', 'has 2 values; give two or more rows of 2'),
-        ('covariate: place, columns: 1', 'columns is 1; expected 2 or more knots in a row'),
-        ('covariate: place, low_m: [0.6, 0]', 'high_m is (0.5, 0.5); it must be above low_m'),
-        ('covariate: place, low_m: 0', 'low_m is 0; expected two numbers'),
+        ('covariate: place, learned: [1, 2, 3]', 'has 3 values; its maps have 4 knots'),
+        (
+            f'{MAP}, columns: 1, low_m: [0, 0]}}]',
+            'columns is 1; expected 2 or more',
+        ),
+        (
+            f'{MAP}, columns: 2, low_m: [1, 0]}}]',
+            'high_m is (0.5, 0.5); it must be',
+        ),
+        (
+            f'{MAP}, columns: 2, low_m: 0}}]',
+            'low_m is 0; expected two numbers',
+        ),
+        (
+            f'{MAP}, columns: 2}}]',
+            "has no 'maps.0.low_m'; give two numbers: lower",
+        ),
         ('covariate: footprint, learned: [1, 2]', 'has 2 values; give 5 for each of some radii'),
         ('covariate: footprint, learned: [1, 2, 3, 4, 5]', 'give 5 for each of some radii'),
         ('covariate: footprint, reach_m: 0', 'reach_m is 0; expected a number above 0'),

@@ -190,20 +190,25 @@ def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
     assert study.nuisance[:18] == pytest.approx(here)
     film = study.measured_um * study.sigma_um
     assert (film @ study.nuisance[:, :2]).sum() == pytest.approx(0.0)
-    patches, by_pass = study.patches(), study.pass_blocks(TRUTH)
-    for blocks in (patches, by_pass):
-        assert set(blocks[:18]).isdisjoint(blocks[18:])
-    assert len(np.unique(by_pass)) == 4
-    assert len(np.unique(patches)) >= 6
 
 
-def test_points_at_few_places_are_patches_by_place(spotted):
+def test_points_are_left_out_in_six_folds_anywhere_on_the_part(spotted):
+    one = spotted.experiments[0]
+    readings = Readings.of(grid_m(7, 10), np.full(70, 20.0))
+    folds = Study.of(Campaign((Experiment.of('panel', PANEL, one.path, readings),))).folds()
+    counts = np.bincount(folds)
+    assert len(counts) == 6
+    assert np.ptp(counts) <= 1
+    assert np.count_nonzero(np.diff(folds)) > len(folds) / 2
+
+
+def test_points_at_one_place_are_left_out_together(spotted):
     places = np.repeat(grid_m()[[3, 20, 41]], 10, axis=0)
     one = spotted.experiments[0]
     experiment = Experiment.of('panel', PANEL, one.path, Readings.of(places, np.full(30, 20.0)))
-    patches = Study.of(Campaign((experiment,))).patches()
-    assert len(np.unique(patches)) == 3
-    assert (patches.reshape(3, 10) == patches.reshape(3, 10)[:, :1]).all()
+    folds = Study.of(Campaign((experiment,))).folds().reshape(3, 10)
+    assert len(np.unique(folds)) == 3
+    assert (folds == folds[:, :1]).all()
 
 
 def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):

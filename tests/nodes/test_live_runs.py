@@ -90,9 +90,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
         NodeProcess(
             tmp_path / 'recorder', RECORDER, output_directory=tmp_path, name='run'
         ) as recorder,
-        NodeProcess(
-            tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, **LOSSLESS
-        ) as simulator,
+        NodeProcess(tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, **LOSSLESS) as simulator,
     ):
         wait_until(lambda: player.exit_code is not None, what='the replay')
         assert player.exit_code == 0, player.err

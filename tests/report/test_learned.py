@@ -8,7 +8,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
-from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import nearest_law
@@ -84,23 +84,26 @@ def shown(study: Study, *effects) -> ReportData:
 @pytest.mark.slow
 def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
     door = study.campaign.experiments[1].measured_points
-    settings = {
-        'part_m': tuple(door.extent_m.tolist()), 'low_m': (-0.4, -0.3), 'high_m': (0.4, 0.3),
-        'columns': 3, 'learned': (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3),
-    }  # fmt: skip
-    factor = LearnedMap(**settings)
-    addition = LearnedMap(**settings | {'kind': 'addition', 'part_m': (9.0, 9.0, 9.0)})
+    place = {'low_m': (-0.4, -0.3), 'high_m': (0.4, 0.3), 'columns': 3, 'rows': 2}
+    learned = (-2.0, -2.0, -2.0, 0.1, 0.2, 0.3)
+    grids = (
+        PartGrid(part_m=tuple(door.extent_m.tolist()), **place),
+        PartGrid(part_m=(9.0, 9.0, 9.0), **place),
+    )
     assert map_figure(shown(study)) is None
-    maps = map_figure(shown(study, factor, addition))
+    maps = map_figure(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
     first, second, dots = maps['data']
     assert first['z'] == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
-    assert second['z'] == pytest.approx(np.array([[-2.0, -2.0, -2.0], [0.1, 0.2, 0.3]]))
     # Neutral is the middle of the colours.
     assert first['zmin'] + first['zmax'] == pytest.approx(2.0)
-    assert second['zmin'] + second['zmax'] == pytest.approx(0.0)
+    assert second['z'] == pytest.approx(first['z'])
     assert len(dots['x']) == len(door.positions_m)
     titles = [note['text'] for note in maps['layout']['annotations']]
-    assert titles == ['factor on door', 'addition [µm] on a part that was not measured here']
+    assert titles == ['factor on door', 'factor on a part that was not measured here']
+    added = map_figure(shown(study, LearnedMap(maps=grids[:1], kind='addition', learned=learned)))
+    assert added['data'][0]['z'] == pytest.approx(np.reshape(learned, (2, 3)))
+    assert added['data'][0]['zmin'] + added['data'][0]['zmax'] == pytest.approx(0.0)
+    assert added['layout']['annotations'][0]['text'] == 'addition [µm] on door'
 
 
 @pytest.mark.slow

@@ -85,6 +85,11 @@ class Explanation:
         return bool(least <= MOST_WRONG_WAY * (up + down)) == (self.cause != UNKNOWN)
 
     @property
+    def learns(self) -> str:
+        """Covariate of the learned law that it may become; '' if it cannot."""
+        return self.random.basis.law.covariate if self.random else ''
+
+    @property
     def law(self) -> np.ndarray:
         """(P, m) directions without the error of the law."""
         return self.columns if self.sensitivity is None else self.sensitivity.columns

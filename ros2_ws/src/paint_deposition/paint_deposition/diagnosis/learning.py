@@ -30,21 +30,20 @@ def choose_laws(
     Returns:
         The number of each explanation, and the standard deviation of its amplitudes.
     """
-    left = {k: (e, e.random.basis.law) for k, e in enumerate(explanations) if e.random is not None}
+    left = {k: e for k, e in enumerate(explanations) if e.learns}
     chosen: list[tuple[int, float]] = []
     while left and len(chosen) < MOST_LAWS:
         gain, k, size = max(
             (float(value), k, float(size))
-            for k, (explanation, _) in left.items()
+            for k, explanation in left.items()
             for value, size in zip(by_size(null, explanation, freedom), SIZES, strict=True)
         )
         if gain < WORTH_LEARNING:
             break
         chosen.append((k, size))
-        explanation, law = left[k]
         # What was chosen may vary from now on, too.
-        null = NullModel.of(np.hstack([null.columns, size * explanation.columns]), null.raw)
-        left = {number: entry for number, entry in left.items() if entry[1] is not law}
+        null = NullModel.of(np.hstack([null.columns, size * left[k].columns]), null.raw)
+        left = {number: e for number, e in left.items() if e.learns != left[k].learns}
     return chosen
 
 

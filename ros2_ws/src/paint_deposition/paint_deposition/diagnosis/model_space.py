@@ -151,6 +151,20 @@ class ModelSpace:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
+    @property
+    def is_shapeless(self) -> bool:
+        """Whether the most probable model has a cause from outside the library."""
+        return bool(PRIOR.keys() & set(self.models[0].causes))
+
+    def best_law(self, cause: str) -> tuple[int, float, float]:
+        """The explanation of an effect by its law, its size and log evidence, if it acts alone."""
+        first, last = self._first[self.causes.index(cause)], self._last[self.causes.index(cause)]
+        laws = [k for k in range(first, last) if self.explanations[k].sensitivity is not None]
+        deviation = self.null.deviation[:, np.newaxis]
+        values = np.array([self._by_size(k, deviation)[:, 0] for k in laws])
+        k, s = np.unravel_index(values.argmax(), values.shape)
+        return laws[k], float(SIZES[s]), float(values[k, s])
+
     def _physical_sizes(self, k: int) -> np.ndarray:
         """(S,) whether an explanation, alone at each size, is what its cause can be."""
         amounts = self.principal[k].amplitudes(self.null.deviation, SIZES)

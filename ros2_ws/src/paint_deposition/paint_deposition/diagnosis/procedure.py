@@ -10,14 +10,14 @@
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from paint_deposition.diagnosis.cross_validation import Stage, nested_rmse_um
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.diagnosis.learning import choose_laws
-from paint_deposition.diagnosis.model_space import SURE, Group, Model, ModelSpace
+from paint_deposition.diagnosis.model_space import PRIOR, SURE, Group, Model, ModelSpace
 from paint_deposition.diagnosis.run import Run
 from paint_deposition.diagnosis.unexplained import locate_unexplained
 from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, percent
@@ -29,6 +29,12 @@ from paint_deposition.readings.campaign import Campaign
 # Significance level of the test that something is missing.
 ALPHA = 0.05
 ROUNDS = 4
+# Effects tried in the place of a shapeless cause: this many, whose laws alone have this share of
+# its log evidence.
+TRIALS, LEAST_LAW = 3, 0.4
+# Least log evidence of such a cause, and its share of all that there was: less may be what the
+# laws that were accepted leave over.
+STRONG, LEFT_OVER = 15.0, 0.15
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
 # Share by which learned laws must lower the error on points left out.
@@ -63,18 +69,25 @@ def diagnose(
         reason = 'The readings agree with the model to within the noise of the gauge.'
         return run.diagnosis(p_value, 'none_missing', reason)
     stages: list[Stage] = []
-    while len(stages) < ROUNDS and (effects := _started(space)):
-        progress('refitting with ' + ', '.join(effect.id for effect in effects))
-        stages.append(Stage(space, run.plain, frozenset(effect.id for effect in effects)))
+    least = max(STRONG, LEFT_OVER * float(space.models[0].log_weight))
+    while len(stages) < ROUNDS:
+        found = _started(space)
+        effects = found or _behind_shapeless(run, space, least)
+        if not effects:
+            break
+        names = [effect.id for effect in effects]
+        progress('refitting with ' + ', '.join(names))
+        stages.append(Stage(space, run.plain, frozenset(names), shapeless=not found))
         run.fit = run.fitted_with([*run.taken, *effects])
         space = run.linearise()
-    groups = _tested(run)
+    groups = _tested(run, least)
     if len(groups) < sum(len(stage.accepted) for stage in stages):
         space = run.linearise()
-    errors_um = nested_rmse_um([*stages, Stage(space, run.plain)], run.study)
+    stages.append(Stage(space, run.plain))
+    errors_um = nested_rmse_um(stages, run.study)
     _accept(run, groups, float(errors_um[0]))
     progress('learning what the laws leave unexplained')
-    _learn(run, space, errors_um)
+    _learn(run, space, stages, errors_um)
     return _conclude(run, space, p_value)
 
 
@@ -88,19 +101,58 @@ def _started(space: ModelSpace) -> list[Effect]:
         amplitudes = amounts[k]
         if law is None:
             # A free law says nothing of the law's amplitude: take it from the law alone.
-            k = next(
-                i
-                for i, e in enumerate(space.explanations)
-                if e.cause == cause and e.sensitivity is not None
-            )
-            law = space.explanations[k].sensitivity
-            (amplitudes,) = space.amplitudes(Model((cause,), (k,), (1.0,), 0.0))
-        assert law is not None
-        effects.append(law.with_amplitudes(amplitudes[: len(law.names)]))
+            effects.append(_by_law_alone(space, cause))
+        else:
+            effects.append(law.with_amplitudes(amplitudes[: len(law.names)]))
     return effects
 
 
-def _tested(run: Run) -> dict[str, Group]:
+def _by_law_alone(space: ModelSpace, cause: str) -> Effect:
+    """An effect with the amplitudes that its law has if nothing else is missing."""
+    k, size, _ = space.best_law(cause)
+    law = space.explanations[k].sensitivity
+    assert law is not None
+    (amplitudes,) = space.amplitudes(Model((cause,), (k,), (size,)))
+    return law.with_amplitudes(amplitudes[: len(law.names)])
+
+
+def _behind_shapeless(run: Run, space: ModelSpace, least: float) -> list[Effect]:
+    """The effect that most of what a shapeless cause explains comes from, if there is one."""
+    effects, _ = _in_place_of_shapeless(run, space, run.taken, least)
+    return [_by_law_alone(space, cause) for cause in effects[:1]]
+
+
+def _in_place_of_shapeless(
+    run: Run, space: ModelSpace, beside: Sequence[Effect], least: float, *wanted: str
+) -> Group:
+    """The effects that leave little of a shapeless cause's evidence after a refit with one.
+
+    A shapeless cause follows the readings more closely than any law, and the more so the more
+    readings there are: its evidence says how far a law is off, not that the effect is absent. The
+    probability is the share of that evidence which the best effect takes.
+
+    Args:
+        run: the readings.
+        space: at the model without the effect.
+        beside: effects that this model has.
+        least: log evidence of a shapeless cause that calls for this.
+        wanted: effects to try besides the ones whose laws explain most.
+    """
+    weight = float(space.models[0].log_weight)
+    if not space.is_shapeless or weight < least:
+        return (), 0.0
+    evidence = {c: space.best_law(c)[2] for c in space.causes if c not in PRIOR}
+    likely = [c for c in evidence if evidence[c] >= LEAST_LAW * weight]
+    likely = sorted(likely, key=lambda c: -evidence[c])[:TRIALS]
+    shares = {}
+    for cause in dict.fromkeys([*likely, *wanted]):
+        fit = run.fitted_with([*beside, _by_law_alone(space, cause)])
+        shares[cause] = 1.0 - float(run.linearise(fit).models[0].log_weight) / weight
+    taking = sorted((c for c in shares if shares[c] > SURE), key=lambda c: -shares[c])
+    return tuple(taking), max(shares.values(), default=0.0)
+
+
+def _tested(run: Run, least: float) -> dict[str, Group]:
     """What could stand in the place of each added effect, all others as they are.
 
     An effect that does not stand this test is taken out again, the least probable first.
@@ -109,8 +161,12 @@ def _tested(run: Run) -> dict[str, Group]:
         effects = {effect.id: effect for effect in run.taken}
         groups = {}
         for name in effects:
-            fit = run.fitted_with([e for e in effects.values() if e.id != name])
-            groups[name] = run.linearise(fit).group(name)
+            others = [e for e in effects.values() if e.id != name]
+            space = run.linearise(run.fitted_with(others))
+            groups[name] = space.group(name)
+            if groups[name][1] <= SURE:
+                group = _in_place_of_shapeless(run, space, others, least, name)
+                groups[name] = group if name in group[0] else groups[name]
         if not groups or min(p for _, p in groups.values()) > SURE:
             return groups
         weakest = min(groups, key=lambda name: groups[name][1])
@@ -135,15 +191,24 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
         run.accepted.append(run.described(members, probability, before))
 
 
-def _learn(run: Run, space: ModelSpace, errors_um: np.ndarray) -> None:
-    """Add as many laws of any form as improve the prediction of points left out."""
-    enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
-    chosen = choose_laws(run.plain, space.explanations, space.freedom)[:enough]
-    if not chosen:
-        return
-    fit = run.learned([(space.explanations[k], size) for k, size in chosen])
-    if fit.objective > run.fit.objective:
-        return
+def _learn(run: Run, space: ModelSpace, stages: Sequence[Stage], errors_um: np.ndarray) -> None:
+    """Add as many laws of any form as improve the prediction of points left out.
+
+    A law that the model cannot be fitted with is not tried again.
+    """
+    without: set[str] = set()
+    while True:
+        enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
+        options = [e for e in space.explanations if e.learns not in without]
+        chosen = [(options[k], size) for k, size in choose_laws(run.plain, options, space.freedom)]
+        chosen = chosen[:enough]
+        if not chosen:
+            return
+        fit = run.learned(chosen)
+        if fit.objective <= run.fit.objective:
+            break
+        without.add(chosen[0][0].learns)
+        errors_um = nested_rmse_um(stages, run.study, without)
     laws = [
         e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
     ]

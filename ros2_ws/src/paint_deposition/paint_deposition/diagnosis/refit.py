@@ -142,14 +142,11 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
 
 
 def _holdout_um(run: Run, null: NullModel, options: Sequence[Explanation]) -> float:
-    """Error on points left out by patches, the law's kind, length and size chosen without them.
-
-    In micrometres.
-    """
-    blocks = run.study.patches()
-    deviation = np.empty(len(blocks))
-    for block in np.unique(blocks):
-        out = blocks == block
+    """Error on points left out [um], the law's kind, length and size chosen without them."""
+    folds = run.study.folds()
+    deviation = np.empty(len(folds))
+    for fold in np.unique(folds):
+        out = folds == fold
         kept = [explanation.select(~out) for explanation in options]
         weights = _log_bayes_factors(run, null.select(~out), kept)
         explanation, size = _best(options, weights)

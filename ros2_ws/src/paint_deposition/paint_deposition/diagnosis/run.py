@@ -36,8 +36,9 @@ from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign
 
 STARTS = 10
-# Times that laws of any form and the model's parameters are fitted to each other.
-LEARNING_STEPS = 3
+# Times that laws of any form and the model's parameters are fitted to each other at most, and the
+# change of the misfit from which on they suit each other.
+LEARNING_STEPS, SETTLED = 8, 0.5
 # A point that gets less than this share of the mean film was hardly reached by the path.
 REACHED = 0.02
 MOST_UNREACHED = 0.1
@@ -160,7 +161,7 @@ class Run:
                 size * random.change_um / self.study.sigma_um[:, np.newaxis]
                 for random, (_, size) in zip(randoms, chosen, strict=True)
             ]
-            columns = np.hstack(parts)
+            columns, before = np.hstack(parts), fit.objective
             fit = self.fitted_with(self._candidates_in(fit), columns, fit.model)
             covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
             amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
@@ -171,6 +172,8 @@ class Run:
                     randoms, chosen, np.split(amounts, ends), strict=True
                 )
             )
+            if abs(before - fit.objective) < SETTLED:
+                break
         start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
         return self.study.fit(self._free(start), nuisance=self.study.nuisance)
 

@@ -15,8 +15,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES, knot_weights
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
 from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
-from paint_deposition.effects.learned.place import LearnedMap, places_m
-from paint_deposition.fitting.smooth_fields import covariance_root
+from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
+from paint_deposition.fitting.smooth_fields import covariance_root, smooth, with_edges
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.covariates import Rays
 
@@ -45,6 +45,7 @@ class Basis:
         film_um: (P, K) change of the film for a value of 1 (1 um) at each knot.
         knots: (K, D) their places, in the unit in which lengths of correlation are given.
         shortest: length that the knots resolve, in that unit.
+        edges: whether the law may change within less than its length of correlation.
     """
 
     law: type[LearnedLaw]
@@ -52,6 +53,7 @@ class Basis:
     film_um: np.ndarray
     knots: np.ndarray
     shortest: float
+    edges: bool = False
 
     def within(self, low: float, high: float) -> np.ndarray:
         """(K,) knots of a curve at values of its covariate in a range."""
@@ -69,10 +71,8 @@ class Basis:
             among: (K,) bool, knots at which the law is not zero; default all.
         """
         kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
-        square = cdist(self.knots[kept], self.knots[kept], 'sqeuclidean')
-        small = covariance_root(
-            np.exp(-0.5 * square / max(length, self.shortest) ** 2), NEGLIGIBLE
-        )
+        away = cdist(self.knots[kept], self.knots[kept]) / max(length, self.shortest)
+        small = covariance_root(with_edges(away) if self.edges else smooth(away), NEGLIGIBLE)
         root = np.zeros((len(self.knots), small.shape[1]))
         root[kept] = size * small
         return RandomLaw(self, root)
@@ -98,8 +98,8 @@ class RandomLaw:
     def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
         """The same where another model says what arrives where."""
         bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
-        part = self.basis.settings.get('part_m')
-        (basis,) = (basis for basis in bases if basis.settings.get('part_m') == part)
+        maps = self.basis.settings.get('maps')
+        (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)
         return replace(self, basis=basis)
 
     def learned(self, amplitudes: np.ndarray) -> LearnedLaw:
@@ -161,15 +161,16 @@ def curve_basis(
 
 
 def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> list[Basis]:
-    """Maps over each part that was measured, lengths of correlation in metres.
+    """A map over each part that was measured, and one over all; lengths in metres.
 
     Parts of one shape share a map, however they were painted.
     """
     film_um = study.forward.predict_um(model)
     owner, experiments = study.campaign.experiment_of, study.campaign.experiments
     points = [experiment.measured_points for experiment in experiments]
-    sides = [tuple(np.round(p.extent_m, 3)) for p in points]
-    found = []
+    sides = [tuple(map(float, np.round(p.extent_m, 3))) for p in points]
+    grids: list[PartGrid] = []
+    changes, knots = [], []
     for side in dict.fromkeys(sides):
         places = {k: places_m(points[k]) for k, other in enumerate(sides) if other == side}
         everywhere = np.vstack(list(places.values()))
@@ -177,20 +178,29 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
         if min(high - low) < MAP_STEP_M:
             continue
         columns, rows = (int(n) for n in np.ceil((high - low) / MAP_STEP_M) + 1)
-        settings = {
-            'kind': kind, 'part_m': tuple(map(float, side)), 'columns': columns,
-            'low_m': tuple(low.tolist()), 'high_m': tuple(high.tolist()),
-        }  # fmt: skip
-        law = LearnedMap(**settings, learned=(0.0,) * (rows * columns))
-        change = np.zeros((len(study), rows * columns))
+        grid = PartGrid(
+            part_m=side, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()),
+            columns=columns, rows=rows,
+        )  # fmt: skip
+        change = np.zeros((len(study), grid.knots))
         for k, place_m in places.items():
-            change[owner == k] = law.weights(place_m)
-        if kind == 'factor':
-            change *= film_um[:, np.newaxis]
-        across, up = np.linspace(low[0], high[0], columns), np.linspace(low[1], high[1], rows)
-        grid = np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
-        found.append(Basis(LearnedMap, settings, change, grid, MAP_STEP_M))
-    return found
+            change[owner == k] = grid.weights(place_m)
+        # Parts have nothing in common.
+        knots.append(np.column_stack([grid.knots_m(), np.full(grid.knots, FAR * len(grids))]))
+        changes.append(change * film_um[:, np.newaxis] if kind == 'factor' else change)
+        grids.append(grid)
+    chosen = [[k] for k in range(len(grids))] + [list(range(len(grids)))] * (len(grids) > 1)
+    return [
+        Basis(
+            LearnedMap,
+            {'kind': kind, 'maps': tuple(grids[k] for k in parts)},
+            np.hstack([changes[k] for k in parts]),
+            np.vstack([knots[k] for k in parts]),
+            MAP_STEP_M,
+            edges=True,
+        )
+        for parts in chosen
+    ]
 
 
 def footprint_basis(study: Study, model: DepositionModel) -> Basis:

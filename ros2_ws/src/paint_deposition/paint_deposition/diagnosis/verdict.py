@@ -102,9 +102,9 @@ class Step:
 
     @staticmethod
     def of(study: Study, added: str, fit: Fit) -> Step:
-        """Compute the errors of a fit, those on points left out by patches."""
+        """Compute the errors of a fit, those on points left out too."""
         null = NullModel.around(fit, study.nuisance)
-        left_out_um = hold_out(null, study.patches()) * study.sigma_um
+        left_out_um = hold_out(null, study.folds()) * study.sigma_um
         fitted = study.residuals(fit.predicted_um)
         return Step(added, fit, fitted.rmse_um, root_mean_square(left_out_um))
 

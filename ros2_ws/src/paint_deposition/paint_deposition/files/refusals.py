@@ -1,7 +1,7 @@
 """Why a checked value was refused, in one line: the key, its value, the range, the remedy."""
 
 from dataclasses import asdict
-from typing import Any, TypeVar
+from typing import Any, TypeVar, get_args
 
 from annotated_types import Ge, Gt, Le
 from pydantic import BaseModel, ValidationError
@@ -35,17 +35,28 @@ def checked(model: type[Made], where: str, values: Any, refusal: type[PaintError
     return made
 
 
+def _field(model: type[BaseModel] | None, place: tuple[int | str, ...]) -> FieldInfo | None:
+    """The innermost field that a place in the values stands for."""
+    field = None
+    for name in (part for part in place if isinstance(part, str) and model):
+        field = model.model_fields.get(name) if model else None
+        kinds = (field.annotation, *get_args(field.annotation)) if field else ()
+        models = (k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel))
+        model = next(models, None)
+    return field
+
+
 def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     first, others = error.errors()[0], error.error_count() - 1
     more = f' (and {others} more)' if others else ''
-    if first['type'] == 'value_error' and not first['loc']:
-        return f'{where}: {first["ctx"]["error"]}{more}'
+    key = '.'.join(str(part) for part in first['loc'])
+    if first['type'] == 'value_error':
+        return f'{where}: {f"{key}: " if key else ""}{first["ctx"]["error"]}{more}'
     if not first['loc']:
         return f'{where} is {first["input"]!r}; expected the keys {", ".join(model.model_fields)}'
-    key = '.'.join(str(part) for part in first['loc'])
     if first['type'] == 'extra_forbidden':
         return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
-    field = model.model_fields.get(str(first['loc'][0]))
+    field = _field(model, first['loc'])
     if field is None:
         return f'{where}: unknown key {key}; expected names of parameters{more}'
     if first['type'] == 'missing':

@@ -3,7 +3,19 @@
 from collections.abc import Iterable
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import eigh
+
+
+def smooth(away: ArrayLike) -> np.ndarray:
+    """Correlation at a distance over its length: that of a field without any edge."""
+    return np.exp(-0.5 * np.square(away))
+
+
+def with_edges(away: ArrayLike) -> np.ndarray:
+    """The same of a field that may bend sharply: Matérn's with smoothness 3/2."""
+    scaled = np.sqrt(3.0) * np.asarray(away)
+    return (1.0 + scaled) * np.exp(-scaled)
 
 
 def covariance_root(covariance: np.ndarray, negligible: float) -> np.ndarray:
@@ -21,7 +33,7 @@ def covariance_root(covariance: np.ndarray, negligible: float) -> np.ndarray:
 def field_over_values(values: np.ndarray, length: float, negligible: float) -> np.ndarray:
     """(P, n) root of a field of unit variance over values (P,), with a length of correlation."""
     away = (values[:, np.newaxis] - values) / length
-    return covariance_root(np.exp(-0.5 * away**2), negligible)
+    return covariance_root(smooth(away), negligible)
 
 
 def fields_over_parts(
@@ -37,6 +49,6 @@ def fields_over_parts(
     same = owner[:, np.newaxis] == owner
     square = np.sum((positions_m[:, np.newaxis] - positions_m) ** 2, axis=2)
     return [
-        covariance_root(np.where(same, np.exp(-0.5 * square / length**2), 0.0), negligible)
+        covariance_root(np.where(same, smooth(np.sqrt(square) / length), 0.0), negligible)
         for length in lengths_m
     ]

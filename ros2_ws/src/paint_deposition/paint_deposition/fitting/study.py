@@ -5,7 +5,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.cluster.vq import kmeans2
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -20,8 +19,8 @@ from paint_deposition.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.readings.plausibility import check_unit
 from paint_deposition.readings.residuals import Residuals, root_mean_square
 
-# Blocks for cross-validation hold about this many points, and each part has at least some blocks.
-POINTS_A_PATCH, FEWEST_PATCHES = 8, 4
+# Times that points are left out for cross-validation, each of them once.
+FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
 
@@ -214,28 +213,16 @@ class Study:
             for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
         ]
 
-    def patches(self, seed: int = 0) -> np.ndarray:
-        """(P,) number of the patch of neighbouring points that each point belongs to."""
-        numbers = np.zeros(len(self), dtype=int)
-        for index in range(len(self.campaign.experiments)):
-            rows = np.flatnonzero(self.campaign.experiment_of == index)
-            wanted = max(FEWEST_PATCHES, len(rows) // POINTS_A_PATCH)
-            positions_m = self.campaign.positions_m[rows]
-            places, label = np.unique(positions_m, axis=0, return_inverse=True)
-            if len(places) > wanted:
-                _, label = kmeans2(positions_m, wanted, minit='++', seed=seed)
-            numbers[rows] = numbers.max() + 1 + label.ravel()
-        return numbers
+    def folds(self, seed: int = 0) -> np.ndarray:
+        """(P,) number of the fold in which each point is left out, all at one place together."""
+        places, place = np.unique(self.campaign.positions_m, axis=0, return_inverse=True)
+        fold = np.random.default_rng(seed).permutation(np.arange(len(places)) % FOLDS)
+        return fold[place.ravel()]
 
     def passes(self, model: DepositionModel) -> np.ndarray:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""
         means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
         return np.round(means).astype(int)
-
-    def pass_blocks(self, model: DepositionModel) -> np.ndarray:
-        """(P,) number of the block of points that one pass painted; parts share no block."""
-        labels = np.column_stack([self.campaign.experiment_of, self.passes(model)])
-        return np.unique(labels, axis=0, return_inverse=True)[1].ravel()
 
 
 def _of_means(noise: GaugeNoise, campaign: Campaign) -> np.ndarray:

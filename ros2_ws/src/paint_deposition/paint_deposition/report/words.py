@@ -121,8 +121,9 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
         low, high = (number(end + first) for end in (law.low, law.high))
         words.append(('over', f'{low} to {high}', unit_words(law.unit)))
     elif isinstance(law, LearnedMap):
-        sides = (1e3 * (high - low) for low, high in zip(law.low_m, law.high_m, strict=True))
-        words.append(('over', ' × '.join(f'{side:.0f}' for side in sides), 'mm of the part'))
+        for grid in law.maps:
+            sides = 1e3 * np.subtract(grid.high_m, grid.low_m)
+            words.append(('over', ' × '.join(f'{side:.0f}' for side in sides), 'mm of a part'))
     elif isinstance(law, LearnedFootprint):
         words.append(('out to', number(1e3 * law.reach_m), 'mm from the axis on the model plane'))
     return words

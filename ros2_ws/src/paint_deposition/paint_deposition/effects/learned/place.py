@@ -1,7 +1,9 @@
-"""A map over a part learned from readings, for what no covariate carries."""
+"""Maps over parts learned from readings, for what no covariate carries."""
+
+from collections.abc import Iterator
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paint_deposition.effects.learned.law import LearnedLaw, applied, hat_weights
 from paint_deposition.part.axes import across_axis, downhill_axis
@@ -19,49 +21,35 @@ def places_m(points: SurfacePoints) -> np.ndarray:
     return (points.positions_m - points.centre_m) @ np.column_stack(axes)
 
 
-class LearnedMap(LearnedLaw):
-    """The film follows the place on the part, as learned; other parts are left alone.
+class PartGrid(BaseModel):
+    """Knots of a map: an even grid over a part as the gun sees it."""
 
-    The values are those at the knots of an even grid over the part as the gun sees it, row by row
-    from the lowest, each from the left.
-    """
-
-    id, covariate = 'learned:place', 'place'
-    over = 'the place on the part'
-    kinds = ('factor', 'addition')
+    model_config = ConfigDict(frozen=True, extra='forbid')
 
     part_m: tuple[float, float, float] = Field(
-        (1.0, 1.0, 1.0),
-        description='three numbers: sides of the bounding box of the part it was learned on [m]',
+        description='three numbers: sides of the bounding box of the part [m]'
     )
-    low_m: Pair = Field(
-        (-0.5, -0.5), description='two numbers: lower left knot, from the centre [m]'
-    )
-    high_m: Pair = Field(
-        (0.5, 0.5), description='two numbers: upper right knot, from the centre [m]'
-    )
-    columns: int = Field(2, ge=2, description='2 or more knots in a row')
-    learned: tuple[float, ...] = Field((0.0,) * 4, description='a list of numbers: h at the knots')
+    low_m: Pair = Field(description='two numbers: lower left knot, from the centre [m]')
+    high_m: Pair = Field(description='two numbers: upper right knot, from the centre [m]')
+    columns: int = Field(ge=2, description='2 or more knots in a row')
+    rows: int = Field(ge=2, description='2 or more rows of knots')
 
     @model_validator(mode='after')
-    def _is_a_map(self) -> 'LearnedMap':
-        rows, rest = divmod(len(self.learned), self.columns)
-        if rows < 2 or rest:
-            raise ValueError(
-                f'learned has {len(self.learned)} values; give two or more rows of {self.columns}'
-            )
+    def _has_an_area(self) -> 'PartGrid':
         if not all(high > low for low, high in zip(self.low_m, self.high_m, strict=True)):
             raise ValueError(f'high_m is {self.high_m}; it must be above low_m, {self.low_m}')
         return self
 
-    @classmethod
-    def typical(cls) -> 'LearnedMap':
-        return cls(learned=(0.0, 0.1, 0.1, 0.0))
-
     @property
-    def rows(self) -> int:
-        """Of knots."""
-        return len(self.learned) // self.columns
+    def knots(self) -> int:
+        """Row by row from the lowest, each from the left."""
+        return self.rows * self.columns
+
+    def knots_m(self) -> np.ndarray:
+        """(K, 2) their places from the centre [m]."""
+        across = np.linspace(self.low_m[0], self.high_m[0], self.columns)
+        up = np.linspace(self.low_m[1], self.high_m[1], self.rows)
+        return np.stack(np.meshgrid(across, up), axis=-1).reshape(-1, 2)
 
     def weights(self, place_m: np.ndarray) -> np.ndarray:
         """(V, K) weights of the knots at places (V, 2)."""
@@ -71,12 +59,50 @@ class LearnedMap(LearnedLaw):
         return (up[:, :, np.newaxis] * across[:, np.newaxis]).reshape(len(place_m), -1)
 
     def is_of(self, points: SurfacePoints) -> bool:
-        """Whether the points lie on the part that it was learned on."""
+        """Whether the points lie on the part of this grid."""
         return bool(np.allclose(points.extent_m, self.part_m, rtol=SAME_PART, atol=1e-4))
 
+
+class LearnedMap(LearnedLaw):
+    """The film follows the place on the part, as learned; other parts are left alone."""
+
+    id, covariate = 'learned:place', 'place'
+    over = 'the place on the part'
+    kinds = ('factor', 'addition')
+
+    maps: tuple[PartGrid, ...] = Field(
+        (PartGrid(part_m=(1.0,) * 3, low_m=(-0.5,) * 2, high_m=(0.5,) * 2, columns=2, rows=2),),
+        description='a list of the grids of knots, one for each part',
+    )
+    learned: tuple[float, ...] = Field(
+        (0.0,) * 4, description='a list of numbers: h at the knots of one map after the other'
+    )
+
+    @model_validator(mode='after')
+    def _fills_its_maps(self) -> 'LearnedMap':
+        knots = sum(grid.knots for grid in self.maps)
+        if len(self.learned) != knots:
+            raise ValueError(
+                f'learned has {len(self.learned)} values; its maps have {knots} knots'
+            )
+        return self
+
+    @classmethod
+    def typical(cls) -> 'LearnedMap':
+        return cls(learned=(0.0, 0.1, 0.1, 0.0))
+
+    def on_parts(self) -> Iterator[tuple[PartGrid, np.ndarray]]:
+        """Each grid with its values (rows, columns)."""
+        first = 0
+        for grid in self.maps:
+            values = np.array(self.learned[first : first + grid.knots])
+            yield grid, values.reshape(grid.rows, grid.columns)
+            first += grid.knots
+
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        if not self.is_of(points):
-            return film_um
-        # Value by value, so that it is the same to the bit for few points and for many.
-        h = np.einsum('vk,k->v', self.weights(places_m(points)), np.array(self.learned))
-        return applied(film_um, h, self.kind)
+        for grid, values in self.on_parts():
+            if grid.is_of(points):
+                # Value by value, so that it is the same to the bit for few points and for many.
+                h = np.einsum('vk,k->v', grid.weights(places_m(points)), values.ravel())
+                return applied(film_um, h, self.kind)
+        return film_um

@@ -25,7 +25,7 @@ class StandoffEfficiency(Effect):
     )
 
     exponent: float = parameter(
-        0.0, low=0.0, high=2.0, typical=0.5, unit='1',
+        0.0, low=0.0, high=4.0, typical=0.5, unit='1',
         description='a, exponent of the loss with distance; positive loses',
     )  # fmt: skip
 

@@ -55,16 +55,17 @@ class _Panel:
 
 def map_figure(data: ReportData) -> dict[str, Any] | None:
     """Each map over a part that the best model has learned, the part as the gun sees it."""
-    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedMap)]
+    law = data.model.effect(LearnedMap.id)
+    if not isinstance(law, LearnedMap):
+        return None
     panels, marks = [], []
-    for k, law in enumerate(laws, start=1):
-        parts = [e for e in data.experiments if law.is_of(e.measured_points)]
-        values: np.ndarray = np.reshape(law.learned, (law.rows, law.columns))
+    for k, (grid, values) in enumerate(law.on_parts(), start=1):
+        parts = [e for e in data.experiments if grid.is_of(e.measured_points)]
         neutral = 0.0
         if law.kind == 'factor':
             values, neutral = np.maximum(1.0 + values, LEAST_FACTOR), 1.0
-        x = np.linspace(law.low_m[0], law.high_m[0], law.columns)
-        y = np.linspace(law.low_m[1], law.high_m[1], law.rows)
+        x = np.linspace(grid.low_m[0], grid.high_m[0], grid.columns)
+        y = np.linspace(grid.low_m[1], grid.high_m[1], grid.rows)
         title = 'factor' if law.kind == 'factor' else 'addition [µm]'
         title += ' on ' + (joined([e.name for e in parts]) or 'a part that was not measured here')
         panels.append(
