@@ -53,6 +53,23 @@ def test_share_within_the_target_band(tolerance, share):
     assert stats.within_target == pytest.approx(share)
 
 
+def test_below_within_and_above_share_the_painted_area():
+    film, area = np.array([0.0, 10.0, 20.0, 30.0]), np.array([5.0, 0.2, 0.5, 0.3])
+    stats = film_statistics(film, area, 1.0, target_um=20.0, target_tolerance_um=5.0)
+    assert (stats.below_target, stats.within_target, stats.above_target) == pytest.approx(
+        (0.2, 0.5, 0.3)
+    )
+
+
+@pytest.mark.parametrize(('target', 'cpk'), [(20.0, 1.0), (22.0, 4.0 / 6.0), (28.0, -2.0 / 6.0)])
+def test_cpk_is_the_way_to_the_nearer_limit_over_three_standard_deviations(target, cpk):
+    # Half the area at 18, half at 22 um: mean 20, standard deviation 2.
+    stats = film_statistics(
+        np.array([18.0, 22.0]), np.ones(2), 1.0, target_um=target, target_tolerance_um=6.0
+    )
+    assert stats.cpk == pytest.approx(cpk, rel=1e-12)
+
+
 def test_without_target_or_paint_figures_say_so():
     stats = film_statistics(np.zeros(4), np.full(4, 0.25), emitted_cm3=0.0)
     assert math.isnan(stats.within_target)

@@ -162,7 +162,7 @@ def figures(folder: Path) -> dict[str, dict[str, float]]:
 
 def draw(folder: Path, picture: Path) -> None:
     """The three comparisons side by side."""
-    from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_png
+    from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
     from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
 
     figure = new_figure(13.0, 4.0)
@@ -209,7 +209,7 @@ def draw(folder: Path, picture: Path) -> None:
         )  # fmt: skip
     right.set_ylim(bottom=0.0)
     legend(right, loc='lower right')
-    save_png(figure, picture)
+    save_picture(figure, picture)
 
 
 if __name__ == '__main__':

@@ -1,17 +1,23 @@
 """The picture of a painted part: seen from the gun's side, gravity down."""
 
+import io
+import re
+
 import numpy as np
 import pytest
+from matplotlib.colors import to_rgb
 from matplotlib.image import imread
+from matplotlib.text import Text
 
-from booth import door, painted, serpentine
+from booth import door, painted, panel, serpentine
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.pictures.chart import new_figure
-from paint_deposition.report.pictures.film import draw_film, write_door_picture
+from paint_deposition.report.pictures.film import draw_film, film_picture, write_film_picture
 from paint_deposition.report.pictures.view import View
+from paint_deposition.report.style import BELOW, HIGH, WITHIN
 
 X, Y, Z = np.eye(3)
 
@@ -49,7 +55,7 @@ def test_a_slanting_part_is_seen_along_its_normal():
 def draw(tmp_path, film_um, path, **options):
     surface = door()
     statistics = film_statistics(film_um, surface.vertex_areas_m2, 10.0, **options)
-    file = write_door_picture(
+    file = write_film_picture(
         tmp_path / 'film.png', surface, film_um, path, statistics, 'Door', ''
     )
     assert [f.name for f in tmp_path.iterdir()] == ['film.png']
@@ -82,3 +88,107 @@ def test_labels_on_contours_are_level():
     labels = [text for text in axes.texts if text.get_text().isdigit()]
     assert len(labels) > 1
     assert all(label.get_rotation() == 0.0 for label in labels)
+
+
+def figure_of(surface, film_um, path=None, **target):
+    statistics = film_statistics(film_um, surface.vertex_areas_m2, 10.0, **target)
+    spray = SprayPath.empty() if path is None else path
+    return film_picture(surface, film_um, spray, statistics, 'Part', '')
+
+
+def pixels_of(figure) -> np.ndarray:
+    """(H, W, 3) the picture, first row on top."""
+    content = io.BytesIO()
+    figure.savefig(content, format='png', dpi=figure.dpi)
+    content.seek(0)
+    return (255 * imread(content)[:, :, :3]).round().astype(int)
+
+
+def colour_bar(figure, pixels) -> tuple[np.ndarray, np.ndarray]:
+    """(N, 3) colours of the bar from below, and the film [um] that its axis has there."""
+    bar = figure.axes[1]
+    box = bar.get_window_extent()
+    rows = np.arange(int(box.y0) + 2, int(box.y1) - 1)
+    film = bar.transData.inverted().transform(np.stack([np.zeros(len(rows)), rows + 0.5], 1))[:, 1]
+    return pixels[len(pixels) - 1 - rows, int(box.x0 + 0.5 * box.width)], film
+
+
+def test_the_film_is_read_back_from_the_picture_through_its_colour_bar():
+    surface = door()
+    # Thin to thick along a slant, on a door whose creases any light would show.
+    x, z = surface.vertices_m[:, 0], surface.vertices_m[:, 2]
+    film = 18.0 + 9.0 * x + 6.0 * z
+    figure = figure_of(surface, film)
+    pixels = pixels_of(figure)
+    colours, films = colour_bar(figure, pixels)
+    inside = surface.normals @ surface.outward > 0.9
+    at = figure.axes[0].transData.transform(np.stack([x, z], axis=1)[inside]).astype(int)
+    centre = figure.axes[0].transData.inverted().transform(at + 0.5)
+    true_um = 18.0 + 9.0 * centre[:, 0] + 6.0 * centre[:, 1]
+    seen = pixels[len(pixels) - 1 - at[:, 1], at[:, 0]]
+    off = np.abs(seen[:, None] - colours[None]).sum(axis=2)
+    # Elsewhere a contour, its label or the outline lies on top.
+    clear = off.min(axis=1) == 0
+    assert clear.mean() > 0.9
+    # Where several rows of the bar have the colour, it is read in their middle.
+    same = off == off.min(axis=1, keepdims=True)
+    read_um = (same @ films) / same.sum(axis=1)
+    assert np.abs(read_um / true_um - 1.0)[clear].max() < 0.01
+
+
+@pytest.mark.slow
+def test_the_bands_take_the_share_of_the_picture_that_the_figures_tell():
+    surface = panel()
+    film = 20.0 + 20.0 * surface.vertices_m[:, 0]
+    target = {'target_um': 18.0, 'target_tolerance_um': 3.0}
+    figure = figure_of(surface, film, **target)
+    pixels, box = pixels_of(figure), figure.axes[0].get_window_extent()
+    rows = slice(len(pixels) - int(box.y1), len(pixels) - int(box.y0))
+    area = pixels[rows, int(box.x0) : int(box.x1)]
+    counts = [
+        np.sum(np.abs(area - np.round(255 * np.array(to_rgb(colour)))).sum(axis=2) < 4)
+        for colour in (BELOW, WITHIN, HIGH)
+    ]
+    # From 10 to 30 um across the panel: 15 and 21 um lie a quarter and eleven twentieths along.
+    assert np.array(counts) / sum(counts) == pytest.approx([0.25, 0.3, 0.45], abs=0.005)
+    told = ' '.join(text.get_text() for legend in figure.legends for text in legend.get_texts())
+    told_percent = [float(share) for share in re.findall(r'([\d.]+) %', told)]
+    # The figures count whole vertices, here 20 mm apart.
+    assert told_percent == pytest.approx([45.0, 30.0, 25.0], abs=2.0)
+    assert sum(told_percent) == pytest.approx(100.0, abs=0.2)
+
+
+def test_passes_beside_the_part_are_drawn_whole():
+    path = spray_path(serpentine((0.5, 0.9), half_width_m=1.2, opens_at_m=1.1))[0]
+    gun = path.position_m[path.flow > 0.0]
+    figure = figure_of(door(), np.zeros(len(door().vertices_m)), path)
+    (left, right), (low, high) = figure.axes[0].get_xlim(), figure.axes[0].get_ylim()
+    assert left < gun[:, 0].min() < gun[:, 0].max() < right
+    assert low < gun[:, 2].min() < gun[:, 2].max() < high
+
+
+def test_a_pass_in_another_frame_leaves_the_part_large_enough_to_see():
+    path = spray_path(serpentine((50.0,)))[0]
+    figure = figure_of(door(), np.zeros(len(door().vertices_m)), path)
+    assert np.ptp(figure.axes[0].get_ylim()) < 3.0
+
+
+@pytest.mark.slow
+def test_every_label_is_upright():
+    film = painted(door(), serpentine((0.5,))).film_um
+    figure = figure_of(door(), film, target_um=10.0, target_tolerance_um=3.0)
+    figure.canvas.draw()
+    texts = [text for text in figure.findobj(Text) if text.get_text()]
+    assert len(texts) > 30
+    assert {text.get_rotation() for text in texts} == {0.0}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('suffix', 'begins'), [('svg', b'<?xml'), ('pdf', b'%PDF')])
+def test_the_suffix_is_the_format(tmp_path, suffix, begins):
+    film = painted(door(), serpentine((0.5,))).film_um
+    statistics = film_statistics(film, door().vertex_areas_m2, 10.0)
+    file = write_film_picture(
+        tmp_path / f'film.{suffix}', door(), film, SprayPath.empty(), statistics, 'Door', ''
+    )
+    assert file.read_bytes().startswith(begins)

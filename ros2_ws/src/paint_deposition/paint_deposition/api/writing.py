@@ -19,7 +19,7 @@ from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.pictures.calibration import write_calibration_pictures
-from paint_deposition.report.pictures.film import write_door_picture
+from paint_deposition.report.pictures.film import write_film_picture
 from paint_deposition.report.pictures.profiles import write_comparison_picture
 from paint_deposition.report.pictures.uniformity import write_uniformity
 from paint_deposition.results.calibration import write_calibration
@@ -28,6 +28,8 @@ from paint_deposition.results.fitted_model import write_fitted
 from paint_deposition.results.plan import write_plan
 from paint_deposition.results.residual_mesh import write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
+
+PNG = 'png'
 
 
 @singledispatch
@@ -48,7 +50,12 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
 
 
 @write.register
-def _(result: Film, folder: str | Path, made_from: Mapping[str, Any] | None = None) -> list[Path]:
+def _(
+    result: Film,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
     about = result.to_dict() | dict(made_from or {})
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
@@ -57,48 +64,58 @@ def _(result: Film, folder: str | Path, made_from: Mapping[str, Any] | None = No
         files.append(Path(folder) / 'predicted.csv')
         write_predictions(files[-1], result.readings.source, result.predicted_um)
     names = [Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')]
-    picture = write_door_picture(
-        Path(folder) / 'film.png', result.surface, result.film_um, result.path, result.statistics,
-        f'Film on {names[0] or "the part"}', f'{names[1]}, {names[2] or "default model"}',
+    picture = write_film_picture(
+        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
+        result.statistics, f'Film on {names[0] or "the part"}',
+        f'{names[1]}, {names[2] or "default model"}',
     )  # fmt: skip
     return [*files, picture]
 
 
 @write.register
-def _(result: Calibration, folder: str | Path, start: ModelFile | None = None) -> list[Path]:
+def _(
+    result: Calibration, folder: str | Path, start: ModelFile | None = None, pictures: str = PNG
+) -> list[Path]:
     files = write_calibration(folder, result, start)
-    return files + write_calibration_pictures(folder, result)
+    return files + write_calibration_pictures(folder, result, pictures)
 
 
 @write.register
-def _(result: Comparison, folder: str | Path) -> list[Path]:
-    return _write_report(Path(folder), 'comparison.json', result, result)
+def _(result: Comparison, folder: str | Path, pictures: str = PNG) -> list[Path]:
+    return _write_report(Path(folder), 'comparison.json', result, result, pictures)
 
 
 @write.register
-def _(result: Diagnosis, folder: str | Path, start: ModelFile | None = None) -> list[Path]:
+def _(
+    result: Diagnosis, folder: str | Path, start: ModelFile | None = None, pictures: str = PNG
+) -> list[Path]:
     folder, start = Path(folder), start or ModelFile(result.history[0].model)
     models = [folder / 'model_before.yaml', folder / 'model.yaml']
     write_fitted(models[0], result.study, result.history[:1], start)
     write_fitted(models[1], result.study, result.history, start)
     last = result.comparisons[-1]
-    return models + _write_report(folder, 'diagnosis.json', result, last, start.history)
+    return models + _write_report(folder, 'diagnosis.json', result, last, pictures, start.history)
 
 
 @write.register
-def _(result: Recommendation, folder: str | Path) -> list[Path]:
-    files = [Path(folder) / 'recommendation.json', Path(folder) / 'uniformity.png']
+def _(result: Recommendation, folder: str | Path, pictures: str = PNG) -> list[Path]:
+    files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
     write_json(files[0], result.to_dict())
     write_uniformity(files[1], result)
     return files
 
 
 @write.register
-def _(result: Plan, folder: str | Path, made_from: Mapping[str, Any] | None = None) -> list[Path]:
+def _(
+    result: Plan,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
     files = write_plan(folder, result, result.surface, about)
-    picture = write_door_picture(
-        Path(folder) / 'film.png', result.surface, result.film_um, result.path,
+    picture = write_film_picture(
+        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,
     )  # fmt: skip
     return [*files, picture]
@@ -109,11 +126,13 @@ def _write_report(
     figures: str,
     result: Comparison | Diagnosis,
     last: Comparison,
+    pictures: str,
     older: Sequence[Mapping[str, Any]] = (),
 ) -> list[Path]:
     """Figures, the last model's residuals as a table and as meshes, picture and report."""
     data = ReportData.of(result, older)
-    files = [folder / name for name in (figures, 'residuals.csv', 'comparison.png', 'report.html')]
+    names = (figures, 'residuals.csv', f'comparison.{pictures}', 'report.html')
+    files = [folder / name for name in names]
     write_json(files[0], result.to_dict())
     write_residuals(files[1], last)
     meshes = write_residual_meshes(folder, last)

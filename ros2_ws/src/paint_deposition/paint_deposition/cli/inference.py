@@ -13,6 +13,7 @@ from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    PICTURES,
     model_option,
     output_option,
     read_inputs,
@@ -42,8 +43,11 @@ OWN_EFFECTS = click.option(
 @CAMPAIGN
 @model_option("Model to judge as it is; default: the campaign's, else one fitted to it.")
 @OUTPUT
+@PICTURES
 @JSON
-def compare_command(campaign: Path, model_file: Path | None, output: Path, as_json: bool) -> None:
+def compare_command(
+    campaign: Path, model_file: Path | None, output: Path, pictures: str, as_json: bool
+) -> None:
     """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
 
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
@@ -53,7 +57,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
         data, start = read_inputs(campaign, model_file, tell)
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
-        files = write_results(comparison, output)
+        files = write_results(comparison, output, pictures=pictures)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
 
@@ -81,6 +85,7 @@ def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
 @OUTPUT
 @OWN_EFFECTS
 @SEED
+@PICTURES
 @JSON
 def diagnose_command(
     campaign: Path,
@@ -88,6 +93,7 @@ def diagnose_command(
     output: Path,
     effect_files: tuple[Path, ...],
     seed: int,
+    pictures: str,
     as_json: bool,
 ) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
@@ -104,7 +110,7 @@ def diagnose_command(
             data, start.model if start else None, posterior=start.posterior if start else None,
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
-        files = _write(diagnosis, output, start, tell)
+        files = _write(diagnosis, output, start, tell, pictures)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -119,9 +125,16 @@ def diagnose_command(
 @MODEL
 @OUTPUT
 @SEED
+@PICTURES
 @JSON
 def refit_command(
-    campaign: Path, effect: str, model_file: Path | None, output: Path, seed: int, as_json: bool
+    campaign: Path,
+    effect: str,
+    model_file: Path | None,
+    output: Path,
+    seed: int,
+    pictures: str,
+    as_json: bool,
 ) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
@@ -141,20 +154,24 @@ def refit_command(
             data, added, start.model if start else None,
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
-        files = _write(diagnosis, output, start, tell)
+        files = _write(diagnosis, output, start, tell, pictures)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
 
 def _write(
-    diagnosis: pd.Diagnosis, output: Path, start: ModelFile | None, tell: Progress
+    diagnosis: pd.Diagnosis,
+    output: Path,
+    start: ModelFile | None,
+    tell: Progress,
+    pictures: str,
 ) -> list[Path]:
     tell('comparing before and after')
     _ = diagnosis.comparisons
     tell('looking for what to measure and spray next')
     _ = diagnosis.proposals
     tell('writing the report')
-    return write_results(diagnosis, output, start=start)
+    return write_results(diagnosis, output, start=start, pictures=pictures)
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:

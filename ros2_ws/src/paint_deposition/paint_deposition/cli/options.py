@@ -42,6 +42,10 @@ NOT_NEGATIVE = FiniteRange(min=0.0)
 FILE = click.Path(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+PICTURES = click.option(
+    '--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png', show_default=True,
+    help='Format of the pictures.',
+)  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
 

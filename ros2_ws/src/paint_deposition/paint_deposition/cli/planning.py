@@ -19,6 +19,7 @@ from paint_deposition.cli.options import (
     MODEL,
     NOT_NEGATIVE,
     NUMBER,
+    PICTURES,
     POSITIVE,
     direction_option,
     file_lines,
@@ -70,9 +71,15 @@ def passes_wanted(command: Callable) -> Callable:
 @model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
 @output_option('model.yaml, calibration.json and pictures')
 @seed_option('the starts of the fit')
+@PICTURES
 @JSON
 def calibrate_command(
-    campaign: Path, model_file: Path | None, output: Path, seed: int, as_json: bool
+    campaign: Path,
+    model_file: Path | None,
+    output: Path,
+    seed: int,
+    pictures: str,
+    as_json: bool,
 ) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 
@@ -83,7 +90,7 @@ def calibrate_command(
         data, start = read_inputs(campaign, model_file, tell)
         result = pd.calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
-        files = write_results(result, output, start=start)
+        files = write_results(result, output, start=start, pictures=pictures)
     if not as_json:
         say_all('warning', result.warnings)
     say_results(files, as_json, [*_calibration_lines(result), *file_lines(files)])
@@ -118,15 +125,21 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     help='The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
 )  # fmt: skip
 @output_option('recommendation.json and uniformity.png; default: the working directory', '.')
+@PICTURES
 @JSON
 def recommend_command(
-    model_file: Path | None, output: Path, as_json: bool, travel_deg: float, **wanted: Any
+    model_file: Path | None,
+    output: Path,
+    pictures: str,
+    as_json: bool,
+    travel_deg: float,
+    **wanted: Any,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
     model = read_given_model(model_file)
     travel_rad = math.radians(travel_deg)
     answer = pd.recommend(model, travel_rad=travel_rad, **wanted)
-    files = write_results(answer, output)
+    files = write_results(answer, output, pictures=pictures)
     say_results(files, as_json, [*_recommendation_lines(answer), *file_lines(files)])
 
 
@@ -170,6 +183,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
 @output_option('the bag, passes.csv, passes.mod, plan.json and the film')
+@PICTURES
 @JSON
 def plan_command(
     mesh: Path,
@@ -180,6 +194,7 @@ def plan_command(
     mesh_scale: float,
     max_edge_length_m: float,
     frame_id: str,
+    pictures: str,
     as_json: bool,
     **wanted: Any,
 ) -> None:
@@ -198,7 +213,7 @@ def plan_command(
             'frame_id': frame_id,
         }
         tell('writing')
-        files = write_results(result, output, made_from=made_from)
+        files = write_results(result, output, made_from=made_from, pictures=pictures)
     say_all('note', surface.notes)
     say_results(files, as_json, [*_plan_lines(result), *file_lines(files)])
 

@@ -18,6 +18,7 @@ from paint_deposition.cli.options import (
     MESH_SCALE,
     MODEL,
     NOT_NEGATIVE,
+    PICTURES,
     direction_option,
     file_lines,
     max_edge_length_option,
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
+@PICTURES
 @JSON
 def simulate_command(
     mesh: Path,
@@ -75,6 +77,7 @@ def simulate_command(
     mesh_scale: float,
     max_edge_length_m: float,
     down: np.ndarray | None,
+    pictures: str,
     as_json: bool,
     **wanted: float,
 ) -> None:
@@ -99,7 +102,7 @@ def simulate_command(
             'model_file': str(model_file or ''),
         }
         tell('writing and drawing')
-        files = write_results(film, output, made_from=made_from)
+        files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('warning', filter(None, [film.warning]))
     say_results(files, as_json, [*_lines(film), *file_lines(files)])
@@ -115,7 +118,8 @@ def _lines(film: pd.Film) -> Iterator[str]:
     if s.target_um:
         yield (
             f'{100 * s.within_target:.1f} % of it within {s.target_um:g} ± '
-            f'{s.target_tolerance_um:g} µm'
+            f'{s.target_tolerance_um:g} µm, {100 * s.below_target:.1f} % below, '
+            f'{100 * s.above_target:.1f} % above, Cpk {s.cpk:.2f}'
         )
     if not math.isnan(s.capture_fraction):
         yield (

@@ -7,6 +7,10 @@ import numpy as np
 
 # Thinner film counts as bare metal: overspray dust that no gauge shows.
 DEFAULT_PAINTED_ABOVE_UM = 1.0
+CPK_MEANS = (
+    'Cpk: distance of the mean film from the nearer limit over three standard deviations, both '
+    'weighted by the painted area of this part.'
+)
 
 
 @dataclass(frozen=True)
@@ -18,7 +22,10 @@ class FilmStatistics:
         std_dev_um: standard deviation of the film [um].
         min_um, max_um: least and greatest film [um].
         coverage: share of the part's area that is painted, 0 to 1.
-        within_target: share of the painted area in the target band, 0 to 1; NaN without a target.
+        below_target, within_target, above_target: shares of the painted area below, in and above
+            the target band, 0 to 1; NaN without a target.
+        cpk: distance of the mean from the nearer limit of the band over three standard deviations;
+            NaN without a target or a standard deviation.
         painted_volume_cm3: solids on the whole part, dust included [cm3].
         capture_fraction: solids on the part over `emitted_volume_cm3`; NaN without any. It is no
             transfer efficiency: K1 already holds that of a part which catches everything.
@@ -35,7 +42,10 @@ class FilmStatistics:
     min_um: float
     max_um: float
     coverage: float
+    below_target: float
     within_target: float
+    above_target: float
+    cpk: float
     painted_volume_cm3: float
     capture_fraction: float
     emitted_volume_cm3: float
@@ -43,6 +53,14 @@ class FilmStatistics:
     painted_above_um: float
     target_um: float
     target_tolerance_um: float
+
+    @property
+    def band_um(self) -> tuple[float, float]:
+        """Lowest and highest film of the target band [um]."""
+        return (
+            self.target_um - self.target_tolerance_um,
+            self.target_um + self.target_tolerance_um,
+        )
 
     def to_dict(self) -> dict[str, float | None]:
         """All figures by name; None stands for NaN, which JSON does not know."""
@@ -72,14 +90,21 @@ def film_statistics(
     film, area = film_um[painted], area_m2[painted]
     painted_area = float(area.sum())
     mean = variance = least = greatest = 0.0
-    within = math.nan
+    below = within = above = cpk = math.nan
     if painted_area > 0.0:
         mean = float(np.sum(film * area)) / painted_area
         variance = float(np.sum((film - mean) ** 2 * area)) / painted_area
         least, greatest = float(film.min()), float(film.max())
     if target_um > 0.0:
-        good = np.abs(film - target_um) <= target_tolerance_um
-        within = float(area[good].sum()) / painted_area if painted_area > 0.0 else 0.0
+        off = film - target_um
+        shares = [off < -target_tolerance_um, np.abs(off) <= target_tolerance_um,
+                  off > target_tolerance_um]  # fmt: skip
+        below, within, above = (
+            float(area[share].sum()) / painted_area if painted_area > 0.0 else 0.0
+            for share in shares
+        )
+        if variance > 0.0:
+            cpk = (target_tolerance_um - abs(mean - target_um)) / (3.0 * math.sqrt(variance))
     volume = float(np.sum(film_um * area_m2))
     return FilmStatistics(
         mean_um=mean,
@@ -87,7 +112,10 @@ def film_statistics(
         min_um=least,
         max_um=greatest,
         coverage=painted_area / float(area_m2.sum()),
+        below_target=below,
         within_target=within,
+        above_target=above,
+        cpk=cpk,
         painted_volume_cm3=volume,
         capture_fraction=volume / emitted_cm3 if emitted_cm3 > 0.0 else math.nan,
         emitted_volume_cm3=float(emitted_cm3),

@@ -7,13 +7,15 @@ from matplotlib.axes import Axes
 
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_png
+from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
 
 LINE_POINTS = 600
 
 
-def write_calibration_pictures(folder: str | Path, calibration: Calibration) -> list[Path]:
+def write_calibration_pictures(
+    folder: str | Path, calibration: Calibration, suffix: str = 'png'
+) -> list[Path]:
     """Write what the campaign allows: ``collapse.png``, ``profiles.png``, ``agreement.png``."""
     folder = Path(folder)
     written = []
@@ -21,7 +23,7 @@ def write_calibration_pictures(folder: str | Path, calibration: Calibration) -> 
     if panels:
         figure = new_figure(6.4, 4.2)
         draw_collapse(figure.subplots(), calibration, panels[0][1])
-        written.append(save_png(figure, folder / 'collapse.png'))
+        written.append(save_picture(figure, folder / f'collapse.{suffix}'))
         figure = new_figure(8.0, 2.6 * len(panels) + 0.4)
         rows = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
         for axes, (number, panel) in zip(rows, panels, strict=True):
@@ -29,11 +31,11 @@ def write_calibration_pictures(folder: str | Path, calibration: Calibration) -> 
         for axes in rows[:-1]:
             axes.set_xlabel('')
         legend(rows[0], loc='lower center', ncols=2)
-        written.append(save_png(figure, folder / 'profiles.png'))
+        written.append(save_picture(figure, folder / f'profiles.{suffix}'))
     figure = new_figure(5.2, 5.0)
     study, predicted_um = calibration.study, calibration.fit.predicted_um
     draw_agreement(figure.subplots(), study.measured_um, predicted_um, study.sigma_um)
-    return [*written, save_png(figure, folder / 'agreement.png')]
+    return [*written, save_picture(figure, folder / f'agreement.{suffix}')]
 
 
 def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:

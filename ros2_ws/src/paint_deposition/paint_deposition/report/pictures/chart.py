@@ -38,8 +38,11 @@ def legend(axes: Axes, **options: Any) -> None:
     axes.legend(frameon=False, fontsize=9, labelcolor=INK, **options)
 
 
-def save_png(figure: Figure, path: str | Path) -> Path:
-    """Write the figure, replacing an older file at once."""
+def save_picture(figure: Figure, path: str | Path) -> Path:
+    """Write the figure as PNG, SVG or PDF, by the suffix, replacing an older file at once."""
+    path = Path(path)
     with replacing(path) as temporary:
-        figure.savefig(temporary, format='png', dpi=DOTS_PER_INCH, facecolor='white')
-    return Path(path)
+        figure.savefig(
+            temporary, format=path.suffix.removeprefix('.'), dpi=DOTS_PER_INCH, facecolor='white'
+        )
+    return path

@@ -1,72 +1,72 @@
-"""The painted part from the front: film as colour on the shaded surface, and the tool path."""
+"""The painted part with the figures of its film; first what is in the target band, if any."""
 
 from pathlib import Path
+from textwrap import fill
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
-from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
-from matplotlib.patheffects import Normal, Stroke
-from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import Affine2D
-from matplotlib.tri import Triangulation
 
 from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
-from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import new_figure, save_png
-from paint_deposition.report.pictures.view import SNAP_COSINE, View
-from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
+from paint_deposition.report.pictures.part import PartPicture
+from paint_deposition.report.pictures.tool_path import draw_tool_path
+from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].
 PART_IN = (7.6, 7.6)
-LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.75, 2.45, 0.6, 0.75
-LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.25, 0.24, 3.2
-# Tool path around the part that is still shown [m].
-MARGIN_M = 0.18
-# Light from above left; how much a lean of the surface brightens or darkens it.
-LIGHT, CONTRAST = (-0.45, 0.75), 0.5
-DARKEST, BRIGHTEST = 0.55, 1.18
-ARROW_EVERY_M = 0.45
-HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
-PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
+LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.9, 2.95, 0.6, 0.75
+LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.3, 0.24, 4.0
+LINE_IN, INSET_IN = 0.24, (2.1, 1.35)
+BINS = 40
 
 
-def write_door_picture(
-    path: str | Path,
+def write_film_picture(path: str | Path, *drawn: Any) -> Path:
+    """Write ``film_picture`` as PNG, SVG or PDF, by the suffix, in place of an older file."""
+    return save_picture(film_picture(*drawn), path)
+
+
+def film_picture(
     surface: Surface,
     film_um: np.ndarray,
     spray: SprayPath,
     statistics: FilmStatistics,
     title: str,
     subtitle: str,
-) -> Path:
-    """Draw a painted part with the figures of its film, replacing an older picture at once.
+) -> Figure:
+    """A painted part with the figures of its film.
+
+    With a target the part is drawn twice: too thin, right and too thick first, then the film.
 
     Args:
-        path: PNG to write.
+        surface: the part.
         film_um: (V,) film at the vertices of the surface [um].
         spray: the tool path.
         statistics: of the film.
         title, subtitle: what to write above.
     """
-    low, high = _window(surface, spray, View.of_front(surface.outward, surface.down))
-    figure, axes = _canvas(high - low)
-    scale = draw_film(axes, surface, film_um, spray, statistics.painted_above_um)
-    axes.set_title(title, loc='left', fontsize=13, color=INK, pad=24)
-    axes.annotate(
-        subtitle, (0.0, 1.0), xytext=(0, 9), xycoords='axes fraction',
+    part = PartPicture.of(surface)
+    low, high = part.window(spray)
+    wanted = statistics.target_um > 0.0
+    figure, rows = _canvas(high - low, 2 if wanted else 1)
+    if wanted:
+        _draw_band(rows[0], part, film_um, spray, statistics)
+        _draw_band_legend(rows[0], surface, film_um, statistics)
+    scale = draw_film(rows[-1].axes, surface, film_um, spray, statistics.painted_above_um, part)
+    _draw_legend(rows[-1], part, scale, film_um, statistics)
+    rows[0].axes.set_title(title, loc='left', fontsize=13, color=INK, pad=24)
+    rows[0].axes.annotate(
+        fill(subtitle, 110), (0.0, 1.0), xytext=(0, 9), xycoords='axes fraction',
         textcoords='offset points', fontsize=9, color=MUTED,
     )  # fmt: skip
-    bare = bool(np.any(film_um <= statistics.painted_above_um))
-    _draw_legend(figure, scale, statistics, bare)
-    return save_png(figure, path)
+    return figure
 
 
 def draw_film(
@@ -75,180 +75,174 @@ def draw_film(
     film_um: np.ndarray,
     spray: SprayPath,
     painted_above_um: float,
+    part: PartPicture | None = None,
 ) -> ColourScale:
     """Draw a painted part on axes of your own, seen from the gun's side.
 
     Args:
         axes: their limits, aspect and labels are set.
+        surface: the part.
         film_um: (V,) film at the vertices of the surface [um].
         spray: the tool path, drawn over the part.
         painted_above_um: film that counts as painted; less is shown as bare metal.
+        part: the picture of the surface, where it is at hand.
 
     Returns:
-        The scale of the colours.
+        The scale of the colours. They are the film: relief is shown by lines alone.
     """
-    view = View.of_front(surface.outward, surface.down)
+    part = part or PartPicture.of(surface)
     scale = film_scale(film_um)
-    low, high = _window(surface, spray, view)
-    _dress(axes, view, low, high)
-    _draw_surface(axes, surface, film_um, view, scale, painted_above_um)
-    _draw_gun(axes, spray, view, low, high)
+    low, high = part.window(spray)
+    part.dress(axes, low, high)
+    seen_um = part.spread(film_um)
+    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > painted_above_um)[:, :, :3] / 255.0)
+    part.draw_contours(axes, film_um, scale.low, scale.high)
+    draw_tool_path(axes, spray, part.view, low, high)
     return scale
 
 
-def _canvas(extent_m: np.ndarray) -> tuple[Figure, Axes]:
-    """A figure around axes that are as large as the part needs them."""
-    width, height = extent_m * min(PART_IN / extent_m)
-    height_in = max(height, LEAST_HEIGHT_IN)
-    size = np.array([LEFT_IN + width + RIGHT_IN, BOTTOM_IN + height_in + TOP_IN])
-    figure = new_figure(*size)
-    figure.set_layout_engine('none')
-    corner = np.array([LEFT_IN, BOTTOM_IN + 0.5 * (height_in - height)])
-    return figure, figure.add_axes((*(corner / size), width / size[0], height / size[1]))
+class _Row:
+    """Axes for the part, and a column beside them that is filled from above [in]."""
 
+    def __init__(self, figure: Figure, box: tuple[float, float, float, float]) -> None:
+        self.figure = figure
+        self.size = figure.get_size_inches()
+        left, bottom, width, height = box
+        self.axes = self._axes(left, bottom, width, height)
+        self.left, self.top, self.bottom = left + width + LEGEND_GAP_IN, bottom + height, bottom
 
-def _window(surface: Surface, spray: SprayPath, view: View) -> tuple[np.ndarray, np.ndarray]:
-    """Lowest and highest corner of the picture: the part, and the gun not far from it."""
-    corners = view.flat(surface.vertices_m)
-    gun = view.flat(spray.position_m[spray.flow > 0.0])
-    low, high = corners.min(axis=0), corners.max(axis=0)
-    if len(gun):
-        low = np.maximum(np.minimum(low, gun.min(axis=0)), low - MARGIN_M)
-        high = np.minimum(np.maximum(high, gun.max(axis=0)), high + MARGIN_M)
-    room = 0.03 * (high - low).max()
-    return low - room, high + room
+    def _axes(self, left: float, bottom: float, width: float, height: float) -> Axes:
+        across, up = self.size
+        return self.figure.add_axes((left / across, bottom / up, width / across, height / up))
 
+    def axes_below(self, width_in: float, height_in: float, indent_in: float = 0.0) -> Axes:
+        """Axes below what the column holds already."""
+        self.top -= height_in
+        return self._axes(self.left + indent_in, self.top, width_in, height_in)
 
-def _draw_surface(
-    axes: Axes,
-    surface: Surface,
-    film_um: np.ndarray,
-    view: View,
-    scale: ColourScale,
-    painted_above_um: float,
-) -> None:
-    normals = face_normals(surface.vertices_m, surface.faces)
-    front = np.flatnonzero(normals @ view.toward > 0.0)
-    depth = surface.vertices_m[surface.faces[front]].mean(axis=1) @ view.toward
-    right_m, up_m = view.flat(surface.vertices_m).T
-    triangles = Triangulation(right_m, up_m, surface.faces[front[np.argsort(depth)]])
-    colours = scale.rgba(film_um, film_um > painted_above_um) / 255.0
-    lean = surface.normals @ (LIGHT[0] * view.right + LIGHT[1] * view.up)
-    shade = np.clip(1.0 + CONTRAST * lean, DARKEST, BRIGHTEST)[:, np.newaxis]
-    colours[:, :3] = np.clip(colours[:, :3] * shade, 0.0, 1.0)
-    axes.add_collection(TriMesh(triangles, facecolor=colours), autolim=False)
-    _draw_contours(axes, triangles, film_um, scale)
-    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.8))
-
-
-def _draw_contours(
-    axes: Axes, triangles: Triangulation, film_um: np.ndarray, scale: ColourScale
-) -> None:
-    """Lines of equal film at round figures: shading darkens colours, but moves no line."""
-    levels = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(scale.low, scale.high)
-    levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
-    if not len(levels):
-        return
-    lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
-    for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
-        # Level, or labels on upright lines would read upward here and downward there.
-        label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
-
-
-def _draw_gun(axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray) -> None:
-    on = spray.flow > 0.0
-    apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
-    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (apart_s > 1e-3))
-    number = 0
-    for rows in np.split(np.arange(len(spray)), breaks):
-        line = view.flat(spray.position_m[rows])
-        if not on[rows].any():
-            axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
-            continue
-        number += 1
-        axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)
-        room = 0.02 * (high - low).max()
-        shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
-        if len(shown) > 1:
-            _draw_arrows(axes, shown)
-            axes.annotate(
-                str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
-                bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},
-            )  # fmt: skip
-
-
-def _draw_arrows(axes: Axes, line: np.ndarray) -> None:
-    """Arrow heads along a line, in its direction."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = max(1, round(along[-1] / ARROW_EVERY_M))
-    for middle in along[-1] * (np.arange(count) + 0.5) / count:
-        row = max(1, int(np.searchsorted(along, middle)))
-        right, up = line[row] - line[row - 1]
-        turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
-        axes.plot(
-            *line[row], marker=MarkerStyle('^', transform=turn), markersize=9,
-            markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
+    def write(self, lines: list[str], size: float = 9.5, **look: str) -> None:
+        """Lines of text below what the column holds already."""
+        across, up = self.size
+        self.figure.text(
+            self.left / across, self.top / up, '\n'.join(lines), va='top', fontsize=size,
+            linespacing=1.6, **{'color': INK, **look},
         )  # fmt: skip
+        self.top -= LINE_IN * len(lines) * size / 9.5
+
+    def patches(self, entries: list[tuple[str, str]]) -> None:
+        """A coloured patch with a label in each line."""
+        across, up = self.size
+        self.figure.legend(
+            handles=[Patch(color=colour) for colour, _ in entries],
+            labels=[label for _, label in entries], loc='upper left', frameon=False, fontsize=9.5,
+            bbox_to_anchor=((self.left - 0.1) / across, (self.top + 0.08) / up),
+            labelcolor=INK, handlelength=1.2, handleheight=1.0, borderpad=0.2,
+        )  # fmt: skip
+        self.top -= 0.25 * len(entries) + 0.05
 
 
-def _dress(axes: Axes, view: View, low: np.ndarray, high: np.ndarray) -> None:
-    axes.set_aspect('equal')
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(low[1], high[1])
-    axes.set_facecolor('white')
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.tick_params(colors=MUTED, labelsize=9)
-    axes.set_xlabel(view.labels[0], color=MUTED)
-    axes.set_ylabel(view.labels[1], color=MUTED)
-    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
-    if view.right.min() < -SNAP_COSINE:
-        axes.xaxis.set_major_formatter(lambda value, _: f'{-value:g}')
-    if view.up.min() < -SNAP_COSINE:
-        axes.yaxis.set_major_formatter(lambda value, _: f'{-value:g}')
+def _canvas(extent_m: np.ndarray, count: int) -> tuple[Figure, list[_Row]]:
+    """A figure of rows, each with axes as large as the part needs them, the first on top."""
+    width, height = extent_m * min(PART_IN / extent_m)
+    row_in = max(height, LEAST_HEIGHT_IN)
+    pitch = row_in + BOTTOM_IN + 0.3
+    total = TOP_IN + BOTTOM_IN + row_in + (count - 1) * pitch
+    figure = new_figure(LEFT_IN + width + RIGHT_IN, total)
+    figure.set_layout_engine('none')
+    bottoms = [BOTTOM_IN + k * pitch + 0.5 * (row_in - height) for k in reversed(range(count))]
+    rows = [_Row(figure, (LEFT_IN, bottom, width, height)) for bottom in bottoms]
+    for row in rows:
+        row.top += 0.5 * (row_in - height)
+        row.bottom -= 0.5 * (row_in - height)
+    return figure, rows
+
+
+def _draw_band(
+    row: _Row, part: PartPicture, film_um: np.ndarray, spray: SprayPath, s: FilmStatistics
+) -> None:
+    low, high = part.window(spray)
+    part.dress(row.axes, low, high)
+    seen_um = part.spread(film_um)
+    band = np.digitize(seen_um, s.band_um, right=True)
+    band[seen_um <= s.painted_above_um] = 3
+    part.draw_pixels(row.axes, np.array([to_rgb(c) for c in (BELOW, WITHIN, HIGH, BARE)])[band])
+    draw_tool_path(row.axes, spray, part.view, low, high)
+
+
+def _draw_band_legend(row: _Row, surface: Surface, film_um: np.ndarray, s: FilmStatistics) -> None:
+    """Shares, histogram and Cpk."""
+    low, high = s.band_um
+    row.write([f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm'], 11.0)
+    row.write([f'share of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'], 8.0,
+              color=MUTED)  # fmt: skip
+    row.top -= 0.08
+    row.patches(
+        [
+            (HIGH, f'{_share(s.above_target)} high, above {high:g} µm'),
+            (WITHIN, f'{_share(s.within_target)} in the band'),
+            (BELOW, f'{_share(s.below_target)} low, below {low:g} µm'),
+        ]
+        + [(BARE, f'bare, up to {s.painted_above_um:g} µm')] * (s.coverage < 1.0)
+    )
+    row.top -= 0.3
+    text_in = 5 * LINE_IN
+    height = np.clip(row.top - row.bottom - text_in - 0.5, 0.9, 2.2)
+    _draw_histogram(row.axes_below(2.1, height, 0.4), surface, film_um, s)
+    row.top -= 0.6
+    row.write([f'Cpk {s.cpk:.2f}'.replace('-', '−')], 11.0)
+    row.write(fill(CPK_MEANS, 44).split('\n'), 8.0, color=MUTED)
+
+
+def _share(share: float) -> str:
+    return f'{100 * share:.1f} %'
+
+
+def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics) -> None:
+    """Area over film, with the target band behind it."""
+    painted = film_um > s.painted_above_um
+    film, area = film_um[painted], surface.vertex_areas_m2[painted]
+    low, high = s.band_um
+    quiet(axes, 'film [µm]', '', size=8.0)
+    axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
+    axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
+    if len(film):
+        axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
+    for limit in (low, s.target_um, high):
+        axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 
 
 def _draw_legend(
-    figure: Figure, scale: ColourScale, statistics: FilmStatistics, bare: bool
+    row: _Row, part: PartPicture, scale: ColourScale, film_um: np.ndarray, s: FilmStatistics
 ) -> None:
-    width, height = figure.get_size_inches()
-    left = width - RIGHT_IN + LEGEND_GAP_IN
-    lines = _figures(statistics)
-    text_in = 0.24 * len(lines) + (0.35 if bare else 0.0)
-    bar_in = height - BOTTOM_IN - TOP_IN - text_in - 0.25
-    bar = figure.colorbar(
-        ScalarMappable(
-            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
-        ),
-        cax=figure.add_axes(
-            (left / width, 1.0 - (TOP_IN + bar_in) / height, BAR_WIDTH_IN / width, bar_in / height)
-        ),
-    )
-    bar.set_label('film thickness [µm]', color=MUTED)
-    bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.ax.spines['outline'].set_visible(False)
-    top = (BOTTOM_IN + text_in) / height
-    if bare:
-        figure.legend(
-            handles=[Patch(color='#{:02x}{:02x}{:02x}'.format(*BARE_RGB))],
-            labels=[f'below {statistics.painted_above_um:g} µm'],
-            loc='upper left', bbox_to_anchor=((left - 0.1) / width, top), frameon=False,
-            fontsize=9, labelcolor=MUTED, handlelength=1.2, handleheight=1.0, borderpad=0.2,
-        )  # fmt: skip
-        top -= 0.35 / height
-    figure.text(
-        left / width, top, '\n'.join(lines), va='top', fontsize=9.5, color=INK, linespacing=1.6
-    )
-
-
-def _figures(s: FilmStatistics) -> list[str]:
     lines = [
         f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm',
         f'{s.min_um:.1f} to {s.max_um:.1f} µm',
         f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²',
         f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
     ]
-    if s.target_um > 0.0:
-        lines.append(
-            f'{100 * s.within_target:.0f} % within {s.target_um:g} ± {s.target_tolerance_um:g} µm'
+    bare = bool(np.any(film_um <= s.painted_above_um))
+    extent = part.high_m - part.low_m
+    inset = extent * min(INSET_IN / extent)
+    below = LINE_IN * len(lines) + 0.3 * bare + inset[1] + 0.75
+    row.write(['film [µm]'], color=MUTED)
+    bar = row.figure.colorbar(
+        ScalarMappable(
+            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
+        ),
+        cax=row.axes_below(BAR_WIDTH_IN, row.top - row.bottom - below),
+    )
+    bar.ax.tick_params(colors=MUTED, labelsize=9)
+    bar.ax.spines['outline'].set_visible(False)
+    row.top -= 0.2
+    if bare:
+        row.patches(
+            [('#{:02x}{:02x}{:02x}'.format(*BARE_RGB), f'up to {s.painted_above_um:g} µm')]
         )
-    return lines
+    row.write(lines)
+    row.top -= 0.1
+    row.write(['shape'], 8.0, color=MUTED)
+    row.top -= 0.05
+    relief = row.axes_below(*inset)
+    relief.set_axis_off()
+    relief.set(xlim=(part.low_m[0], part.high_m[0]), ylim=(part.low_m[1], part.high_m[1]))
+    part.draw_relief(relief)

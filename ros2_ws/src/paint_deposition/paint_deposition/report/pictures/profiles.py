@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 
 from paint_deposition.comparison.profiles import Profile
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_png
+from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
 TEXT_PT = 8.0
@@ -39,7 +39,7 @@ def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
     figure.legend(
         handles, labels, loc='outside upper left', ncols=len(labels), fontsize=9, frameon=False
     )
-    return save_png(figure, path)
+    return save_picture(figure, path)
 
 
 def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:

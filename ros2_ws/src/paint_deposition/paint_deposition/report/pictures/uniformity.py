@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_png
+from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK, MUTED
 
 PERCENT = 100.0
@@ -21,7 +21,7 @@ def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
     left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
     draw_curve(left, recommendation)
     draw_passes(right, recommendation)
-    return save_png(figure, path)
+    return save_picture(figure, path)
 
 
 def draw_curve(axes: Axes, answer: Recommendation) -> None:

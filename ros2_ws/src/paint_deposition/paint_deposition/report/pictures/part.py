@@ -1,0 +1,166 @@
+"""A part as a flat picture from the gun's side: in colours, with contours, in relief."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import MaxNLocator
+
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.surface import Surface
+from paint_deposition.part.visibility import Occluder
+from paint_deposition.report.pictures.view import SNAP_COSINE, View
+from paint_deposition.report.style import INK, MUTED
+
+# Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
+MARGIN_IN_PARTS = 1.0
+# Pixels along the longer side of the part, and how many of them contours may skip.
+PIXELS, COARSER = 1200, 4
+# Light from above left; how much a lean of the surface brightens or darkens it.
+LIGHT, CONTRAST = (-0.45, 0.75), 0.9
+GREY, DARKEST, BRIGHTEST = 0.78, 0.25, 1.0
+PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
+
+
+@dataclass(frozen=True)
+class PartPicture:
+    """What a picture shows of a part, found by a ray for each of its H x W pixels.
+
+    Attributes:
+        view: the directions of the picture.
+        corners: (H, W, 3) vertices of the triangle in each pixel, the lowest row first.
+        weights: (H, W, 3) of these vertices; NaN where there is no part.
+        normals: (V, 3) of the surface.
+        edges_m: (E, 2, 2) visible creases and free edges in the picture [m].
+        low_m, high_m: (2,) corners of the part in the picture [m].
+    """
+
+    view: View
+    corners: np.ndarray
+    weights: np.ndarray
+    normals: np.ndarray
+    edges_m: np.ndarray
+    low_m: np.ndarray
+    high_m: np.ndarray
+
+    @staticmethod
+    def of(surface: Surface) -> 'PartPicture':
+        """The part from the gun's side, gravity down."""
+        view = View.of_front(surface.outward, surface.down)
+        flat = view.flat(surface.vertices_m)
+        low, high = flat.min(axis=0), flat.max(axis=0)
+        front = surface.faces[face_normals(surface.vertices_m, surface.faces) @ view.toward > 0.0]
+        width, height = np.maximum(PIXELS * (high - low) / (high - low).max(), 1).astype(int)
+        right, up = (
+            start + (np.arange(count) + 0.5) * (end - start) / count
+            for start, end, count in zip(low, high, (width, height), strict=True)
+        )
+        places = np.stack(np.meshgrid(right, up), axis=-1).reshape(-1, 2)
+        nearest = (surface.vertices_m @ view.toward).max() + 1.0
+        eyes = places @ np.stack([view.right, view.up]) + nearest * view.toward
+        hit = Occluder(surface.vertices_m, front).first_faces(
+            eyes, np.broadcast_to(-view.toward, eyes.shape)
+        )
+        corners = front[np.maximum(hit, 0)]
+        weights = _barycentric(places, flat[corners])
+        weights[hit < 0] = np.nan
+        return PartPicture(
+            view,
+            corners.reshape(height, width, 3),
+            weights.reshape(height, width, 3),
+            surface.normals,
+            flat[_borders(front[np.unique(hit[hit >= 0])])],
+            low,
+            high,
+        )
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """(H, W) values of the vertices (V,) in each pixel, NaN where there is no part."""
+        return np.einsum('hwk,hwk->hw', values[self.corners], self.weights)
+
+    def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest corner of a picture of the part with its whole passes [m]."""
+        low, high = self.low_m, self.high_m
+        margin = MARGIN_IN_PARTS * (high - low).max()
+        gun = self.view.flat(spray.position_m[spray.flow > 0.0])
+        if len(gun):
+            low = np.maximum(np.minimum(low, gun.min(axis=0)), low - margin)
+            high = np.minimum(np.maximum(high, gun.max(axis=0)), high + margin)
+        room = 0.03 * (high - low).max()
+        return low - room, high + room
+
+    def draw_pixels(self, axes: Axes, rgb: np.ndarray) -> None:
+        """Colours (H, W, 3), 0 to 1, as they are: no light falls on them."""
+        shown = np.isfinite(self.weights[:, :, :1]).astype(float)
+        (left, bottom), (right, top) = self.low_m, self.high_m
+        axes.imshow(
+            np.concatenate([rgb, shown], axis=2), extent=(left, right, bottom, top),
+            origin='lower', interpolation='nearest',
+        )  # fmt: skip
+        axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
+
+    def draw_relief(self, axes: Axes) -> None:
+        """The bare part in grey, lit from above left."""
+        lean = self.spread(self.normals @ (LIGHT[0] * self.view.right + LIGHT[1] * self.view.up))
+        grey = np.clip(GREY * (1.0 + CONTRAST * np.nan_to_num(lean)), DARKEST, BRIGHTEST)
+        self.draw_pixels(axes, np.repeat(grey[:, :, np.newaxis], 3, axis=2))
+
+    def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
+        """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
+        levels = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
+        levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
+        film = self.spread(film_um)[::COARSER, ::COARSER]
+        if not len(levels) or min(film.shape) < 2:
+            return
+        (left, bottom), (right, top) = self.low_m, self.high_m
+        x, y = (
+            start + (COARSER * np.arange(count) + 0.5) * (end - start) / pixels
+            for start, end, count, pixels in zip(
+                (left, bottom), (right, top), film.shape[::-1], self.weights.shape[1::-1],
+                strict=True,
+            )
+        )  # fmt: skip
+        lines = axes.contour(
+            x, y, np.ma.masked_invalid(film), levels, colors=INK, linewidths=0.6, alpha=0.55
+        )
+        for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
+            # Level, or labels on upright lines would read upward here and downward there.
+            label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
+
+    def dress(self, axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
+        """Axes with the coordinates of the mesh, to these corners [m]."""
+        axes.set_aspect('equal')
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.spines[['top', 'right']].set_visible(False)
+        axes.tick_params(colors=MUTED, labelsize=9)
+        across, upward = self.view.labels
+        axes.set_xlabel(across, color=MUTED)
+        axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
+        # Axes of the mesh that point the other way are labelled with the mesh's own sign.
+        if self.view.right.min() < -SNAP_COSINE:
+            axes.xaxis.set_major_formatter(lambda value, _: f'{-value:g}')
+        if self.view.up.min() < -SNAP_COSINE:
+            axes.yaxis.set_major_formatter(lambda value, _: f'{-value:g}')
+
+
+def _borders(faces: np.ndarray) -> np.ndarray:
+    """(E, 2) edges with one triangle only: creases, where patches share no vertex, and rims."""
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    unique, count = np.unique(edges, axis=0, return_counts=True)
+    return unique[count == 1]
+
+
+def _barycentric(places: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(N, 3) weights of the corners of flat triangles (N, 3, 2) at places (N, 2) in them."""
+    first, second = (triangles[:, k] - triangles[:, 2] for k in (0, 1))
+    off = places - triangles[:, 2]
+    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        a = (off[:, 0] * second[:, 1] - off[:, 1] * second[:, 0]) / area
+        b = (first[:, 0] * off[:, 1] - first[:, 1] * off[:, 0]) / area
+    a, b = np.clip(np.nan_to_num(a), 0.0, 1.0), np.clip(np.nan_to_num(b), 0.0, 1.0)
+    return np.stack([a, b, np.clip(1.0 - a - b, 0.0, 1.0)], axis=1)
