@@ -248,20 +248,20 @@ VISITOR = """<script>
 (async () => {
   const root = document.documentElement, rest = ms => new Promise(done => setTimeout(done, ms));
   while (!('ready' in root.dataset)) await rest(50);
-  const plot = document.getElementById('part');
-  const camera = {eye: {x: 0.3, y: 1.9, z: 0.4}};
-  await Plotly.relayout(plot, {'scene.camera.eye': camera.eye});
+  const panes = ['part-0', 'part-1'].map(id => document.getElementById(id));
+  await Plotly.relayout(panes[0], {'scene.camera.eye': {x: 0.3, y: 1.9, z: 0.4}});
   await rest(200);
-  const eyes = ['scene', 'scene2'].map(key => plot.layout[key].camera.eye.y);
-  root.dataset.eyes = JSON.stringify(eyes);
+  root.dataset.eyes = JSON.stringify(panes.map(plot => plot.layout.scene.camera.eye.y));
   document.getElementById('part-passes').click();
-  const count = document.querySelectorAll('.switch button').length;
+  const buttons = '#part-views button, #part-experiments button';
+  const count = document.querySelectorAll(buttons).length;
   for (let k = 0; k < count; ++k) {
-    document.querySelectorAll('.switch button')[k].click();
+    document.querySelectorAll(buttons)[k].click();
     await rest(200);
   }
   root.dataset.pressed = count;
-  root.dataset.titles = document.getElementById('part-titles').textContent;
+  const titles = document.querySelectorAll('#part figcaption');
+  root.dataset.titles = [...titles].map(title => title.textContent).join(', ');
 })();
 </script>"""
 
@@ -285,7 +285,7 @@ def test_a_browser_draws_every_chart_without_errors(report, tmp_path):
     assert len(charts) >= 7
     assert all('data-drawn' in chart for chart in charts), charts
     assert root['data-pressed'] == '5'
-    assert root['data-titles'] == 'Residual beforeWhat the model gained'
+    assert root['data-titles'] == 'Residual before, What the model gained'
     assert root['data-eyes'] == '[1.9,1.9]'
     assert 'Uncaught' not in done.stderr
     assert 'Content Security Policy' not in done.stderr

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
@@ -25,11 +25,38 @@ Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
+Name = Annotated[str, BeforeValidator(str)]
+# Keys that only tell the reader of the report what it is about.
+HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
+
+
 class _File(BaseModel, extra='forbid'):
     """A campaign as it is written."""
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
     model: Text | None = Field(None, description='the name of a model file')
+    part: Name = Field('', description='a name or number, for the head of the report')
+    batch: Name = Field('', description='a name or number, for the head of the report')
+    paint: Name = Field('', description='the name of the paint, for the head of the report')
+    cell: Name = Field('', description='the name of the cell, for the head of the report')
+    date: Name = Field('', description='when it was painted, for the head of the report')
+    operator: Name = Field('', description='a name, for the head of the report')
+    target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
+    tolerance_um: Number | None = Field(
+        None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
+    )
+
+    @model_validator(mode='after')
+    def _band(self) -> '_File':
+        if (self.target_um is None) != (self.tolerance_um is None):
+            raise ValueError('target_um and tolerance_um belong together; give both or none')
+        return self
+
+    @property
+    def head(self) -> dict[str, str]:
+        """What is said of part and batch, by key."""
+        told = {key: getattr(self, key) for key in HEAD}
+        return {key: text for key, text in told.items() if text}
 
 
 class _Entry(BaseModel, extra='forbid'):
@@ -82,7 +109,9 @@ def read_campaign(
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     start = None if file.model is None else str(path.parent / file.model)
-    return Campaign(tuple(experiments), start, str(path))
+    return Campaign(
+        tuple(experiments), start, str(path), file.head, file.target_um, file.tolerance_um
+    )
 
 
 def _read_experiment(

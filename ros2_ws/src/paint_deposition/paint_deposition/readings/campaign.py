@@ -125,6 +125,8 @@ class Campaign:
         experiments: at least one.
         model_file: the start model's file, or None.
         name: that of its file, '' for none; errors compare within one campaign only.
+        head: what the report says of part and batch, by key.
+        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not told.
 
     Raises:
         ReadingsError: two experiments have one name.
@@ -133,6 +135,9 @@ class Campaign:
     experiments: tuple[Experiment, ...]
     model_file: str | None = None
     name: str = ''
+    head: Mapping[str, str] = field(default_factory=dict)
+    target_um: float | None = None
+    tolerance_um: float | None = None
 
     def __repr__(self) -> str:
         names = ', '.join(experiment.name for experiment in self.experiments)

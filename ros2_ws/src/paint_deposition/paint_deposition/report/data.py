@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -17,24 +18,28 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.study import Study
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import Experiment
+from paint_deposition.readings.residuals import root_mean_square
 from paint_deposition.results.fitted_model import history_as_list
-
-# Share of the surface that stays within the range told; single vertices at rims do not count.
-MOST_OF_THE_SURFACE = 0.98
 
 
 @dataclass(frozen=True)
 class Change:
-    """What one effect does to the readings a gauge would take, over all experiments.
+    """By how much a prediction differs from another at the measured points.
 
     Attributes:
-        least_um, most_um: with the effect minus without it, over most of the surface [um].
-        rms_um: root mean square over the surface [um].
+        least_um, most_um: the most negative and the most positive difference, or 0 [um].
+        rms_um: root mean square [um].
     """
 
     least_um: float
     most_um: float
     rms_um: float
+
+    @staticmethod
+    def of(difference_um: np.ndarray) -> 'Change':
+        """Sum up differences (P,) [um]."""
+        least, most = float(difference_um.min()), float(difference_um.max())
+        return Change(min(least, 0.0), max(most, 0.0), root_mean_square(difference_um))
 
 
 @dataclass(frozen=True)
@@ -99,6 +104,16 @@ class ReportData:
         return self.study.campaign.experiments
 
     @property
+    def target_um(self) -> float | None:
+        """The film wanted [um], if the campaign tells it."""
+        return self.study.campaign.target_um
+
+    @property
+    def tolerance_um(self) -> float | None:
+        """What it may differ [um]."""
+        return self.study.campaign.tolerance_um
+
+    @property
     def improved(self) -> bool:
         """Whether there is a before and an after."""
         return len(self.models) > 1
@@ -136,17 +151,16 @@ class ReportData:
 
     @cached_property
     def changes(self) -> dict[str, Change]:
-        """What each effect of the best model does, by id; the pattern stays as it is."""
-        found = {}
-        for effect in self.model.effects:
-            others = tuple(e for e in self.model.effects if e.id != effect.id)
-            without = self.model.model_copy(update={'effects': others})
-            difference, area = [], []
-            for k, painted in enumerate(self.painted):
-                difference.append(painted[-1].gauge_um - self._paint(k, without).gauge_um)
-                area.append(self.experiments[k].surface.vertex_areas_m2)
-            found[effect.id] = _change(np.concatenate(difference), np.concatenate(area))
-        return found
+        """What each effect that was added changes in the prediction at the points, by id.
+
+        The model with it and the model without it are each fitted to all readings: what the
+        pattern can imitate counts as no change.
+        """
+        steps = self.diagnosis.history if self.diagnosis else ()
+        return {
+            step.added: Change.of(step.fit.predicted_um - before.fit.predicted_um)
+            for before, step in pairwise(steps)
+        }
 
     @cached_property
     def _surfaces(self) -> list[SurfacePoints]:
@@ -164,13 +178,3 @@ class ReportData:
         """Points of the study that belong to an experiment."""
         first, stop = np.searchsorted(self.study.campaign.experiment_of, [index, index + 1])
         return slice(int(first), int(stop))
-
-
-def _change(difference_um: np.ndarray, area_m2: np.ndarray) -> Change:
-    order = np.argsort(difference_um)
-    share = np.cumsum(area_m2[order]) / area_m2.sum()
-    tail = 0.5 * (1.0 - MOST_OF_THE_SURFACE)
-    ends = np.minimum(np.searchsorted(share, [tail, 1.0 - tail]), len(order) - 1)
-    least, most = difference_um[order[ends]].tolist()
-    rms = float(np.sqrt(np.average(difference_um**2, weights=area_m2)))
-    return Change(min(least, 0.0), max(most, 0.0), rms)

@@ -1,5 +1,7 @@
 """Sentences of the headline: what is missing, how sure that is, what it costs and what changes."""
 
+from itertools import pairwise
+
 from paint_deposition.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
@@ -12,6 +14,22 @@ from paint_deposition.report.words import (
     micrometres,
     percent_words,
 )
+
+# What in the cell is worth a look where an effect is more than physics.
+CHECKS = {
+    'air_drift': "Measure the booth's draught at the part.",
+    'corner_slowdown': 'Compare the speed reached at turns with the programmed one.',
+    'flow_drift': 'Check the paint flow over the time of a part.',
+    'gauge_curvature_bias': 'Check the gauge on a curved sample of known film.',
+    'gauge_gain': 'Calibrate the gauge.',
+    'gauge_zero': 'Zero the gauge on bare metal.',
+    'part_misalignment': 'Check where the part hangs.',
+    'pose_lag': 'Check the clocks of robot and recording.',
+    'tcp_offset': 'Check the TCP.',
+    'tcp_standoff': 'Check the TCP along the axis of the bell.',
+    'tcp_tilt': "Check the direction of the bell's axis in the TCP.",
+    'trigger_lag': 'Check the lead times of the trigger.',
+}
 
 
 def explained(rows: list[dict]) -> str:
@@ -46,14 +64,18 @@ def chance(diagnosis: Diagnosis) -> str:
 
 
 def costs(data: ReportData, diagnosis: Diagnosis) -> str:
-    """What each effect that was added does to the readings."""
-    return ' '.join(
-        f'{capital(with_article(name))} changes the reading by '
-        f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} '
-        f'over the part, {micrometres(change.rms_um)} RMS.'
-        for name, change in data.changes.items()
-        if name in diagnosis.accepted
-    )
+    """By how much predictions are wrong without each effect that was added."""
+    found = []
+    for before, step in pairwise(diagnosis.history):
+        change = data.changes[step.added]
+        found.append(
+            f'Without {with_article(step.added)}, once the pattern has adapted as well as it can, '
+            f'the prediction differs by {micrometres(change.rms_um)} RMS at the points, by '
+            f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} at '
+            f'single ones, and the error is {micrometres(before.rmse_um)} instead of '
+            f'{micrometres(step.rmse_um)}.'
+        )
+    return ' '.join(found)
 
 
 def accepted_rows(data: ReportData) -> list[dict]:
@@ -122,7 +144,18 @@ def blind(diagnosis: Diagnosis) -> str:
 
 
 def to_do(data: ReportData) -> str:
+    """The spray that settles most."""
     _, sprays = data.proposals
     if not sprays:
         return 'Take more readings, and repeats at some points.'
     return f'Spray {sprays[0].what}: {apart_words(sprays[0])}.'
+
+
+def to_use(data: ReportData, named: list[dict]) -> str:
+    """What a shop does with a model that has found its effects."""
+    checks = dict.fromkeys(
+        CHECKS.get(one, '') for row in named for one in (row['id'], *row['like'])
+    )
+    plan = 'Simulate and plan with model.yaml of this folder: it holds what was missing.'
+    settle = to_do(data) if data.proposals[1] and any(row['others'] for row in named) else ''
+    return ' '.join(filter(None, [*checks, plan, settle]))

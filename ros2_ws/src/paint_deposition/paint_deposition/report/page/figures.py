@@ -11,16 +11,14 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,
     base_layout,
-    chart_title,
+    chart,
     figure,
-    grid_domains,
     scatter,
     zero_axis,
 )
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import covariate_label, minus, p_words, step_words
 
-COVARIATES_A_ROW = 4
 MOST_COVARIATES = 8
 BINS = 6
 # Conditions that differ by less than this share say nothing of the model.
@@ -41,21 +39,23 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     traces = [
         scatter(ends, ends + spread, 'lines', **bound),
         scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
-                fillcolor='rgba(154,165,177,0.25)', name='95 % gauge and texture'),
+                fillcolor='rgba(154,165,177,0.25)'),
         scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
     ]  # fmt: skip
     for name, values, colour in _before_and_after(data, predicted):
         hover = 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>'
         marker = {'size': 5.5, 'color': colour, 'opacity': 0.9}
-        traces.append(
-            scatter(measured, values, 'markers', name=name, marker=marker, hovertemplate=hover)
-        )
+        traces.append(scatter(measured, values, 'markers', marker=marker, hovertemplate=hover))
     layout = base_layout(
         xaxis=axis('measured [µm]', range=[0, top], constrain='domain'),
         yaxis=axis('predicted [µm]', range=[0, top], scaleanchor='x', constrain='domain'),
     )
-    layout['legend']['traceorder'] = 'normal'
-    return figure('parity', traces, layout, 420)
+    legend = [('95 % gauge and texture', BEFORE, 'band'), *_legend(data)]
+    return figure('parity', [chart('', traces, layout, 400)], legend)
+
+
+def _legend(data: ReportData) -> list[tuple[str, str, str]]:
+    return [(name, colour, 'dot') for name, colour in _before_and_after(data)]
 
 
 def _before_and_after(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
@@ -72,39 +72,33 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     dependences = dependences[:MOST_COVARIATES]
     if not dependences:
         return None
-    rows = -(-len(dependences) // COVARIATES_A_ROW)
-    inner = 220 * rows
-    layout = base_layout(margin={'l': 48, 'r': 12, 't': 56, 'b': 40}, annotations=[])
-    layout['legend'] |= {'y': 1.0 + 30 / inner}
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
     later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
-    traces: list[dict] = []
-    domains = grid_domains(len(dependences), COVARIATES_A_ROW, inner, (36, 74))
-    for k, (dependence, (x, y)) in enumerate(zip(dependences, domains, strict=True), start=1):
+    charts = []
+    for dependence in dependences:
         name = dependence.covariate
         x_mean, residual_means = _means(values[name], data.residuals_um)
+        traces: list[dict] = []
         for label, residual, mean, colour in _before_and_after(
             data, data.residuals_um, residual_means
         ):
-            common = {'xaxis': f'x{k}', 'yaxis': f'y{k}', 'legendgroup': label}
             traces += [
-                scatter(values[name], residual, 'markers', name=label, showlegend=k == 1,
+                scatter(values[name], residual, 'markers',
                         marker={'size': 4, 'color': colour, 'opacity': 0.6},
-                        hovertemplate=f'{AT_VALUE}<extra>{label}</extra>', **common),
+                        hovertemplate=f'{AT_VALUE}<extra>{label}</extra>'),
                 scatter(x_mean, mean, 'lines', line={'color': colour, 'width': 2.5},
-                        hoverinfo='skip', **common),
+                        hoverinfo='skip'),
             ]  # fmt: skip
-        layout[f'xaxis{k}'] = axis(covariate_label(name), domain=x, anchor=f'y{k}', nticks=5)
-        layout[f'yaxis{k}'] = zero_axis(
-            'residual [µm]' if x[0] == 0.0 else '', domain=y, anchor=f'x{k}',
-            range=[-reach, reach],
-        )  # fmt: skip
+        layout = base_layout(
+            xaxis=axis(covariate_label(name), nticks=5),
+            yaxis=zero_axis('residual [µm]', range=[-reach, reach]),
+        )
         text = f'ρ {dependence.correlation:+.2f}'
         if data.improved and name in later:
             text += f' → {later[name]:+.2f}'
         text += f', {p_words(dependence.p_value)}'
-        layout['annotations'].append(chart_title(minus(text), k, 11))
-    return figure('covariates', traces, layout, inner + 96)
+        charts.append(chart(minus(text), traces, layout, 220))
+    return figure('covariates', charts, _legend(data))
 
 
 def _conditions(data: ReportData) -> dict[str, np.ndarray]:
@@ -128,11 +122,11 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     steps = data.diagnosis.history
     names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
     bars = [
-        ('fitted points', [s.rmse_um for s in steps], BEFORE, INK),
+        ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
         ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
     ]
     traces = [
-        {'type': 'bar', 'x': names, 'y': values, 'name': name, 'marker': {'color': colour},
+        {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},
          'texttemplate': '%{y:.2f}', 'textposition': 'inside',
          'insidetextanchor': 'start', 'textangle': 0, 'insidetextfont': {'color': text},
          'hovertemplate': name + ': %{y:.2f} µm<extra></extra>'}
@@ -141,7 +135,7 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     floor = data.diagnosis.noise_floor_um
     top = 1.15 * max(*(max(values) for _, values, _, _ in bars), floor)
     layout = base_layout(
-        margin={'l': 56, 'r': 64, 't': 48, 'b': 48}, barmode='group',
+        margin={'l': 48, 'r': 64, 't': 8, 'b': 48}, barmode='group',
         bargap=0.45, bargroupgap=0.06,
         xaxis=axis('', ticks='', tickangle=0, tickfont={'size': 12, 'color': INK}),
         yaxis=axis('RMSE [µm]', range=[0, top]),
@@ -153,7 +147,8 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
             'font': {'size': 11, 'color': INK}, 'align': 'left',
         }],
     )  # fmt: skip
-    return figure('history', traces, layout, 420)
+    legend = [(name, colour, 'band') for name, _, colour, _ in bars]
+    return figure('history', [chart('', traces, layout, 400)], legend)
 
 
 def unknown_figure(data: ReportData) -> dict[str, Any] | None:
@@ -166,12 +161,12 @@ def unknown_figure(data: ReportData) -> dict[str, Any] | None:
     hover = f'{AT_VALUE}<extra></extra>'
     traces = [
         scatter(_conditions(data)[unknown.covariate], data.residuals_um[-1], 'markers',
-                name='residual of each point', hovertemplate=hover,
-                marker={'size': 5, 'color': BEFORE}),
-        scatter(x, np.asarray(y), 'lines', name='smoothed', hovertemplate=hover,
+                hovertemplate=hover, marker={'size': 5, 'color': BEFORE}),
+        scatter(x, np.asarray(y), 'lines', hovertemplate=hover,
                 line={'color': ACCENT, 'width': 2.5}),
     ]  # fmt: skip
     layout = base_layout(
         xaxis=axis(covariate_label(unknown.covariate)), yaxis=zero_axis('residual [µm]')
     )
-    return figure('unknown', traces, layout, 320)
+    legend = [('residual of each point', BEFORE, 'dot'), ('smoothed', ACCENT, 'bold')]
+    return figure('unknown', [chart('', traces, layout, 320)], legend)

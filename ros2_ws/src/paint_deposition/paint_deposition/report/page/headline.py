@@ -1,6 +1,6 @@
 """The verdict in plain words for the engineer who runs the process."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import f as fisher
@@ -20,9 +20,11 @@ from paint_deposition.report.page.facts import (
     left_out,
     sure,
     to_do,
+    to_use,
     with_article,
     with_confounded,
 )
+from paint_deposition.report.page.film import film_words
 from paint_deposition.report.page.tables import class_rows
 from paint_deposition.report.words import (
     capital,
@@ -59,6 +61,11 @@ class Headline:
 
 def headline(data: ReportData) -> Headline:
     """Verdict and facts."""
+    told = _verdict(data)
+    return replace(told, facts=(('Film against target', film_words(data)), *told.facts))
+
+
+def _verdict(data: ReportData) -> Headline:
     diagnosis = data.diagnosis
     if diagnosis is None:
         return _compared(data)
@@ -80,8 +87,9 @@ def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     named = [row for row in rows if not is_learned(row['id'])]
     facts = (
         ('What is missing', explained(named)),
-        ('How sure', f'{sure(rows)} {chance(diagnosis)}'),
         ('What it costs', costs(data, diagnosis)),
+        ('What to do', to_use(data, named)),
+        ('How sure', f'{sure(rows)} {chance(diagnosis)}'),
         ('What is learned', learned(data, diagnosis, 'What their laws leave over')),
         ('What changes', changes(data, diagnosis)),
         ('What is left out', left_out(data)),
@@ -117,6 +125,7 @@ def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> He
 def _nothing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     facts = (
         ('What is missing', 'Nothing that these readings can show.'),
+        ('What to do', 'Simulate and plan with model.yaml of this folder.'),
         ('How sure', f'{chance(diagnosis)} {blind(diagnosis)}'),
         ('What changes', changes(data, diagnosis)),
         ('What is left out', left_out(data)),

@@ -13,14 +13,13 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,
     base_layout,
-    chart_title,
+    chart,
     figure,
-    grid_domains,
+    scatter,
 )
 from paint_deposition.report.style import ACCENT, INK, MUTED
 from paint_deposition.report.words import capital, covariate_label, effect_name
 
-CHARTS_A_ROW = 2
 CURVE_POINTS = 201
 # Values tried of an amplitude and of a shape when a law of the library is fitted to a curve.
 AMPLITUDES, SHAPES = 41, 5
@@ -33,51 +32,39 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
     laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
     if not laws:
         return None
-    rows = -(-len(laws) // CHARTS_A_ROW)
-    height = 100 + 260 * rows
-    layout = base_layout(margin={'l': 56, 'r': 12, 't': 56, 'b': 44}, annotations=[], shapes=[])
-    layout['legend'] |= {'y': 1.0 + 30 / (height - 100)}
-    traces: list[dict] = []
-    domains = grid_domains(len(laws), CHARTS_A_ROW, height - 100, (60, 84))
     library = data.diagnosis.library if data.diagnosis else {}
-    for k, (law, (x, y)) in enumerate(zip(laws, domains, strict=True), start=1):
-        traces += _traces(law, library, {'xaxis': f'x{k}', 'yaxis': f'y{k}'}, k == 1)
-        layout[f'xaxis{k}'] = axis(covariate_label(law.covariate), domain=x, anchor=f'y{k}')
-        layout[f'yaxis{k}'] = axis(
-            'factor' if law.kind == 'factor' else 'addition [µm]', domain=y, anchor=f'x{k}'
-        )
-        layout['annotations'].append(chart_title(capital(effect_name(law.id)), k))
-        layout['shapes'] += [
-            {'type': 'line', 'xref': f'x{k}', 'yref': f'y{k} domain', 'x0': end, 'x1': end,
-             'y0': 0, 'y1': 1, 'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}
+    charts = []
+    for law in laws:
+        ends = [
+            {'type': 'line', 'yref': 'paper', 'x0': end, 'x1': end, 'y0': 0, 'y1': 1,
+             'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}
             for end in _shown(law, np.array([law.low, law.high]))
         ]  # fmt: skip
-    return figure('learned', traces, layout, height)
+        layout = base_layout(
+            xaxis=axis(covariate_label(law.covariate)),
+            yaxis=axis('factor' if law.kind == 'factor' else 'addition [µm]'),
+            shapes=ends,
+        )
+        title, traces = _traces(law, library)
+        charts.append(chart(title, traces, layout, 300))
+    return figure('learned', charts, [('learned', ACCENT, 'bold')])
 
 
-def _traces(
-    law: LearnedCurve, library: Mapping[str, type[Effect]], where: dict[str, str], first: bool
-) -> list[dict]:
+def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str, list[dict]]:
+    """A title, and the curve with that of the nearest law of the library."""
     values = np.linspace(law.low, law.high, CURVE_POINTS)
     step = (law.high - law.low) / (len(law.learned) - 1)
     around = np.linspace(law.low - step, law.high + step, CURVE_POINTS)
-    common: dict[str, Any] = where | {'type': 'scatter', 'mode': 'lines'}
-    hover = '%{y:.3g} at %{x:.3g}<extra></extra>'
-    traces = [
-        common | {
-            'x': _shown(law, around), 'y': _of_law(law, around), 'name': 'learned',
-            'legendgroup': 'learned', 'showlegend': first, 'hovertemplate': hover,
-            'line': {'color': ACCENT, 'width': 2.5},
-        }
-    ]  # fmt: skip
+    hover = {'hovertemplate': '%{y:.3g} at %{x:.3g}<extra></extra>'}
+    title, bold = capital(effect_name(law.id)), {'color': ACCENT, 'width': 2.5}
+    traces = [scatter(_shown(law, around), _of_law(law, around), 'lines', line=bold, **hover)]
     near = nearest_law(law, library, values)
     if near is not None:
         effect, curve = near
-        traces.append(common | {
-            'x': _shown(law, values), 'y': curve, 'name': f'law of {effect_name(effect.id)}',
-            'hovertemplate': hover, 'line': {'color': INK, 'width': 1.5, 'dash': 'dash'},
-        })  # fmt: skip
-    return traces
+        dashed = {'color': INK, 'width': 1.5, 'dash': 'dash'}
+        traces.append(scatter(_shown(law, values), curve, 'lines', line=dashed, **hover))
+        title += f'; dashed: law of {effect_name(effect.id)}'
+    return title, traces
 
 
 def _shown(law: LearnedCurve, values: np.ndarray) -> np.ndarray:

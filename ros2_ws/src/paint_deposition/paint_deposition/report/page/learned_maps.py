@@ -1,7 +1,7 @@
 """Heat maps of learned laws that are no curves: maps over a part, and footprints."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,16 +15,14 @@ from paint_deposition.report.page.layout import (
     RESIDUAL_COLOURS,
     axis,
     base_layout,
-    chart_title,
+    chart,
     figure,
-    grid_domains,
     scatter,
 )
 from paint_deposition.report.style import INK, MUTED
 from paint_deposition.report.words import joined
 
-HEIGHT_PX, GAP_PX = 400, 120
-MARGIN_PX = {'l': 56, 'r': 72, 't': 32, 'b': 48}
+HEIGHT_PX = 340
 # Cells of a footprint from one side to the other, and how far out the pattern matters: where it
 # is above this share of its peak.
 CELLS, FAINT = 81, 0.02
@@ -40,6 +38,7 @@ class _Panel:
         title, across, up: of the chart and its axes.
         x, y: (X,) and (Y,) places. values: (Y, X) there.
         scale: colours. low, high: their range.
+        above: further traces over it.
     """
 
     title: str
@@ -51,6 +50,7 @@ class _Panel:
     scale: list[list[Any]]
     low: float
     high: float
+    above: Sequence[dict] = ()
 
 
 def map_figure(data: ReportData) -> dict[str, Any] | None:
@@ -58,8 +58,8 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     law = data.model.effect(LearnedMap.id)
     if not isinstance(law, LearnedMap):
         return None
-    panels, marks = [], []
-    for k, (grid, values) in enumerate(law.on_parts(), start=1):
+    panels = []
+    for grid, values in law.on_parts():
         parts = [e for e in data.experiments if grid.is_of(e.measured_points)]
         neutral = 0.0
         if law.kind == 'factor':
@@ -68,17 +68,15 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
         y = np.linspace(grid.low_m[1], grid.high_m[1], grid.rows)
         title = 'factor' if law.kind == 'factor' else 'addition [µm]'
         title += ' on ' + (joined([e.name for e in parts]) or 'a part that was not measured here')
-        panels.append(
-            _about(neutral, values, title, 'right of the centre [m]', 'above it [m]', x, y)
-        )
-        for part in parts:
-            place = places_m(part.measured_points)
-            dots = {'size': 3, 'color': INK}
-            marks.append(
-                scatter(place[:, 0], place[:, 1], 'markers', marker=dots, hoverinfo='skip')
-                | _axes(k)
-            )
-    return _figure('maps', panels, marks)
+        places = [places_m(part.measured_points) for part in parts]
+        dots = [
+            scatter(place[:, 0], place[:, 1], 'markers', marker={'size': 3, 'color': INK},
+                    hoverinfo='skip')
+            for place in places
+        ]  # fmt: skip
+        panel = _about(neutral, values, title, 'right of the centre [m]', 'above it [m]', x, y)
+        panels.append(replace(panel, above=dots))
+    return _figure('maps', panels)
 
 
 def footprint_figure(data: ReportData) -> dict[str, Any] | None:
@@ -100,9 +98,8 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
         )
     ]
     title = 'factor, with contours of eq. (1)'
-    panels.append(_about(1.0, factor, title, 'tool x [m]', 'tool y [m]', along, along))
     contours = [
-        _axes(3) | {
+        {
             'type': 'contour', 'x': along, 'y': along, 'z': plain, 'showscale': False,
             'autocontour': False, 'hoverinfo': 'skip', 'line': {'color': MUTED, 'width': 1},
             'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain.max()},
@@ -110,7 +107,8 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
         }
         for share in CONTOURS
     ]  # fmt: skip
-    return _figure('footprint', panels, contours)
+    panel = _about(1.0, factor, title, 'tool x [m]', 'tool y [m]', along, along)
+    return _figure('footprint', [*panels, replace(panel, above=contours)])
 
 
 def _about(neutral: float, values: np.ndarray, *where: Any) -> _Panel:
@@ -122,35 +120,21 @@ def _about(neutral: float, values: np.ndarray, *where: Any) -> _Panel:
     )
 
 
-def _axes(number: int) -> dict[str, str]:
-    return {'xaxis': f'x{number}', 'yaxis': f'y{number}'}
-
-
-def _figure(name: str, panels: Sequence[_Panel], above: Sequence[dict]) -> dict[str, Any] | None:
-    """Panels in rows of three, with further traces above them; None without any."""
-    if not panels:
-        return None
-    rows = -(-len(panels) // 3)
-    height = rows * HEIGHT_PX
-    layout, traces = base_layout(margin=MARGIN_PX, annotations=[]), []
-    plot_px = height - MARGIN_PX['t'] - MARGIN_PX['b']
-    domains = grid_domains(max(len(panels), 2), 3, plot_px, (GAP_PX, 90))
-    for k, (panel, (x, y)) in enumerate(zip(panels, domains, strict=False), start=1):
-        layout[f'xaxis{k}'] = axis(
-            panel.across, domain=x, anchor=f'y{k}', showgrid=False, nticks=6,
-            constrain='domain', range=[panel.x[0], panel.x[-1]],
-        )  # fmt: skip
-        layout[f'yaxis{k}'] = axis(
-            panel.up, domain=y, anchor=f'x{k}', showgrid=False, nticks=6, constrain='domain',
-            range=[panel.y[0], panel.y[-1]], scaleanchor='x' if k == 1 else f'x{k}',
-        )  # fmt: skip
-        layout['annotations'].append(chart_title(panel.title, k))
-        traces.append(_axes(k) | {
+def _figure(name: str, panels: Sequence[_Panel]) -> dict[str, Any] | None:
+    """The panels as heat maps; None without any."""
+    charts = []
+    for panel in panels:
+        shared = {'showgrid': False, 'nticks': 6, 'constrain': 'domain'}
+        layout = base_layout(
+            xaxis=axis(panel.across, range=[panel.x[0], panel.x[-1]], **shared),
+            yaxis=axis(panel.up, range=[panel.y[0], panel.y[-1]], scaleanchor='x', **shared),
+        )
+        heat = {
             'type': 'heatmap', 'x': panel.x, 'y': panel.y, 'z': panel.values,
             'zmin': panel.low, 'zmax': panel.high, 'colorscale': panel.scale, 'zsmooth': 'best',
             'hovertemplate': '%{z:.3g} at %{x:.2f}, %{y:.2f} m<extra></extra>',
-            'colorbar': {'x': x[1] + 0.005, 'xanchor': 'left', 'thickness': 10, 'y': sum(y) / 2,
-                         'len': y[1] - y[0], 'outlinewidth': 0,
+            'colorbar': {'thickness': 10, 'outlinewidth': 0,
                          'tickfont': {'size': 11, 'color': MUTED}},
-        })  # fmt: skip
-    return figure(name, [*traces, *above], layout, height)
+        }  # fmt: skip
+        charts.append(chart(panel.title, [heat, *panel.above], layout, HEIGHT_PX))
+    return figure(name, charts) if charts else None

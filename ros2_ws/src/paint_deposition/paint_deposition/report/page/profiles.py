@@ -9,15 +9,14 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,
     base_layout,
-    chart_title,
+    chart,
     figure,
-    grid_domains,
     scatter,
     zero_axis,
 )
-from paint_deposition.report.style import ACCENT, BEFORE, INK, TWO_SIDED_95, charts_a_row
+from paint_deposition.report.style import ACCENT, BEFORE, INK, TWO_SIDED_95
 
-ROW_PX, TOP_PX, BOTTOM_PX = 300, 56, 40
+CHART_PX = 300
 # Share of a chart's height that the residual takes, and above which the film begins.
 RESIDUAL_SHARE, FILM_FROM = 0.26, 0.31
 
@@ -26,40 +25,29 @@ def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
     """Film along each column or row of one experiment: measured, before and after."""
     experiment = data.experiments[index].name
     profiles = [p for p in data.profiles if p.experiment == experiment]
-    columns = charts_a_row(len(profiles))
-    inner = ROW_PX * -(-len(profiles) // columns) - 60
-    layout = base_layout(margin={'l': 48, 'r': 12, 't': TOP_PX, 'b': BOTTOM_PX}, annotations=[])
-    layout['legend'] |= {'y': 1.0 + 24 / inner, 'traceorder': 'normal'}
     film_range, residual_range = _ranges(data, profiles)
-    traces: list[dict] = []
-    domains = grid_domains(len(profiles), columns, inner, (46, 66))
-    for k, (profile, (x, y)) in enumerate(zip(profiles, domains, strict=True)):
-        # The film's axes have odd numbers; the residual shares its position with the film.
-        film, residual = 2 * k + 1, 2 * k + 2
-        cut, floor = (y[0] + share * (y[1] - y[0]) for share in (RESIDUAL_SHARE, FILM_FROM))
-        traces += [
-            trace | {'xaxis': f'x{film}', 'yaxis': f'y{film}'}
-            for trace in _film_traces(data, profile, k == 0)
-        ]
-        traces += [
-            trace | {'xaxis': f'x{film}', 'yaxis': f'y{residual}'}
-            for trace in _residual_traces(data, profile)
-        ]
-        first = x[0] == 0.0
-        layout[f'xaxis{film}'] = axis(
-            f'{profile.axis} [mm]', domain=x, anchor=f'y{residual}', nticks=7
+    charts = []
+    for profile in profiles:
+        layout = base_layout(
+            xaxis=axis(f'{profile.axis} [mm]', anchor='y2', nticks=7),
+            yaxis=axis('film [µm]', domain=[FILM_FROM, 1.0], range=film_range, nticks=6),
+            yaxis2=zero_axis(
+                'residual', domain=[0.0, RESIDUAL_SHARE], range=residual_range, nticks=4
+            ),
         )
-        layout[f'yaxis{film}'] = axis(
-            'film [µm]' if first else '', domain=[floor, y[1]], anchor=f'x{film}',
-            range=film_range, nticks=6,
-        )  # fmt: skip
-        layout[f'yaxis{residual}'] = zero_axis(
-            'residual' if first else '', domain=[y[0], cut], anchor=f'x{film}',
-            range=residual_range, nticks=4,
-        )  # fmt: skip
-        text = f'<b>{_escaped(profile.label)}</b>  {data.errors_in_words(profile.rows)}'
-        layout['annotations'].append(chart_title(text, film))
-    return figure(f'profiles-{index}', traces, layout, inner + TOP_PX + BOTTOM_PX)
+        residuals = [trace | {'yaxis': 'y2'} for trace in _residual_traces(data, profile)]
+        title = f'{profile.label}: {data.errors_in_words(profile.rows)}'
+        charts.append(chart(title, _film_traces(data, profile) + residuals, layout, CHART_PX))
+    return figure(f'profiles-{index}', charts, _legend(data))
+
+
+def _legend(data: ReportData) -> list[tuple[str, str, str]]:
+    lined = any(len(profile.line_m) for profile in data.profiles)
+    before, after = ('line', 'bold') if lined else ('ring', 'dot')
+    models = [(data.model_names[0], INK, before)] if data.improved else []
+    entries = [('measured, bars: 95 % gauge and texture', INK, 'dot'), *models,
+               (data.model_names[-1], ACCENT, after)]  # fmt: skip
+    return entries + [('each pass alone', BEFORE, 'dots')] * lined
 
 
 def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], list[float]]:
@@ -72,12 +60,10 @@ def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], lis
     return [0.0, 1.03 * max(*lines, *measured, 1.0) + noise], [-reach, reach]
 
 
-def _film_traces(data: ReportData, p: Profile, first: bool) -> list[dict]:
+def _film_traces(data: ReportData, p: Profile) -> list[dict]:
     line_mm, at_mm, measured = 1e3 * p.line_m, 1e3 * p.position_m, data.study.measured_um[p.rows]
     traces = [
-        scatter(line_mm, single, 'lines', name='each pass alone', legendgroup='pass',
-                showlegend=first and number == 1, legendrank=9,
-                line={'color': BEFORE, 'width': 1, 'dash': 'dot'},
+        scatter(line_mm, single, 'lines', line={'color': BEFORE, 'width': 1, 'dash': 'dot'},
                 hovertemplate=f'pass {number}: %{{y:.1f}} µm<extra></extra>')
         for number, single in enumerate(p.passes_um, start=1)
     ]  # fmt: skip
@@ -92,14 +78,10 @@ def _film_traces(data: ReportData, p: Profile, first: bool) -> list[dict]:
                 'size': 7, 'symbol': 'circle-open', 'color': INK}  # fmt: skip
             predicted = measured - data.residuals_um[k][p.rows]
             trace = scatter(at_mm, predicted, 'markers', marker=marker)
-        traces.append(trace | {
-            'name': name, 'legendgroup': name, 'showlegend': first, 'legendrank': 2 + k,
-            'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>',
-        })  # fmt: skip
+        traces.append(trace | {'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>'})
     traces.append(
-        scatter(at_mm, measured, 'markers', name='measured, bars: 95 % gauge and texture',
-                legendgroup='measured', showlegend=first, legendrank=1,
-                marker={'size': 5, 'color': INK}, error_y=_bars(data, p, INK),
+        scatter(at_mm, measured, 'markers', marker={'size': 5, 'color': INK},
+                error_y=_bars(data, p, INK),
                 hovertemplate='measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>')
     )  # fmt: skip
     return traces
@@ -124,7 +106,3 @@ def _bars(data: ReportData, p: Profile, colour: str) -> dict[str, Any]:
         'type': 'data', 'array': TWO_SIDED_95 * data.study.sigma_um[p.rows],
         'color': colour, 'thickness': 1, 'width': 0,
     }  # fmt: skip
-
-
-def _escaped(text: str) -> str:
-    return text.replace('&', '&amp;').replace('<', '&lt;').replace(' -', ' −')

@@ -17,13 +17,15 @@ from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
 from paint_deposition.report.page import tables
+from paint_deposition.report.page.film import film_rows, point_rows, points_csv, share_words
 from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.learned import learned_figure
 from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
 from paint_deposition.report.page.profiles import profile_figure
-from paint_deposition.report.page.scene import places_scene, scene_data
+from paint_deposition.report.page.scene import places_scene, scene_data, section_layout
 
 TEMPLATES = Path(__file__).parent / 'templates'
+SCRIPTS = ('report.js', 'part.js')
 SPRAYS_SHOWN = 5
 
 
@@ -53,6 +55,7 @@ def report_html(data: ReportData) -> str:
         'capital': words.capital,
         'film': lambda value: '' if np.isnan(value) else words.minus(f'{value:.1f}'),
         'step': words.step_words,
+        'share': share_words,
     }
     environment.filters.update(filters)
     numbers = range(len(data.experiments))
@@ -72,12 +75,19 @@ def report_html(data: ReportData) -> str:
         'first': _most_telling(data),
         'places': [places_scene(data, k) for k in numbers],
         'figures': figures,
+        'section': section_layout(),
     }
+    points = point_rows(data)
     places, sprays = data.proposals
     return environment.get_template('report.html.j2').render(
         data=data,
         headline=headline(data),
         key_figures=key_figures(data),
+        head=list(data.study.campaign.head.items()),
+        film=film_rows(data),
+        points=points,
+        points_csv=points_csv(points).replace('<', ' '),
+        painted=tables.painted_lines(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
@@ -97,7 +107,7 @@ def report_html(data: ReportData) -> str:
         figures=[figure['name'] for figure in figures],
         content=_as_json(content),
         style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
-        script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
+        scripts=[(TEMPLATES / name).read_text(encoding='utf-8') for name in SCRIPTS],
         plotly=get_plotlyjs(),
     )
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.comparison.profiles import Profile
 from paint_deposition.comparison.residual_field import spread_over_surface
 from paint_deposition.film.colour_scales import round_up
 from paint_deposition.motion.path import SprayPath
@@ -14,13 +15,15 @@ from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, base_layout
+from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, axis, base_layout
+from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import INK, MUTED
 
 SURFACE = '#c3c9cf'
 # Few readings beyond the end of the colours do not take the contrast from all others.
 SHOWN_SHARE = 0.98
 POINTS_A_PASS = 60
+WAY_POINTS = 400
 RESIDUAL, FILM = 'measured minus predicted [µm]', 'film [µm]'
 # Marks float this far above the surface, so that it does not swallow half of them [m].
 LIFT_M = 0.008
@@ -29,7 +32,7 @@ SHADED = {'ambient': 0.9, 'diffuse': 0.35, 'specular': 0.0, 'roughness': 1.0, 'f
 TRUE_COLOURS = SHADED | {'ambient': 1.0, 'diffuse': 0.2}
 # Plotly's camera sees 45 deg from bottom to top.
 TAN_HALF_VIEW, ROOM_AROUND = float(np.tan(np.pi / 8.0)), 1.06
-PANE_ASPECT = 1.36
+PANE_ASPECT = 1.0
 # A part whose outward side leans less toward the vertical than this is looked at upright.
 STANDING = 0.98
 
@@ -45,7 +48,7 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
     fields = [spread_over_surface(surface, positions, normals, r[rows]) for r in data.residuals_um]
     near = np.isfinite(fields[0])[surface.faces].all(axis=1)
     traces = []
-    for k, scene in enumerate(('scene', 'scene2')[: len(data.models)]):
+    for k in range(len(data.models)):
         # What the model gained is set beside the residual before.
         views = ['residual', 'change'] if data.improved and k == 0 else ['residual']
         panes = [
@@ -58,7 +61,7 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
         if k:
             gained = painted[k].gauge_um - painted[0].gauge_um
             panes.append(_mesh('all', ['change'], intensity=gained, coloraxis='coloraxis'))
-        traces += [trace | {'scene': scene} for trace in panes]
+        traces.append(panes)
     times = (' before', ' after') if data.improved else ('',)
     views_shown = [
         ('residual', 'Residual', RESIDUAL, [f'Residual{when}' for when in times]),
@@ -69,12 +72,66 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
     return {
         'name': experiment.name,
         'geometry': _geometry(surface, near),
-        'data': traces,
+        'panes': traces,
+        'plane': _plane(surface),
+        'readings': {
+            **_xyz(positions),
+            'measured': data.study.measured_um[rows],
+            'lines': [
+                {'label': p.label, **_line_of(data, p, index)}
+                for p in data.profiles
+                if p.experiment == experiment.name and len(p.rows) > 1
+            ],
+        },
+        'way': _way(experiment.path),
+        'reach_m': data.model.projection.model_plane_m - data.model.projection.emission_offset_m,
         'layout': _layout(data, experiment),
         'views': [
             dict(zip(('key', 'label', 'bar', 'titles'), view, strict=True))
             for view in views_shown[: 3 if data.improved else 2]
         ],
+    }
+
+
+def _plane(surface: Surface) -> dict[str, Any]:
+    """Axes of the part as the gun sees it, in which the page lays its sections."""
+    view = View.of_front(surface.outward, surface.down)
+    return {
+        'right': view.right, 'up': view.up, 'toward': surface.outward,
+        'centre': surface.centre_m, 'labels': view.labels,
+    }  # fmt: skip
+
+
+def section_layout() -> dict[str, Any]:
+    """Of the film along a line over the part; the page's script fills it."""
+    return base_layout(
+        height=260, xaxis=axis('along the line, from the centre [mm]', nticks=9),
+        yaxis=axis(FILM, rangemode='tozero'),
+    )  # fmt: skip
+
+
+def _line_of(data: ReportData, profile: Profile, index: int) -> dict[str, float]:
+    """The straight line through a column or row: its angle [deg] and its offset [m]."""
+    plane = _plane(data.experiments[index].surface)
+    off = data.study.campaign.positions_m[profile.rows] - plane['centre']
+    flat = np.column_stack([off @ plane['right'], off @ plane['up']])
+    along = np.linalg.svd(flat - flat.mean(axis=0))[2][0]
+    angle = np.degrees(np.arctan2(along[1], along[0])) % 180.0
+    across = np.array([-np.sin(np.radians(angle)), np.cos(np.radians(angle))])
+    return {'angle': round(float(angle), 1), 'offset': float(flat.mean(axis=0) @ across)}
+
+
+def _way(path: SprayPath) -> dict[str, Any]:
+    """The motion in few samples: time, TCP, axis of the bell, pass, speed, gun on or off."""
+    chosen = np.unique(np.linspace(0, len(path) - 1, min(WAY_POINTS, len(path))).astype(int))
+    bell = path.rotation[chosen][:, :, 2]
+    return {
+        'time_s': (path.stamp_ns[chosen] - path.stamp_ns[0]) * 1e-9,
+        **_xyz(path.position_m[chosen]),
+        **{f'a{name}': values for name, values in _xyz(bell).items()},
+        'pass': path.spray_pass[chosen] + 1,
+        'speed': path.speed_m_per_s[chosen],
+        'on': (path.flow[chosen] > 0.0).astype(int),
     }
 
 
@@ -96,16 +153,16 @@ def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
                marker={'size': 3, 'color': INK}),
         _marks(wanted + 2.0 * LIFT_M * experiment.surface.outward, mode='markers+text',
                name='to measure', text=[f'<b>{number}</b>' for number, _ in numbered],
-               textposition='top center', textfont={'size': 14, 'color': INK},
+               textposition='top center', textfont={'size': 14, 'color': MUTED},
                marker={'size': 7, 'symbol': 'diamond', 'color': 'white',
                        'line': {'color': INK, 'width': 2}},
                customdata=np.round(wanted, 4),
                hovertemplate='%{customdata[0]:.3f}, %{customdata[1]:.3f}, %{customdata[2]:.3f} m'
                              '<extra>measure</extra>'),
     ]  # fmt: skip
-    scene = _scene(experiment, [0.0, 1.0], experiment.surface.vertices_m, PANE_ASPECT)
+    scene = _scene(experiment, experiment.surface.vertices_m)
     colours = _colours(FILM, FILM_COLOURS, 0.0, round_up(float(film_um.max())))
-    return {'data': traces, 'layout': _scene_layout(460, 0, 60, scene=scene, coloraxis=colours)}
+    return {'data': traces, 'layout': _scene_layout(420, scene=scene, coloraxis=colours)}
 
 
 def _places_of(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
@@ -164,7 +221,7 @@ def _passes(path: SprayPath) -> list[dict[str, Any]]:
         _marks(np.concatenate(line), mode='lines', line={'color': MUTED, 'width': 2.5},
                hoverinfo='skip', **shown),
         _marks(np.array(list(starts.values())), mode='markers+text', text=list(starts),
-               textposition='middle left', textfont={'size': 12, 'color': INK},
+               textposition='middle left', textfont={'size': 12, 'color': MUTED},
                marker={'size': 3, 'color': INK},
                hovertemplate='pass %{text} begins<extra></extra>', **shown),
     ]  # fmt: skip
@@ -177,41 +234,33 @@ def _layout(data: ReportData, experiment: Experiment) -> dict[str, Any]:
     thickest = round_up(max(float(film.max()) for film in films))
     spraying = experiment.path.position_m[experiment.path.flow > 0.0]
     shown = np.concatenate([experiment.surface.vertices_m, spraying])
-    domains = [[0.0, 0.497], [0.503, 1.0]] if data.improved else [[0.0, 1.0]]
-    aspect = PANE_ASPECT * 2.0 / len(domains)
-    scenes = [_scene(experiment, domain, shown, aspect) for domain in domains]
     return _scene_layout(
-        520, 30, 70,
+        420,
+        scene=_scene(experiment, shown),
         coloraxis=_colours(RESIDUAL, RESIDUAL_COLOURS, -reach, reach),
         coloraxis2=_colours(FILM, FILM_COLOURS, 0.0, thickest),
-        **dict(zip(('scene', 'scene2'), scenes, strict=False)),
-    )  # fmt: skip
+    )
 
 
-def _scene_layout(height: int, top: int, bottom: int, **more: Any) -> dict[str, Any]:
-    margin = {'l': 0, 'r': 0, 't': top, 'b': bottom}
-    return base_layout(margin=margin, height=height, showlegend=False, **more)
+def _scene_layout(height: int, **more: Any) -> dict[str, Any]:
+    return base_layout(margin={'l': 0, 'r': 0, 't': 0, 'b': 64}, height=height, **more)
 
 
 def _colours(title: str, scale: list[list[Any]], low: float, high: float) -> dict[str, Any]:
     bar = {
-        'orientation': 'h', 'thickness': 12, 'len': 0.5, 'x': 0.5, 'xanchor': 'center',
+        'orientation': 'h', 'thickness': 12, 'len': 0.8, 'x': 0.5, 'xanchor': 'center',
         'y': 0.0, 'yanchor': 'top', 'outlinewidth': 0, 'tickfont': {'size': 11, 'color': MUTED},
         'title': {'text': title, 'side': 'bottom'},
     }  # fmt: skip
     return {'cmin': low, 'cmax': high, 'colorscale': scale, 'colorbar': bar}
 
 
-def _scene(
-    experiment: Experiment, domain: list[float], shown_m: np.ndarray, aspect: float
-) -> dict[str, Any]:
+def _scene(experiment: Experiment, shown_m: np.ndarray) -> dict[str, Any]:
     """Seen from the gun's side, a little from above and aside, filling its pane.
 
     Args:
         experiment: whose part is shown.
-        domain: of the pane, from left to right.
         shown_m: (N, 3) everything that is to be in sight [m].
-        aspect: width of the pane over its height.
     """
     surface = experiment.surface
     outward, down = surface.outward, surface.down
@@ -225,7 +274,7 @@ def _scene(
     largest = extent.max()
     right = np.cross(up, gaze) / np.linalg.norm(np.cross(up, gaze))
     centred = (shown_m - 0.5 * (low + high)) / largest
-    wide = np.abs(centred @ right).max() / aspect
+    wide = np.abs(centred @ right).max() / PANE_ASPECT
     tall = np.abs(centred @ np.cross(gaze, right)).max()
     distance = ROOM_AROUND * max(wide, tall) / TAN_HALF_VIEW + np.abs(centred @ gaze).max()
     axes = {
@@ -233,7 +282,6 @@ def _scene(
         for k, name in enumerate('xyz')
     }
     return axes | {
-        'domain': {'x': domain, 'y': [0.0, 1.0]},
         'aspectratio': _named(extent / largest),
         'dragmode': 'turntable' if abs(up[2]) > 0.9 else 'orbit',
         'camera': {'eye': _named(distance * gaze), 'up': _named(up)},

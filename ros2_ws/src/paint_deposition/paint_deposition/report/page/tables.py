@@ -26,6 +26,19 @@ from paint_deposition.report.words import (
 NEGLIGIBLE = 1e-4
 
 
+def painted_lines(data: ReportData) -> list[str]:
+    """How each part was painted, a line each."""
+    lines = []
+    for experiment in data.experiments:
+        spraying = experiment.path.select(experiment.path.flow > 0.0)
+        passes = len(np.unique(spraying.spray_pass[spraying.spray_pass >= 0]))
+        lines.append(
+            f'{experiment.name}: {passes} passes, {np.median(spraying.speed_m_per_s):.2f} m/s, '
+            f'gun on for {experiment.path.spraying_time_s:.1f} s.'
+        )
+    return lines
+
+
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
     """Candidate causes with the effects they are confounded with, and parameters."""
     if data.diagnosis is None:
@@ -38,6 +51,7 @@ def class_rows(data: ReportData) -> list[dict[str, Any]]:
                 'id': found.best,
                 'found': found,
                 'name': effect_name(found.best),
+                'like': [m for m in found.members if m != found.best],
                 'others': [effect_name(m) for m in found.members if m != found.best],
                 'accepted': found.best in data.diagnosis.accepted,
                 'meaning': effect_meaning(effect),
@@ -131,7 +145,8 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
         for name in effect.parameters():
             values = astuple(found[name]) if name in found else [getattr(effect, name)]
             parameters.append(_parameter(type(effect), name, *values))
-        rows.append({'id': effect.id, 'change': data.changes[effect.id], 'parameters': parameters})
+        change = data.changes.get(effect.id)
+        rows.append({'id': effect.id, 'change': change, 'parameters': parameters})
     return rows
 
 

@@ -120,12 +120,12 @@ class _Row:
         self.top -= height_in
         return self._axes(self.left + indent_in, self.top, width_in, height_in)
 
-    def write(self, lines: list[str], size: float = 9.5, **look: str) -> None:
+    def write(self, lines: list[str], size: float = 9.5, colour: str = INK) -> None:
         """Lines of text below what the column holds already."""
         across, up = self.size
         self.figure.text(
             self.left / across, self.top / up, '\n'.join(lines), va='top', fontsize=size,
-            linespacing=1.6, **{'color': INK, **look},
+            linespacing=1.6, color=colour,
         )  # fmt: skip
         self.top -= LINE_IN * len(lines) * size / 9.5
 
@@ -190,7 +190,7 @@ def _draw_band_legend(row: _Row, surface: Surface, film_um: np.ndarray, s: FilmS
     _draw_histogram(row.axes_below(2.1, height, 0.4), surface, film_um, s)
     row.top -= 0.6
     row.write([f'Cpk {s.cpk:.2f}'.replace('-', '−')], 11.0)
-    row.write(fill(CPK_MEANS, 44).split('\n'), 8.0, color=MUTED)
+    row.write(fill(CPK_MEANS, 44).split('\n'), 8.0, MUTED)
 
 
 def _share(share: float) -> str:
@@ -240,7 +240,7 @@ def _draw_legend(
         )
     row.write(lines)
     row.top -= 0.1
-    row.write(['shape'], 8.0, color=MUTED)
+    row.write(['shape'], 8.0, MUTED)
     row.top -= 0.05
     relief = row.axes_below(*inset)
     relief.set_axis_off()

@@ -1,5 +1,6 @@
 'use strict';
-(() => {
+// What the page shows: charts in groups, the part in panes, tables that sort, tables to download.
+const page = (() => {
   const root = document.documentElement;
   const errors = [];
   const failed = (what, error) => {
@@ -18,122 +19,85 @@
   const flat = {...options, displayModeBar: 'hover'};
   let drawn = 0;
 
+  const make = (kind, parent, className = '', text = '') => {
+    const element = document.createElement(kind);
+    element.className = className;
+    element.textContent = text;
+    return parent.appendChild(element);
+  };
+  const rest = () => new Promise(done => setTimeout(done, 0));
+
+  // Paper is narrower than the screen: drawings scale with their place instead of being cut.
+  const scalable = element => {
+    for (const svg of element.querySelectorAll('svg.main-svg')) {
+      svg.setAttribute('viewBox', `0 0 ${svg.getAttribute('width')} ${svg.getAttribute('height')}`);
+    }
+    const box = element.querySelector('.svg-container');
+    if (box) box.style.aspectRatio = `${element.clientWidth} / ${element.clientHeight}`;
+  };
+
   const draw = (element, data, layout, config) => Plotly.newPlot(element, data, layout, config)
-    .then(() => { root.dataset.drawn = ++drawn; element.dataset.drawn = ''; })
+    .then(() => {
+      root.dataset.drawn = ++drawn;
+      element.dataset.drawn = '';
+      scalable(element);
+      element.on('plotly_afterplot', () => scalable(element));
+    })
     .catch(error => {
       failed(element.id, error);
       element.innerHTML = '<p class="failed">This chart could not be drawn.</p>';
     });
 
-  // The mesh is kept once for each part; traces only name its faces.
-  const withGeometry = (trace, geometry) => {
-    const {geometry: faces, views, passes, ...rest} = trace;
-    return faces ? {...rest, ...geometry.vertices, ...geometry[faces]} : {...rest};
-  };
-
-  const flush = () => new Promise(done => setTimeout(done, 0));
-
-  function partViewer() {
-    const plot = document.getElementById('part');
-    const titles = document.getElementById('part-titles');
-    const viewSwitch = document.getElementById('part-views');
-    const partSwitch = document.getElementById('part-experiments');
-    const passBox = document.getElementById('part-passes');
-    let current = content.scenes[content.first];
-    let view = current.views[0].key;
-
-    const visibility = () => current.data.map(trace =>
-      trace.views.includes(view) && (!trace.passes || passBox.checked));
-
-    const chosen = () => current.views.find(each => each.key === view);
-    const bars = () => ({
-      'coloraxis.showscale': view !== 'film', 'coloraxis2.showscale': view === 'film',
-      [`coloraxis${view === 'film' ? '2' : ''}.colorbar.title.text`]: chosen().bar,
-    });
-
-    const buttons = (host, entries, chosen, pick) => {
-      host.replaceChildren(...entries.map(([key, label]) => {
-        const button = document.createElement('button');
-        button.type = 'button';
-        button.textContent = label;
-        button.setAttribute('aria-pressed', key === chosen);
-        button.addEventListener('click', () => pick(key));
-        return button;
-      }));
-    };
-
-    const label = () => {
-      titles.replaceChildren(...chosen().titles.map(text => {
-        const span = document.createElement('span');
-        span.textContent = text;
-        return span;
-      }));
-      buttons(viewSwitch, current.views.map(each => [each.key, each.label]), view, key => {
-        view = key;
-        refresh();
-      });
-      if (partSwitch) {
-        buttons(partSwitch, content.scenes.map(each => [each.name, each.name]), current.name,
-          name => { current = content.scenes.find(each => each.name === name); show(); });
+  async function drawGroup(figure) {
+    const host = document.getElementById(`figure-${figure.name}`);
+    if (!host) return;
+    if (figure.legend.length) {
+      const legend = make('p', host, 'legend');
+      for (const {words, colour, kind} of figure.legend) {
+        make('i', make('span', legend), kind).style.color = colour;
+        legend.lastChild.append(words);
       }
-    };
-
-    const refresh = () => {
-      label();
-      return Plotly.update(plot, {visible: visibility()}, bars());
-    };
-
-    const follow = () => {
-      let busy = false;
-      const follow = change => {
-        if (busy || !plot.layout.scene2) return;
-        const from = Object.keys(change).map(key => /^(scene2?)\.camera/.exec(key))
-          .find(Boolean);
-        if (!from) return;
-        const other = from[1] === 'scene' ? 'scene2' : 'scene';
-        busy = true;
-        Plotly.relayout(plot, {[`${other}.camera`]: plot.layout[from[1]].camera})
-          .finally(() => { busy = false; });
-      };
-      plot.on('plotly_relayout', follow);
-      plot.on('plotly_relayouting', follow);
-    };
-
-    const show = () => {
-      label();
-      Plotly.purge(plot);
-      const shown = visibility();
-      const data = current.data.map((trace, k) =>
-        ({...withGeometry(trace, current.geometry), visible: shown[k]}));
-      const layout = structuredClone(current.layout);
-      layout.coloraxis.showscale = view !== 'film';
-      layout.coloraxis2.showscale = view === 'film';
-      (view === 'film' ? layout.coloraxis2 : layout.coloraxis).colorbar.title.text = chosen().bar;
-      return draw(plot, data, layout, {...options, displayModeBar: true}).then(follow);
-    };
-
-    passBox.addEventListener('change', refresh);
-    return show();
+    }
+    const charts = make('div', host, 'charts');
+    for (const chart of figure.charts) {
+      const panel = make('figure', charts);
+      if (chart.title) make('figcaption', panel, '', chart.title);
+      await draw(make('div', panel, 'chart'), chart.data, chart.layout, flat);
+      await rest();
+    }
   }
 
-  async function start() {
-    for (const figure of content.figures) {
-      const element = document.getElementById(`figure-${figure.name}`);
-      if (!element) continue;
-      await draw(element, figure.data, figure.layout, flat);
-      await flush();
-    }
-    await partViewer();
-    for (const [index, scene] of content.places.entries()) {
-      const element = document.getElementById(`places-${index}`);
-      if (!scene || !element) continue;
-      await flush();
-      const geometry = content.scenes[index].geometry;
-      await draw(element, scene.data.map(trace => withGeometry(trace, geometry)), scene.layout,
-        options);
-    }
-    root.dataset.ready = '';
+  // A click on a heading sorts its table, a second click the other way round.
+  const key = cell => {
+    const text = cell.dataset.sort ?? cell.textContent.trim().replace('−', '-');
+    return text !== '' && isFinite(text) ? Number(text) : text;
+  };
+  document.addEventListener('click', event => {
+    const heading = event.target.closest('table.sortable th');
+    if (!heading) return;
+    const up = heading.getAttribute('aria-sort') !== 'ascending';
+    for (const other of heading.parentNode.cells) other.removeAttribute('aria-sort');
+    heading.setAttribute('aria-sort', up ? 'ascending' : 'descending');
+    const body = heading.closest('table').tBodies[0], column = heading.cellIndex;
+    const order = (a, b) => {
+      const [first, second] = [key(a.cells[column]), key(b.cells[column])];
+      const both = typeof first === 'number' && typeof second === 'number';
+      return (both ? first - second : String(first).localeCompare(String(second))) * (up ? 1 : -1);
+    };
+    body.append(...[...body.rows].sort(order));
+  });
+
+  const download = (name, text) => {
+    const link = document.createElement('a');
+    link.href = URL.createObjectURL(new Blob([text], {type: 'text/csv'}));
+    link.download = name;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+  };
+  for (const button of document.querySelectorAll('button[data-table]')) {
+    const source = document.getElementById(button.dataset.table);
+    button.addEventListener('click', () => download(button.dataset.name, source.textContent));
   }
 
-  start().catch(error => failed('page', error));
+  return {root, content, options, flat, make, rest, draw, drawGroup, download, failed};
 })();
