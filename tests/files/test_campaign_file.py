@@ -71,6 +71,15 @@ def test_down_and_the_model_are_taken_over(campaign, folder):
     assert read.experiments[0].name == '7'
 
 
+def test_part_batch_and_target_are_taken_over(campaign):
+    told = {'part': 'door', 'batch': 4711, 'date': '2026-11-21', 'target_um': 25}
+    read = read_campaign(campaign(top=told | {'tolerance_um': 3.5}))
+    assert read.head == {'part': 'door', 'batch': '4711', 'date': '2026-11-21'}
+    assert (read.target_um, read.tolerance_um) == (25.0, 3.5)
+    without = read.without(np.arange(len(read.readings)) == 0)
+    assert without.head == read.head
+
+
 def test_a_trigger_that_is_not_named_is_noted(campaign):
     """Without it the gun would spray on the way between passes, which changes every answer."""
     told = []
@@ -110,6 +119,9 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'top': {'model': 3}}, 'campaign: model is 3; expected the name of a model file'),
         ({'top': {'experiments': []}}, r'experiments is \[\]; expected a list of at least one'),
         ({'top': {'experiments': {'name': 'door'}}}, 'experiments is .*; expected a list of at'),
+        ({'top': {'bach': 'A'}}, "campaign: unknown key 'bach'; did you mean 'batch'"),
+        ({'top': {'target_um': 20}}, 'target_um and tolerance_um belong together'),
+        ({'top': {'target_um': -1, 'tolerance_um': 1}}, 'target_um is -1; expected the film want'),
         ({'experiments': ['door']}, "experiment 1 is 'door'; expected the keys mesh, trajectory"),
     ],
 )

@@ -92,18 +92,19 @@ def test_a_map_shows_what_it_does_where_the_readings_of_its_part_lie(study):
     )
     assert map_figure(shown(study)) is None
     maps = map_figure(shown(study, LearnedMap(maps=grids, learned=learned * 2)))
-    first, second, dots = maps['data']
+    [first, dots], [second] = (chart['data'] for chart in maps['charts'])
     assert first['z'] == pytest.approx(np.array([[0.05, 0.05, 0.05], [1.1, 1.2, 1.3]]))
     # Neutral is the middle of the colours.
     assert first['zmin'] + first['zmax'] == pytest.approx(2.0)
     assert second['z'] == pytest.approx(first['z'])
     assert len(dots['x']) == len(door.positions_m)
-    titles = [note['text'] for note in maps['layout']['annotations']]
+    titles = [chart['title'] for chart in maps['charts']]
     assert titles == ['factor on door', 'factor on a part that was not measured here']
     added = map_figure(shown(study, LearnedMap(maps=grids[:1], kind='addition', learned=learned)))
-    assert added['data'][0]['z'] == pytest.approx(np.reshape(learned, (2, 3)))
-    assert added['data'][0]['zmin'] + added['data'][0]['zmax'] == pytest.approx(0.0)
-    assert added['layout']['annotations'][0]['text'] == 'addition [µm] on door'
+    (chart,) = added['charts']
+    assert chart['data'][0]['z'] == pytest.approx(np.reshape(learned, (2, 3)))
+    assert chart['data'][0]['zmin'] + chart['data'][0]['zmax'] == pytest.approx(0.0)
+    assert chart['title'] == 'addition [µm] on door'
 
 
 @pytest.mark.slow
@@ -111,7 +112,8 @@ def test_a_footprint_is_the_pattern_times_its_factor(study):
     heavier_right = (0.0,) * WAVES + (0.1, 0.2, 0.0, 0.0, 0.0)
     footprint = LearnedFootprint(reach_m=0.2, learned=heavier_right)
     assert footprint_figure(shown(study)) is None
-    plain, learned, factor = footprint_figure(shown(study, footprint))['data'][:3]
+    charts = footprint_figure(shown(study, footprint))['charts']
+    plain, learned, factor = (chart['data'][0] for chart in charts)
     assert learned['z'] == pytest.approx(plain['z'] * factor['z'])
     x, y = np.meshgrid(factor['x'], factor['y'])
     at = np.argmin(np.hypot(x - 0.2, y))

@@ -1,5 +1,7 @@
 """The report: complete for every verdict, self-contained, and drawn by a real browser."""
 
+import csv
+import json
 import re
 import shutil
 import subprocess
@@ -24,6 +26,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.film import point_rows
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.words import learned_range
 from small_campaign import small_campaign
@@ -132,6 +135,48 @@ def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
     assert 'The same passes at half the flow' in text
     shift = next(iter(diagnosis.classes[0].parameters.values())).value
     assert f'{1e3 * shift:.3g}'.replace('-', '−') in text
+
+
+def test_every_point_is_told_with_its_verdict(report, comparisons):
+    points = comparisons[-1].points
+    told = re.search(r'<script type="text/csv"[^>]*>(.*?)</script>', report.read_text(), re.DOTALL)
+    rows = list(csv.DictReader(told.group(1).splitlines()))
+    deviation = np.array([float(row['deviation_um']) for row in rows])
+    assert deviation == pytest.approx(points.residual_um, abs=6e-4)
+    off = np.abs(points.residual_um) > 1.96 * points.sigma_um
+    assert [row['model'] for row in rows] == ['off' if one else 'OK' for one in off]
+    assert {row['film'] for row in rows} == {''}
+
+
+def test_the_cost_is_what_the_pattern_cannot_imitate(report, diagnosis, comparisons):
+    without, with_it = (step.fit.predicted_um for step in diagnosis.history)
+    rms = np.sqrt(np.mean((with_it - without) ** 2))
+    text = page_of(report).text
+    assert f'the prediction differs by {rms:.2f} µm RMS at the points' in text
+    # The drift alone moves more paint: the fitted pattern takes up a part of it.
+    fitted = diagnosis.history[-1].model
+    alone = diagnosis.study.forward.predict_um(fitted.model_copy(update={'effects': ()}))
+    assert rms < np.sqrt(np.mean((with_it - alone) ** 2))
+
+
+def test_part_batch_and_target_of_the_campaign_lead_the_page(tmp_path, diagnosis, comparisons):
+    measured = diagnosis.study.measured_um
+    target = float(np.median(measured))
+    told = {'head': {'part': 'door <left>', 'batch': '4711'}, 'target_um': target,
+            'tolerance_um': 2.0}  # fmt: skip
+    study = replace(diagnosis.study, campaign=replace(diagnosis.study.campaign, **told))
+    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
+    tell(tmp_path / 'report.html', replace(diagnosis, study=study), beside)
+    page = page_of(tmp_path / 'report.html')
+    assert page.clashes == page.open == []
+    assert 'Part door <left> Batch 4711 An effect is missing' in page.text
+    rows = point_rows(ReportData(beside))
+    for name, holds in (('low', measured < target - 2.0), ('high', measured > target + 2.0)):
+        assert [row['film'] == name for row in rows] == holds.tolist()
+    panel = measured[: len(study.campaign.experiments[0])]
+    low, high = np.mean(panel < target - 2.0), np.mean(panel > target + 2.0)
+    shares = f'points: {100 * low:.0f} % low, {100 * (1 - low - high):.0f} % in'
+    assert shares in page.text
 
 
 def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, comparisons):
@@ -262,12 +307,44 @@ VISITOR = """<script>
   root.dataset.pressed = count;
   const titles = document.querySelectorAll('#part figcaption');
   root.dataset.titles = [...titles].map(title => title.textContent).join(', ');
+
+  const way = document.getElementById('way');
+  way.value = way.max / 2;
+  way.dispatchEvent(new Event('input'));
+  root.dataset.way = document.getElementById('way-told').textContent;
+
+  document.querySelector('#section-lines button').click();
+  await rest(500);
+  const [line, ...others] = document.getElementById('section').data.reverse();
+  const curve = others.find(trace => trace.line.width === 3);
+  const off = line.x.map((x, k) => {
+    const near = curve.x.map((at, n) => [Math.abs(at - x), curve.y[n]]).filter(e => e[1] !== null);
+    return [line.y[k], line.y[k] - near.sort((a, b) => a[0] - b[0])[0][1]];
+  });
+  root.dataset.section = JSON.stringify(off);
+
+  const table = document.querySelector('table.sortable');
+  const cells = [...table.tHead.rows[0].cells];
+  const column = cells.findIndex(cell => cell.textContent.includes('Deviation'));
+  cells[column].click();
+  root.dataset.sorted = JSON.stringify(
+    [...table.tBodies[0].rows].map(row => Number(row.cells[column].dataset.sort)));
+
+  document.body.style.width = '390px';
+  window.dispatchEvent(new Event('resize'));
+  await rest(1500);
+  const wide = [...document.querySelectorAll('header *, main *, footer *')].filter(element =>
+    !element.closest('.rows, svg, .top, .pair') && element.getBoundingClientRect().right > 391);
+  root.dataset.wide = wide.map(element => `${element.tagName} ${element.className}`).join(', ');
+  document.body.style.width = '';
+  window.dispatchEvent(new Event('resize'));
+  await rest(1500);
 })();
 </script>"""
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason='draws the page in Chromium, which is not installed')
-def test_a_browser_draws_every_chart_without_errors(report, tmp_path):
+def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_path):
     picture, visited = tmp_path / 'page.png', tmp_path / 'visited.html'
     visited.write_text(report.read_text().replace('</body>', f'{VISITOR}</body>'))
     command = [
@@ -287,6 +364,16 @@ def test_a_browser_draws_every_chart_without_errors(report, tmp_path):
     assert root['data-pressed'] == '5'
     assert root['data-titles'] == 'Residual before, What the model gained'
     assert root['data-eyes'] == '[1.9,1.9]'
+    assert re.fullmatch(r'[\d.]+ s, (pass \d, gun on|gun off), [\d.]+ m/s', root['data-way'])
+    # What the page cuts from its mesh is what the model predicts at the readings on that line.
+    cut = np.array(json.loads(root['data-section']))
+    points = comparisons[-1].points
+    rows = np.abs(points.measured_um - cut[:, :1]).argmin(axis=1)
+    assert len(cut) >= 5
+    assert cut[:, 1] == pytest.approx(points.residual_um[rows], abs=0.15)
+    deviations = json.loads(root['data-sorted'])
+    assert deviations == sorted(points.residual_um)
+    assert root['data-wide'] == ''
     assert 'Uncaught' not in done.stderr
     assert 'Content Security Policy' not in done.stderr
     assert colourful_share(picture) > 0.02

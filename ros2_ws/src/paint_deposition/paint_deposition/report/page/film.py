@@ -4,10 +4,9 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.statistics import film_statistics
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.style import TWO_SIDED_95
-from paint_deposition.report.words import joined, minus
 
 LOW, IN, HIGH = 'low', 'in', 'high'
 
@@ -18,15 +17,19 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     for k, experiment in enumerate(data.experiments):
         measured = data.study.measured_um[data.rows_of(k)]
         painted = data.painted[k][-1]
+        film = film_statistics(
+            painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
+            target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
+        )  # fmt: skip
         rows.append(
             {
                 'name': experiment.name,
                 'measured': measured,
                 'bands': band_shares(data, measured),
-                'film': film_statistics(
-                    painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
-                    target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
-                ),
+                'areas': {
+                    LOW: film.below_target, IN: film.within_target, HIGH: film.above_target
+                },
+                'film': film,
             }
         )  # fmt: skip
     return rows
@@ -48,31 +51,9 @@ def band_of(data: ReportData, film_um: float) -> str:
     return IN if abs(off) <= data.tolerance_um else LOW if off < 0.0 else HIGH
 
 
-def film_words(data: ReportData) -> str:
-    """The film of all parts in a few sentences."""
-    target = 'No target is known: give target_um and tolerance_um in the campaign.'
-    if data.target_um is not None:
-        target = f'Wanted are {data.target_um:g} ± {data.tolerance_um:g} µm.'
-    return ' '.join([*(_part_words(row) for row in film_rows(data)), target])
-
-
-def _part_words(row: dict[str, Any]) -> str:
-    measured, film = row['measured'], row['film']
-    text = (
-        f'{row["name"]}: {measured.mean():.1f} µm measured on average, {measured.min():.1f} to '
-        f'{measured.max():.1f} µm'
-    )
-    if not row['bands']:
-        return f'{text}.'
-    return f'{text}; {_shares(row["bands"])} of the points, {_area_shares(film)} of the area.'
-
-
-def _shares(bands: dict[str, float]) -> str:
-    return joined([f'{100 * share:.0f} % {name}' for name, share in bands.items()])
-
-
-def _area_shares(film: FilmStatistics) -> str:
-    return _shares({LOW: film.below_target, IN: film.within_target, HIGH: film.above_target})
+def shares_in_words(shares: dict[str, float]) -> str:
+    """'20 % low, 75 % in, 5 % high'."""
+    return ', '.join(f'{100 * share:.0f} % {name}' for name, share in shares.items())
 
 
 def point_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -114,8 +95,3 @@ def _cell(value: Any) -> str:
     if isinstance(value, str):
         return f'"{value.replace(chr(34), 2 * chr(34))}"' if set(value) & set(',"\n') else value
     return f'{value:.3f}'
-
-
-def share_words(share: float) -> str:
-    """A share of an area or of points as a percentage."""
-    return minus(f'{100 * share:.0f} %')

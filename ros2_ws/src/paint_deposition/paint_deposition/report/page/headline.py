@@ -1,6 +1,6 @@
 """The verdict in plain words for the engineer who runs the process."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import f as fisher
@@ -24,7 +24,6 @@ from paint_deposition.report.page.facts import (
     with_article,
     with_confounded,
 )
-from paint_deposition.report.page.film import film_words
 from paint_deposition.report.page.tables import class_rows
 from paint_deposition.report.words import (
     capital,
@@ -61,11 +60,6 @@ class Headline:
 
 def headline(data: ReportData) -> Headline:
     """Verdict and facts."""
-    told = _verdict(data)
-    return replace(told, facts=(('Film against target', film_words(data)), *told.facts))
-
-
-def _verdict(data: ReportData) -> Headline:
     diagnosis = data.diagnosis
     if diagnosis is None:
         return _compared(data)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.film.colour_tables import COOLWARM, VIRIDIS
-from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
+from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED
 
 CLEAR = 'rgba(0,0,0,0)'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
@@ -31,6 +31,7 @@ def base_layout(**more: Any) -> dict[str, Any]:
         'plot_bgcolor': CLEAR,
         'margin': {'l': 48, 'r': 12, 't': 8, 'b': 44},
         'showlegend': False,
+        'modebar': {'bgcolor': CLEAR, 'color': BEFORE, 'activecolor': ACCENT},
         'hoverlabel': {'font': {'family': FONT, 'size': 12}},
     }
     return layout | more

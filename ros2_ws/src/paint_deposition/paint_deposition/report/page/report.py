@@ -13,11 +13,12 @@ from paint_deposition import __version__
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.provenance import git_version
+from paint_deposition.film.statistics import CPK_MEANS
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts
 from paint_deposition.report.page import tables
-from paint_deposition.report.page.film import film_rows, point_rows, points_csv, share_words
+from paint_deposition.report.page.film import film_rows, point_rows, points_csv, shares_in_words
 from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.learned import learned_figure
 from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
@@ -55,7 +56,7 @@ def report_html(data: ReportData) -> str:
         'capital': words.capital,
         'film': lambda value: '' if np.isnan(value) else words.minus(f'{value:.1f}'),
         'step': words.step_words,
-        'share': share_words,
+        'shares': shares_in_words,
     }
     environment.filters.update(filters)
     numbers = range(len(data.experiments))
@@ -85,6 +86,7 @@ def report_html(data: ReportData) -> str:
         key_figures=key_figures(data),
         head=list(data.study.campaign.head.items()),
         film=film_rows(data),
+        cpk=CPK_MEANS,
         points=points,
         points_csv=points_csv(points).replace('<', ' '),
         painted=tables.painted_lines(data),

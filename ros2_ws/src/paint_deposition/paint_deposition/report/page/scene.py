@@ -32,7 +32,7 @@ SHADED = {'ambient': 0.9, 'diffuse': 0.35, 'specular': 0.0, 'roughness': 1.0, 'f
 TRUE_COLOURS = SHADED | {'ambient': 1.0, 'diffuse': 0.2}
 # Plotly's camera sees 45 deg from bottom to top.
 TAN_HALF_VIEW, ROOM_AROUND = float(np.tan(np.pi / 8.0)), 1.06
-PANE_ASPECT = 1.0
+PANE_ASPECT = 1.2
 # A part whose outward side leans less toward the vertical than this is looked at upright.
 STANDING = 0.98
 
@@ -162,7 +162,7 @@ def places_scene(data: ReportData, index: int) -> dict[str, Any] | None:
     ]  # fmt: skip
     scene = _scene(experiment, experiment.surface.vertices_m)
     colours = _colours(FILM, FILM_COLOURS, 0.0, round_up(float(film_um.max())))
-    return {'data': traces, 'layout': _scene_layout(420, scene=scene, coloraxis=colours)}
+    return {'data': traces, 'layout': _scene_layout(370, scene=scene, coloraxis=colours)}
 
 
 def _places_of(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
@@ -235,7 +235,7 @@ def _layout(data: ReportData, experiment: Experiment) -> dict[str, Any]:
     spraying = experiment.path.position_m[experiment.path.flow > 0.0]
     shown = np.concatenate([experiment.surface.vertices_m, spraying])
     return _scene_layout(
-        420,
+        370,
         scene=_scene(experiment, shown),
         coloraxis=_colours(RESIDUAL, RESIDUAL_COLOURS, -reach, reach),
         coloraxis2=_colours(FILM, FILM_COLOURS, 0.0, thickest),

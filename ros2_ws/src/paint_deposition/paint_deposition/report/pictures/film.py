@@ -174,7 +174,7 @@ def _draw_band_legend(row: _Row, surface: Surface, film_um: np.ndarray, s: FilmS
     low, high = s.band_um
     row.write([f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm'], 11.0)
     row.write([f'share of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'], 8.0,
-              color=MUTED)  # fmt: skip
+              colour=MUTED)  # fmt: skip
     row.top -= 0.08
     row.patches(
         [
@@ -203,7 +203,7 @@ def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmSt
     film, area = film_um[painted], surface.vertex_areas_m2[painted]
     low, high = s.band_um
     quiet(axes, 'film [µm]', '', size=8.0)
-    axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
+    axes.set_title('% of the painted area', loc='left', fontsize=8, colour=MUTED)
     axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
     if len(film):
         axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
@@ -224,7 +224,7 @@ def _draw_legend(
     extent = part.high_m - part.low_m
     inset = extent * min(INSET_IN / extent)
     below = LINE_IN * len(lines) + 0.3 * bare + inset[1] + 0.75
-    row.write(['film [µm]'], color=MUTED)
+    row.write(['film [µm]'], colour=MUTED)
     bar = row.figure.colorbar(
         ScalarMappable(
             Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)

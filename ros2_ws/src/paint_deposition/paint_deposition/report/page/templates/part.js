@@ -108,14 +108,15 @@ const partViewer = async () => {
     turnTogether();
     way.max = values(scene.way.x).length - 1;
     way.value = Math.min(way.value, way.max);
-    buttons(lines, scene.readings.lines.map((line, k) => [k, line.label]), null, k => {
-      angle.value = scene.readings.lines[k].angle;
+    const through = line => {
+      angle.value = line.angle;
       setOffsetRange();
-      offset.value = 1000 * scene.readings.lines[k].offset;
-      drawSection();
-    });
-    setOffsetRange();
-    await drawSection();
+      offset.value = 1000 * line.offset;
+      return drawSection();
+    };
+    const known = scene.readings.lines;
+    buttons(lines, known.map((line, k) => [k, line.label]), null, k => through(known[k]));
+    await through(known[0] || {angle: 0, offset: 0});
     await moveGun();
   };
 
@@ -187,8 +188,8 @@ const partViewer = async () => {
     });
     at('section-told').textContent = `${angle.value}° from level, ${offset.value} mm from the `
       + `centre of the part, ${near.length} readings within 15 mm`;
-    await Plotly.react(sectionPlot, data, content.section, flat);
-    sectionPlot.dataset.drawn = '';
+    if ('drawn' in sectionPlot.dataset) await Plotly.react(sectionPlot, data, content.section);
+    else await draw(sectionPlot, data, content.section, flat);
     await mark(2, {x: [found.x], y: [found.y], z: [found.z]});
   };
   const mark = (fromEnd, change) => Promise.all(plots.map((plot, k) =>

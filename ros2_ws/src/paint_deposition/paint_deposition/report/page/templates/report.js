@@ -16,7 +16,9 @@ const page = (() => {
     modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d', 'tableRotation'],
     toImageButtonOptions: {format: 'png', scale: 2},
   };
-  const flat = {...options, displayModeBar: 'hover'};
+  // A finger has no place to rest on: the tools would hide the chart.
+  const pointer = matchMedia('(hover: hover)').matches;
+  const flat = {...options, displayModeBar: pointer && 'hover'};
   let drawn = 0;
 
   const make = (kind, parent, className = '', text = '') => {
