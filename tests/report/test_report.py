@@ -370,7 +370,7 @@ def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_pat
     points = comparisons[-1].points
     rows = np.abs(points.measured_um - cut[:, :1]).argmin(axis=1)
     assert len(cut) >= 5
-    assert cut[:, 1] == pytest.approx(points.residual_um[rows], abs=0.15)
+    assert cut[:, 1] == pytest.approx(points.residual_um[rows], abs=0.3)
     deviations = json.loads(root['data-sorted'])
     assert deviations == sorted(points.residual_um)
     assert root['data-wide'] == ''
