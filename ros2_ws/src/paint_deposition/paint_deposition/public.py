@@ -1,12 +1,12 @@
 """The public names: what a script or a notebook needs."""
 
-from paint_deposition.api.inference import calibrate, compare, diagnose, refit
+from paint_deposition.api.inference import calibrate, compare, compare_models, diagnose, refit
 from paint_deposition.api.pictures import plot
 from paint_deposition.api.planning import plan, recommend
 from paint_deposition.api.samples import sample_folder
 from paint_deposition.api.simulation import Film, simulate
 from paint_deposition.api.writing import write
-from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
@@ -34,10 +34,12 @@ __all__ = [
     'Plan',
     'Readings',
     'Recommendation',
+    'SideBySide',
     'Surface',
     'Trajectory',
     'calibrate',
     'compare',
+    'compare_models',
     'diagnose',
     'plan',
     'plot',

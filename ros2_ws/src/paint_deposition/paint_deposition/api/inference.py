@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.comparison.comparison import compare as compared
 from paint_deposition.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.diagnosis.refit import refit as refitted
@@ -13,6 +13,7 @@ from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.calibration import Calibration
@@ -21,6 +22,7 @@ from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
 
 Progress = Callable[[str], None]
+MOST_MODELS = 6
 # Starts of the fit that stands in for a model where none is given.
 STARTS = 10
 
@@ -69,6 +71,32 @@ def compare(
         study, _ = sifted(campaign, model, model.effects)
     progress('comparing')
     return compared(study, model)
+
+
+def compare_models(
+    campaign: Campaign, models: Mapping[str, DepositionModel], *, progress: Progress = _silent
+) -> SideBySide:
+    """Set several models beside the same readings.
+
+    Args:
+        campaign: painted parts with readings. Slips among them are found with the first model and
+            left out for all.
+        models: by name, taken as they are.
+        progress: called with a line for each step.
+
+    Raises:
+        PaintError: there are fewer than two, or more than can be told apart in a picture.
+    """
+    if not 2 <= len(models) <= MOST_MODELS:
+        raise PaintError(f'{len(models)} models to compare; give 2 to {MOST_MODELS}')
+    progress('fitting the pattern')
+    first = next(iter(models.values()))
+    study, _ = sifted(campaign, first, first.effects)
+    found = {}
+    for name, model in models.items():
+        progress(f'comparing {name}')
+        found[name] = compared(study, model)
+    return SideBySide(found)
 
 
 def diagnose(

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.simulation import Film
-from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
@@ -26,7 +26,7 @@ from paint_deposition.results.calibration import write_calibration
 from paint_deposition.results.film import write_film
 from paint_deposition.results.fitted_model import write_fitted
 from paint_deposition.results.plan import write_plan
-from paint_deposition.results.residual_mesh import write_residual_meshes
+from paint_deposition.results.residual_mesh import file_name, write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
 
 PNG = 'png'
@@ -83,6 +83,19 @@ def _(
 @write.register
 def _(result: Comparison, folder: str | Path, pictures: str = PNG) -> list[Path]:
     return _write_report(Path(folder), 'comparison.json', result, result, pictures)
+
+
+@write.register
+def _(result: SideBySide, folder: str | Path, pictures: str = PNG) -> list[Path]:
+    folder, data = Path(folder), ReportData.of(result)
+    files = [folder / name for name in ('comparison.json', f'comparison.{pictures}')]
+    write_json(files[0], result.to_dict())
+    write_comparison_picture(files[1], data)
+    for name, comparison in result.by_name.items():
+        files.append(folder / f'residuals_{file_name(name)}.csv')
+        write_residuals(files[-1], comparison)
+    write_report(folder / 'report.html', data)
+    return [*files, folder / 'report.html']
 
 
 @write.register

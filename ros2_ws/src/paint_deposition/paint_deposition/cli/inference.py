@@ -41,24 +41,59 @@ OWN_EFFECTS = click.option(
 
 @click.command('compare')
 @CAMPAIGN
-@model_option("Model to judge as it is; default: the campaign's, else one fitted to it.")
+@click.option(
+    '--model', 'model_files', type=FILE, multiple=True,
+    help="Model to judge as it is; default: the campaign's, else one fitted to it. Repeated, the "
+    'models are set side by side.',
+)  # fmt: skip
 @OUTPUT
 @PICTURES
 @JSON
 def compare_command(
-    campaign: Path, model_file: Path | None, output: Path, pictures: str, as_json: bool
+    campaign: Path, model_files: tuple[Path, ...], output: Path, pictures: str, as_json: bool
 ) -> None:
     """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
 
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
-    report.html.
+    report.html. With several models there is a table of residuals for each, and no meshes.
     """
     with Progress('compare') as tell:
+        if len(model_files) > 1:
+            data, _ = read_inputs(campaign, None, tell)
+            models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
+            beside = pd.compare_models(data, models, progress=tell)
+            tell('writing the report')
+            files = write_results(beside, output, pictures=pictures)
+            say_results(files, as_json, _side_by_side_lines(beside, output))
+            return
+        model_file = model_files[0] if model_files else None
         data, start = read_inputs(campaign, model_file, tell)
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output, pictures=pictures)
     say_results(files, as_json, _comparison_lines(comparison, output))
+
+
+def _names(files: tuple[Path, ...]) -> list[str]:
+    """What models are called: their files without the suffix, or the paths if two are alike."""
+    names = [file.stem for file in files]
+    names = names if len(set(names)) == len(names) else [str(file) for file in files]
+    for name in names:
+        if names.count(name) > 1:
+            raise click.UsageError(f'--model {name} is given twice; give each model once')
+    return names
+
+
+def _side_by_side_lines(beside: pd.SideBySide, output: Path) -> Iterator[str]:
+    width = max(len(name) for name in beside.by_name)
+    parts = [e.name for e in next(iter(beside.by_name.values())).study.campaign.experiments]
+    yield f'{"RMSE [µm]":{width}}  {"all":>10}' + ''.join(f'  {part:>10}' for part in parts)
+    for name, comparison in beside.by_name.items():
+        errors = [m.residuals.rmse_um for m in comparison.misfits if m.kind == 'experiment']
+        cells = [comparison.points.rmse_um, *errors]
+        yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in cells)
+    yield f'nearest to the readings: {beside.best}'
+    yield f'report: {output / "report.html"}'
 
 
 def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """The model beside the readings: where and how much it is off."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -81,6 +81,34 @@ class Comparison:
             'dependences': [asdict(dependence) for dependence in self.dependences],
             'notes': list(self.study.notes),
         }
+
+
+@dataclass(frozen=True)
+class SideBySide:
+    """Several models beside the same readings.
+
+    Attributes:
+        by_name: a comparison for each model, in the order asked for, by the model's name.
+    """
+
+    by_name: Mapping[str, Comparison]
+
+    def __repr__(self) -> str:
+        errors = (f'{name} {c.points.rmse_um:.2f}' for name, c in self.by_name.items())
+        return f'SideBySide(RMSE {", ".join(errors)} µm)'
+
+    @property
+    def best(self) -> str:
+        """The model with the least error at the points."""
+        return min(self.by_name, key=lambda name: self.by_name[name].points.rmse_um)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``comparison.json``: of the best model, and of each by its name."""
+        each = [
+            {'name': name, 'rmse_um': c.points.rmse_um} | c.to_dict()
+            for name, c in self.by_name.items()
+        ]
+        return {'best': self.best, 'models': each}
 
 
 def compare(study: Study, model: DepositionModel) -> Comparison:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.comparison.profiles import Profile, profiles_of
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
@@ -19,6 +19,7 @@ from paint_deposition.fitting.study import Study
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.readings.residuals import root_mean_square
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
 from paint_deposition.results.fitted_model import history_as_list
 
 
@@ -50,17 +51,21 @@ class ReportData:
         comparisons: of the first and the best model; one where nothing was added.
         diagnosis: or None after a comparison alone.
         older: history of the model that a diagnosis started from, as in its file.
+        names: of models that stand side by side; none where one model followed from another.
     """
 
     comparisons: tuple[Comparison, ...]
     diagnosis: Diagnosis | None = None
     older: Sequence[Mapping[str, Any]] = ()
+    names: tuple[str, ...] = ()
 
     @staticmethod
     def of(
-        result: Comparison | Diagnosis, older: Sequence[Mapping[str, Any]] = ()
+        result: Comparison | SideBySide | Diagnosis, older: Sequence[Mapping[str, Any]] = ()
     ) -> 'ReportData':
         """Of a diagnosis, models between the first and the last are history only."""
+        if isinstance(result, SideBySide):
+            return ReportData(tuple(result.by_name.values()), names=tuple(result.by_name))
         if isinstance(result, Comparison):
             return ReportData((result,))
         first, *later = result.comparisons
@@ -116,7 +121,7 @@ class ReportData:
     @property
     def improved(self) -> bool:
         """Whether there is a before and an after."""
-        return len(self.models) > 1
+        return len(self.models) > 1 and not self.names
 
     @property
     def model(self) -> DepositionModel:
@@ -126,7 +131,24 @@ class ReportData:
     @property
     def model_names(self) -> tuple[str, ...]:
         """What the models are called where both are shown."""
-        return ('model before', 'model after') if self.improved else ('model',)
+        return self.names or (('model before', 'model after') if self.improved else ('model',))
+
+    @property
+    def colours(self) -> tuple[str, ...]:
+        """Of the models; of two that followed from each other the last has the strong one."""
+        return MODELS[: len(self.models)] if self.names else (BEFORE, ACCENT)[-len(self.models) :]
+
+    @property
+    def lines(self) -> list[dict[str, Any]]:
+        """Colour and width [px] of each model's line over readings.
+
+        The line of a model before is thin and lies over the bold one, so that both are seen where
+        they agree.
+        """
+        if self.names:
+            return [{'color': colour, 'width': 2.2} for colour in self.colours]
+        lines = [{'color': INK, 'width': 1.2}, {'color': ACCENT, 'width': 3.5}]
+        return lines[-len(self.models) :]
 
     @cached_property
     def residuals_um(self) -> list[np.ndarray]:

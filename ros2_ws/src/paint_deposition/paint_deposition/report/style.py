@@ -8,6 +8,8 @@ ACCENT = '#00708c'
 # Film below, within and above the target band, and bare metal; told apart by the colour-blind too.
 BELOW, WITHIN, HIGH, BARE = '#3f6fb0', '#b9dcae', '#e07b1f', '#9e9e9e'
 COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
+# Models side by side; as many can be told apart.
+MODELS = (ACCENT, *COMPONENTS, '#b5485f', '#8a7a2b')
 # 95 % of normally distributed readings lie within so many standard deviations.
 TWO_SIDED_95 = 1.96
 

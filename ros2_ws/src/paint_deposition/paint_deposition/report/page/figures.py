@@ -42,7 +42,7 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
                 fillcolor='rgba(154,165,177,0.25)'),
         scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
     ]  # fmt: skip
-    for name, values, colour in _before_and_after(data, predicted):
+    for name, values, colour in _of_each_model(data, predicted):
         hover = 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>'
         marker = {'size': 5.5, 'color': colour, 'opacity': 0.9}
         traces.append(scatter(measured, values, 'markers', marker=marker, hovertemplate=hover))
@@ -55,13 +55,12 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
 
 
 def _legend(data: ReportData) -> list[tuple[str, str, str]]:
-    return [(name, colour, 'dot') for name, colour in _before_and_after(data)]
+    return [(name, colour, 'dot') for name, colour in _of_each_model(data)]
 
 
-def _before_and_after(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
-    """Name, values and colour of each model, the last one in the strong colour."""
-    colours = (BEFORE, ACCENT)[-len(data.models) :]
-    return zip(data.model_names, *values, colours, strict=True)
+def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
+    """Name, values and colour of each model."""
+    return zip(data.model_names, *values, data.colours, strict=True)
 
 
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
@@ -79,7 +78,7 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
         name = dependence.covariate
         x_mean, residual_means = _means(values[name], data.residuals_um)
         traces: list[dict] = []
-        for label, residual, mean, colour in _before_and_after(
+        for label, residual, mean, colour in _of_each_model(
             data, data.residuals_um, residual_means
         ):
             traces += [

@@ -61,6 +61,8 @@ class Headline:
 def headline(data: ReportData) -> Headline:
     """Verdict and facts."""
     diagnosis = data.diagnosis
+    if data.names:
+        return _side_by_side(data)
     if diagnosis is None:
         return _compared(data)
     # A diagnosis adds effects that it is sure of, and keeps learned laws for what they predict.
@@ -218,11 +220,27 @@ def _compared(data: ReportData) -> Headline:
     return Headline('open' if off else 'good', 'Comparison', title, facts)
 
 
+def _side_by_side(data: ReportData) -> Headline:
+    errors = [comparison.points.rmse_um for comparison in data.comparisons]
+    best = data.names[int(np.argmin(errors))]
+    told = joined([f'{n} {micrometres(e)}' for n, e in zip(data.names, errors, strict=True)])
+    facts = (
+        ('How far off', f'RMSE of {told}; the gauge alone gives '
+                        f'{micrometres(data.study.noise_floor_um)}.'),
+        ('What to do', f'Take {best}, unless it was fitted to these very readings and the others '
+                       'were not.'),
+    )  # fmt: skip
+    return Headline('open', 'Side by side', f'{best} is nearest to the readings', facts)
+
+
 def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     """(label, before or '', after, remark) of the figures beside the facts."""
     noise, diagnosis = data.study.noise, data.diagnosis
     source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
+    if data.names:
+        named = zip(data.names, data.comparisons, strict=True)
+        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in named] + [floor]
     if diagnosis is None:
         rmse_um = data.comparisons[-1].points.rmse_um
         return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]

@@ -14,7 +14,7 @@ from paint_deposition.report.page.layout import (
     scatter,
     zero_axis,
 )
-from paint_deposition.report.style import ACCENT, BEFORE, INK, TWO_SIDED_95
+from paint_deposition.report.style import BEFORE, INK, TWO_SIDED_95
 
 CHART_PX = 300
 # Share of a chart's height that the residual takes, and above which the film begins.
@@ -43,10 +43,11 @@ def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
 
 def _legend(data: ReportData) -> list[tuple[str, str, str]]:
     lined = any(len(profile.line_m) for profile in data.profiles)
-    before, after = ('line', 'bold') if lined else ('ring', 'dot')
-    models = [(data.model_names[0], INK, before)] if data.improved else []
-    entries = [('measured, bars: 95 % gauge and texture', INK, 'dot'), *models,
-               (data.model_names[-1], ACCENT, after)]  # fmt: skip
+    models = [
+        (name, line['color'], 'dot' if not lined else 'bold' if line['width'] > 2 else 'line')
+        for name, line in zip(data.model_names, data.lines, strict=True)
+    ]
+    entries = [('measured, bars: 95 % gauge and texture', INK, 'dot'), *models]
     return entries + [('each pass alone', BEFORE, 'dots')] * lined
 
 
@@ -67,15 +68,15 @@ def _film_traces(data: ReportData, p: Profile) -> list[dict]:
                 hovertemplate=f'pass {number}: %{{y:.1f}} µm<extra></extra>')
         for number, single in enumerate(p.passes_um, start=1)
     ]  # fmt: skip
-    # The thin line lies over the bold one, so that both are seen where they agree.
-    for k, name in reversed(list(enumerate(data.model_names))):
-        last = k == len(data.models) - 1
+    named = zip(data.model_names, data.lines, strict=True)
+    for k, (name, line) in reversed(list(enumerate(named))):
         if len(line_mm):
-            style = {'color': ACCENT, 'width': 3.5} if last else {'color': INK, 'width': 1.2}
-            trace = scatter(line_mm, p.lines_um[k], 'lines', line=style)
+            trace = scatter(line_mm, p.lines_um[k], 'lines', line=line)
         else:
-            marker = {'size': 8, 'color': ACCENT} if last else {
-                'size': 7, 'symbol': 'circle-open', 'color': INK}  # fmt: skip
+            # An open ring lies over the full dot of the model after it.
+            marker = {'size': 7, 'color': line['color']}
+            if k < len(data.models) - 1:
+                marker |= {'symbol': 'circle-open'}
             predicted = measured - data.residuals_um[k][p.rows]
             trace = scatter(at_mm, predicted, 'markers', marker=marker)
         traces.append(trace | {'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>'})
@@ -94,10 +95,10 @@ def _residual_traces(data: ReportData, p: Profile) -> list[dict]:
                 marker={'size': 4.5, 'color': colour}, line={'width': 1, 'color': colour},
                 hovertemplate='residual %{y:+.2f} µm<extra></extra>')
         for residual, colour in zip(
-            reversed(data.residuals_um), (ACCENT, BEFORE), strict=False
+            reversed(data.residuals_um), reversed(data.colours), strict=True
         )
     ]  # fmt: skip
-    traces[0]['error_y'] = _bars(data, p, ACCENT)
+    traces[0]['error_y'] = _bars(data, p, data.colours[-1])
     return traces[::-1]
 
 

@@ -100,6 +100,7 @@ def report_html(data: ReportData) -> str:
         levels=tables.level_rows(data),
         shift=data.diagnosis and data.diagnosis.pattern_shift,
         blind=tables.blind_rows(data),
+        models=tables.model_rows(data),
         misfits=tables.misfit_rows(data),
         places=places,
         sprays=sprays[:SPRAYS_SHOWN],

@@ -58,11 +58,13 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
             _readings(data, positions + LIFT_M * normals, rows, k) | {'views': views},
             *_passes(experiment.path),
         ]
-        if k:
+        if data.improved and k:
             gained = painted[k].gauge_um - painted[0].gauge_um
             panes.append(_mesh('all', ['change'], intensity=gained, coloraxis='coloraxis'))
         traces.append(panes)
-    times = (' before', ' after') if data.improved else ('',)
+    times: tuple[str, ...] = (' before', ' after') if data.improved else ('',)
+    if data.names:
+        times = tuple(f': {name}' for name in data.names)
     views_shown = [
         ('residual', 'Residual', RESIDUAL, [f'Residual{when}' for when in times]),
         ('film', 'Film', FILM, [f'Film predicted{when}' for when in times]),
@@ -73,6 +75,8 @@ def scene_data(data: ReportData, index: int) -> dict[str, Any]:
         'name': experiment.name,
         'geometry': _geometry(surface, near),
         'panes': traces,
+        'lines': data.lines,
+        'films': [f'{name.replace(" ", "_")}_um' for name in data.model_names],
         'plane': _plane(surface),
         'readings': {
             **_xyz(positions),

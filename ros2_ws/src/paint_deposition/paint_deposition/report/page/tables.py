@@ -188,6 +188,20 @@ def _size(value: float | None, unit: str) -> str:
     return f'{size} {shown_unit}'.strip()
 
 
+def model_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Models side by side: error and bias of each on every part."""
+    return [
+        {
+            'name': name,
+            'effects': ', '.join(effect_name(e.id) for e in c.model.effects) or 'none',
+            'all': c.points,
+            'parts': [m.residuals for m in c.misfits if m.kind == 'experiment'],
+            'regions': len(c.regions),
+        }
+        for name, c in zip(data.names, data.comparisons, strict=False)
+    ]
+
+
 def misfit_rows(data: ReportData) -> list[dict[str, Any]]:
     """Experiments, their groups and passes: bias and RMSE before and after."""
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from paint_deposition.comparison.profiles import Profile
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_picture
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
+from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
 TEXT_PT = 8.0
 
@@ -57,12 +57,12 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
         last = k == len(data.models) - 1
         # The thin line lies over the bold one, so that both are seen where they agree.
         style: dict[str, Any] = {
-            'color': ACCENT if last else INK,
+            'color': data.lines[k]['color'],
             'label': label,
             'zorder': 3 - 0.1 * k,
         }
         if len(line_mm):
-            axes.plot(line_mm, profile.lines_um[k], lw=3 if last else 1, **style)
+            axes.plot(line_mm, profile.lines_um[k], lw=0.85 * data.lines[k]['width'], **style)
         else:
             predicted = measured - data.residuals_um[k][profile.rows]
             axes.plot(at_mm, predicted, 'o', ms=4, fillstyle='full' if last else 'none', **style)
@@ -81,6 +81,6 @@ def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
         bars = TWO_SIDED_95 * data.study.sigma_um[profile.rows] if last else np.zeros(len(at_mm))
         axes.errorbar(
             at_mm, residual[profile.rows], bars, fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7,
-            color=ACCENT if last else BEFORE,
+            color=data.colours[k],
         )  # fmt: skip
     axes.axhline(0.0, color=MUTED, lw=0.8)

@@ -6,7 +6,7 @@ const partViewer = async () => {
   const panes = at('part'), viewSwitch = at('part-views'), partSwitch = at('part-experiments');
   const passBox = at('part-passes'), sectionPlot = at('section'), lines = at('section-lines');
   const angle = at('section-angle'), offset = at('section-offset'), way = at('way');
-  const NEAR_M = 0.015, INK = '#1f2933', ACCENT = '#00708c', MARK = '#d1701f';
+  const NEAR_M = 0.015, INK = '#1f2933', MARK = '#d1701f';
   let scene = content.scenes[content.first], view = scene.views[0].key, plots = [];
 
   // Arrays come as plotly's typed arrays, in base64.
@@ -178,7 +178,7 @@ const partViewer = async () => {
     const last = films.length - 1;
     const data = found.films.map((film, k) => ({
       type: 'scatter', mode: 'lines', x: found.at, y: film, hoverinfo: k === last ? 'x+y' : 'skip',
-      line: k === last ? {color: ACCENT, width: 3} : {color: INK, width: 1.2},
+      line: scene.lines[k],
     })).reverse();
     data.push({
       type: 'scatter', mode: 'markers', marker: {color: INK, size: 6},
@@ -219,10 +219,9 @@ const partViewer = async () => {
     const {x, y, z} = scene.geometry.vertices;
     const films = scene.panes.map(pane =>
       values(pane.find(trace => trace.views && trace.views[0] === 'film').intensity));
-    const names = films.length > 1 ? ['before_um', 'after_um'] : ['film_um'];
     const rows = [...values(x).keys()].map(k =>
       [...xyz({x, y, z}, k).map(value => value.toFixed(5)), ...films.map(f => f[k].toFixed(3))]);
-    download(`film_${scene.name}.csv`, [['x_m', 'y_m', 'z_m', ...names], ...rows].join('\n') + '\n');
+    download(`film_${scene.name}.csv`, [['x_m', 'y_m', 'z_m', ...scene.films], ...rows].join('\n') + '\n');
   });
   await show();
 };
