@@ -10,10 +10,13 @@ from typing import Any
 from paint_deposition.api.simulation import Film
 from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
+from paint_deposition.files.provenance import origin
 from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.fitting.study import Study
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.data import ReportData
@@ -41,7 +44,9 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         folder: where to; made if it is not there.
         start: of a calibration or a diagnosis, the ``ModelFile`` that it started from: its name,
             history and uncertainties are carried on.
-        made_from: of a film or a plan, more to say in its figures, such as the files used.
+        made_from: of a film, a plan or a recommendation, more to say in its figures, such as the
+            files used.
+        model: of a plan or a recommendation, what it was computed with.
 
     Returns:
         The paths written.
@@ -57,6 +62,7 @@ def _(
     pictures: str = PNG,
 ) -> list[Path]:
     about = result.to_dict() | dict(made_from or {})
+    about |= _provenance(result.model, _files(about))
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
     )
@@ -76,7 +82,8 @@ def _(
 def _(
     result: Calibration, folder: str | Path, start: ModelFile | None = None, pictures: str = PNG
 ) -> list[Path]:
-    files = write_calibration(folder, result, start)
+    made_with = _of_study(result.study, result.model)
+    files = write_calibration(folder, result, start, made_with)
     return files + write_calibration_pictures(folder, result, pictures)
 
 
@@ -89,7 +96,8 @@ def _(result: Comparison, folder: str | Path, pictures: str = PNG) -> list[Path]
 def _(result: SideBySide, folder: str | Path, pictures: str = PNG) -> list[Path]:
     folder, data = Path(folder), ReportData.of(result)
     files = [folder / name for name in ('comparison.json', f'comparison.{pictures}')]
-    write_json(files[0], result.to_dict())
+    models = {name: comparison.model for name, comparison in result.by_name.items()}
+    write_json(files[0], result.to_dict() | _of_study(data.study, models))
     write_comparison_picture(files[1], data)
     for name, comparison in result.by_name.items():
         files.append(folder / f'residuals_{file_name(name)}.csv')
@@ -111,9 +119,15 @@ def _(
 
 
 @write.register
-def _(result: Recommendation, folder: str | Path, pictures: str = PNG) -> list[Path]:
+def _(
+    result: Recommendation,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    model: DepositionModel | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
     files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
-    write_json(files[0], result.to_dict())
+    write_json(files[0], result.to_dict() | _provenance(model, _files(made_from or {})))
     write_uniformity(files[1], result)
     return files
 
@@ -123,15 +137,42 @@ def _(
     result: Plan,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
+    model: DepositionModel | None = None,
     pictures: str = PNG,
 ) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
+    about |= _provenance(model, _files(about))
     files = write_plan(folder, result, result.surface, about)
     picture = write_film_picture(
         Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,
     )  # fmt: skip
     return [*files, picture]
+
+
+def _provenance(
+    model: DepositionModel | Mapping[str, DepositionModel] | None,
+    files: Mapping[str, str],
+    campaign: str = '',
+) -> dict[str, Any]:
+    return {'provenance': origin(model, files, campaign)}
+
+
+def _files(about: Mapping[str, Any]) -> dict[str, str]:
+    """Of what a command says of its inputs, those that are files."""
+    keys = ('mesh_file', 'mesh', 'trajectory', 'model_file', 'model')
+    told = {key.removesuffix('_file'): str(about[key]) for key in keys if about.get(key)}
+    return {what: file for what, file in told.items() if Path(file).exists()}
+
+
+def _of_study(
+    study: Study, model: DepositionModel | Mapping[str, DepositionModel]
+) -> dict[str, Any]:
+    campaign = study.campaign
+    files = {'start model': campaign.model_file or ''}
+    for experiment in campaign.experiments:
+        files |= {f'{experiment.name}: {kind}': file for kind, file in experiment.files.items()}
+    return _provenance(model, files, campaign.name if Path(campaign.name).is_file() else '')
 
 
 def _write_report(
@@ -146,7 +187,7 @@ def _write_report(
     data = ReportData.of(result, older)
     names = (figures, 'residuals.csv', f'comparison.{pictures}', 'report.html')
     files = [folder / name for name in names]
-    write_json(files[0], result.to_dict())
+    write_json(files[0], result.to_dict() | _of_study(last.study, last.model))
     write_residuals(files[1], last)
     meshes = write_residual_meshes(folder, last)
     write_comparison_picture(files[2], data)

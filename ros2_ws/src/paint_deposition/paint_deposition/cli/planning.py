@@ -139,7 +139,10 @@ def recommend_command(
     model = read_given_model(model_file)
     travel_rad = math.radians(travel_deg)
     answer = pd.recommend(model, travel_rad=travel_rad, **wanted)
-    files = write_results(answer, output, pictures=pictures)
+    files = write_results(
+        answer, output, pictures=pictures, model=model,
+        made_from={'model_file': str(model_file or '')},
+    )  # fmt: skip
     say_results(files, as_json, [*_recommendation_lines(answer), *file_lines(files)])
 
 
@@ -213,7 +216,7 @@ def plan_command(
             'frame_id': frame_id,
         }
         tell('writing')
-        files = write_results(result, output, made_from=made_from, pictures=pictures)
+        files = write_results(result, output, made_from=made_from, model=model, pictures=pictures)
     say_all('note', surface.notes)
     say_results(files, as_json, [*_plan_lines(result), *file_lines(files)])
 

@@ -12,6 +12,7 @@ from paint_deposition.cli.options import FILE, GUN_SIGNAL, JSON, MAX_POSE_GAP
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_files import refuse_gun_signal
+from paint_deposition.files.provenance import origin
 from paint_deposition.files.rapid.motion import is_rapid, program_as_text
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
@@ -33,11 +34,11 @@ def inspect_command(
     """
     if is_rapid(recording):
         program = read_program(recording, gun_signal=gun_signal)
-        click.echo(json_text(asdict(program)) if as_json else program_as_text(program))
+        click.echo(_json(asdict(program), recording) if as_json else program_as_text(program))
         return
     refuse_gun_signal(recording, gun_signal)
     summary = summarise(recording, max_pose_gap_s)
-    click.echo(json_text(asdict(summary)) if as_json else _table(summary))
+    click.echo(_json(asdict(summary), recording) if as_json else _table(summary))
 
 
 @click.command('recover')
@@ -64,7 +65,7 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     ) as bar:
         recovery = recover(run, output, on_bytes=bar.update)
     if as_json:
-        click.echo(json_text(_figures(recovery)))
+        click.echo(_json(_figures(recovery), run))
         return
     for line in recovery.breaks:
         click.echo(line)
@@ -75,6 +76,10 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     for topic, count in recovery.counts.items():
         click.echo(f'{count:10d}  {topic}')
     click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
+
+
+def _json(figures: dict, recording: Path) -> str:
+    return json_text(figures | {'provenance': origin(files={'recording': recording})})
 
 
 def _figures(recovery: Recovery) -> dict:

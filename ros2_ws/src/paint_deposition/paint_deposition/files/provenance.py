@@ -1,13 +1,19 @@
-"""What a run was made with: kept in its metadata, so that a film can be explained years later."""
+"""What a run or a result was made with, so that a film can be explained years later."""
 
 from __future__ import annotations
 
 import hashlib
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from paint_deposition import __version__
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.json_files import json_text, plain
+
+BLOCK_BYTES = 1 << 20
 
 
 def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
@@ -20,6 +26,61 @@ def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
         text = _content(model_file, 'model_file').decode('utf-8', errors='replace')
         notes |= {'model_file': model_file, 'model_yaml': text}
     return {key: value for key, value in notes.items() if value}
+
+
+def origin(
+    model: DepositionModel | Mapping[str, DepositionModel] | None = None,
+    files: Mapping[str, str | Path] | None = None,
+    campaign: str = '',
+) -> dict[str, Any]:
+    """What figures were computed from, for the key ``provenance`` of every JSON.
+
+    Args:
+        model: or several by name; in full.
+        files: by what they are; each with its digest. Empty names are left out.
+        campaign: its file, '' for none.
+    """
+    models = model if isinstance(model, Mapping) else {'model': model} if model else {}
+    named = {'campaign': campaign, **(files or {})}
+    return {
+        'package_version': __version__,
+        'git_version': git_version(),
+        'campaign': campaign,
+        'models': {name: _in_full(one) for name, one in models.items()},
+        'files': [
+            {'what': what, 'file': str(file), 'sha256': sha256(file)}
+            for what, file in named.items() if str(file) not in ('', '.')
+        ],
+    }  # fmt: skip
+
+
+def _in_full(model: DepositionModel) -> dict[str, Any]:
+    values = {
+        'planar': plain(model.planar.model_dump()),
+        'projection': plain(model.projection.model_dump()),
+        'effects': [{'id': e.id, **plain(e.model_dump())} for e in model.effects],
+    }
+    return values | {'sha256': hashlib.sha256(json_text(values).encode()).hexdigest()}
+
+
+def sha256(path: str | Path) -> str:
+    """Digest of a file, or of all files of a folder with their names, such as a bag's.
+
+    Raises:
+        PaintError: it cannot be read.
+    """
+    path, digest = Path(path), hashlib.sha256()
+    try:
+        for file in sorted(path.rglob('*')) if path.is_dir() else [path]:
+            if path.is_dir():
+                digest.update(str(file.relative_to(path)).encode())
+            if file.is_file():
+                with file.open('rb') as content:
+                    while block := content.read(BLOCK_BYTES):
+                        digest.update(block)
+    except OSError as error:
+        raise PaintError(f'{path}: {error.strerror}') from None
+    return digest.hexdigest()
 
 
 def git_version() -> str:

@@ -1,6 +1,8 @@
 """A calibration on disk: the model with its uncertainty, and figures."""
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from paint_deposition.diagnosis.verdict import Step
 from paint_deposition.files.json_files import write_json
@@ -10,7 +12,10 @@ from paint_deposition.results.fitted_model import write_fitted
 
 
 def write_calibration(
-    folder: str | Path, calibration: Calibration, start: ModelFile | None = None
+    folder: str | Path,
+    calibration: Calibration,
+    start: ModelFile | None = None,
+    details: Mapping[str, Any] | None = None,
 ) -> list[Path]:
     """Write ``model.yaml`` and ``calibration.json``; older ones are replaced.
 
@@ -18,6 +23,7 @@ def write_calibration(
         folder: made if it is not there.
         calibration: what to write.
         start: the model it started from, whose name and history are carried on.
+        details: more to say in calibration.json.
     """
     model_file, figures = Path(folder) / 'model.yaml', Path(folder) / 'calibration.json'
     study = calibration.study
@@ -28,5 +34,5 @@ def write_calibration(
     ]
     step = Step.of(study, '', calibration.fit)
     write_fitted(model_file, study, [step], start, '\n'.join(header))
-    write_json(figures, calibration.to_dict())
+    write_json(figures, calibration.to_dict() | dict(details or {}))
     return [model_file, figures]

@@ -203,7 +203,7 @@ def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmSt
     film, area = film_um[painted], surface.vertex_areas_m2[painted]
     low, high = s.band_um
     quiet(axes, 'film [µm]', '', size=8.0)
-    axes.set_title('% of the painted area', loc='left', fontsize=8, colour=MUTED)
+    axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
     axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
     if len(film):
         axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
