@@ -1,13 +1,44 @@
-"""The command `paint`, in this process as a rule and as a process where that is the point."""
+"""The command `paint`, in this process as a rule and as a process where that is the point.
+
+Figures that a command prints as JSON are held against the schema of their kind every time.
+"""
 
 import io
+import json
 import subprocess
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
+import jsonschema
 import pytest
 
+import paint_deposition
 from paint_deposition.cli.main import run
+
+SCHEMAS = Path(paint_deposition.__file__).parent / 'schemas'
+# The kind of JSON that each command prints.
+KINDS = {
+    'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
+    'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
+    'inspect': 'recording', 'recover': 'recovery',
+}  # fmt: skip
+
+
+def schema(kind: str) -> dict:
+    """The schema of a kind of JSON."""
+    return json.loads((SCHEMAS / f'{kind}.json').read_text(encoding='utf-8'))
+
+
+def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.CompletedProcess:
+    """The same, its JSON valid if it printed any."""
+    if '--json' in words and done.returncode == 0:
+        kind = KINDS[words[0]]
+        if kind == 'comparison' and words.count('--model') > 1:
+            kind = 'side_by_side'
+        if kind == 'recording' and any(word.endswith(('.mod', '.prg')) for word in words):
+            kind = 'program'
+        jsonschema.validate(json.loads(done.stdout), schema(kind))
+    return done
 
 
 def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess:
@@ -21,13 +52,15 @@ def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedPr
     ):
         place.chdir(cwd or Path.cwd())
         code = run(words)
-    return subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())
+    done = subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())
+    return checked(done, words)
 
 
 def installed_paint(*arguments: object) -> subprocess.CompletedProcess:
     """Run the installed `paint` with these arguments as a process of its own."""
     command = ['paint', *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return checked(done, command[1:])
 
 
 def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:
