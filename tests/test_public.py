@@ -92,7 +92,9 @@ def test_results_show_and_tell_themselves(name, request, tmp_path):
     files = pd.write(result, tmp_path)
     assert all(file.stat().st_size for file in files)
     written = next(file for file in files if file.suffix == '.json')
-    assert json.loads(written.read_text()) == figures
+    told = json.loads(written.read_text())
+    assert told.pop('provenance')['package_version'] == pd.__version__
+    assert told == figures
 
 
 def test_inputs_show_themselves_shortly(film, campaign):
