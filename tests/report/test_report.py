@@ -302,7 +302,7 @@ VISITOR = """<script>
   const count = document.querySelectorAll(buttons).length;
   for (let k = 0; k < count; ++k) {
     document.querySelectorAll(buttons)[k].click();
-    await rest(200);
+    await rest(1500);
   }
   root.dataset.pressed = count;
   const titles = document.querySelectorAll('#part figcaption');
@@ -315,8 +315,8 @@ VISITOR = """<script>
 
   document.querySelector('#section-lines button').click();
   await rest(500);
-  const [line, ...others] = document.getElementById('section').data.reverse();
-  const curve = others.find(trace => trace.line.width === 3);
+  const [line, ...others] = [...document.getElementById('section').data].reverse();
+  const curve = others.find(trace => trace.line.width === 3.5);
   const off = line.x.map((x, k) => {
     const near = curve.x.map((at, n) => [Math.abs(at - x), curve.y[n]]).filter(e => e[1] !== null);
     return [line.y[k], line.y[k] - near.sort((a, b) => a[0] - b[0])[0][1]];

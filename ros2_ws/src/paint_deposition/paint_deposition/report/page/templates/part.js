@@ -32,6 +32,17 @@ const partViewer = async () => {
     }
   };
 
+  // One change after the other: a plot that is being drawn takes no second one. Of changes that wait
+  // only one of each kind is done, with the values of that moment.
+  let last = Promise.resolve();
+  const waiting = new Set();
+  const inTurn = work => {
+    if (waiting.has(work)) return;
+    waiting.add(work);
+    last = last.then(() => { waiting.delete(work); return work(); })
+      .catch(error => page.failed('part', error));
+  };
+
   const chosen = () => scene.views.find(each => each.key === view);
   const shown = trace => !trace.views || trace.views.includes(view)
     && (!trace.passes || passBox.checked);
@@ -44,14 +55,15 @@ const partViewer = async () => {
     chosen().titles.forEach((text, k) => { panes.children[k].firstChild.textContent = text; });
     buttons(viewSwitch, scene.views.map(each => [each.key, each.label]), view, key => {
       view = key;
-      refresh();
+      inTurn(refresh);
     });
     if (partSwitch) {
       buttons(partSwitch, content.scenes.map(each => [each.name, each.name]), scene.name,
-        name => { scene = content.scenes.find(each => each.name === name); show(); });
+        name => { scene = content.scenes.find(each => each.name === name); inTurn(show); });
     }
   };
   const refresh = () => {
+    if (plots.length !== scene.panes.length) return show();
     label();
     return Promise.all(plots.map((plot, k) =>
       Plotly.update(plot, {visible: allTraces(k).map(shown)}, bars())));
@@ -115,7 +127,7 @@ const partViewer = async () => {
       return drawSection();
     };
     const known = scene.readings.lines;
-    buttons(lines, known.map((line, k) => [k, line.label]), null, k => through(known[k]));
+    buttons(lines, known.map((line, k) => [k, line.label]), null, k => inTurn(() => through(known[k])));
     await through(known[0] || {angle: 0, offset: 0});
     await moveGun();
   };
@@ -175,9 +187,9 @@ const partViewer = async () => {
     const centre = values(scene.plane.centre), readings = scene.readings;
     const near = [...values(readings.measured).keys()].filter(k =>
       Math.abs(dot(xyz(readings, k), across) - dot(centre, across) - place) < NEAR_M);
-    const last = films.length - 1;
+    const bold = films.length - 1;
     const data = found.films.map((film, k) => ({
-      type: 'scatter', mode: 'lines', x: found.at, y: film, hoverinfo: k === last ? 'x+y' : 'skip',
+      type: 'scatter', mode: 'lines', x: found.at, y: film, hoverinfo: k === bold ? 'x+y' : 'skip',
       line: scene.lines[k],
     })).reverse();
     data.push({
@@ -210,11 +222,11 @@ const partViewer = async () => {
   for (const slider of [angle, offset]) {
     slider.addEventListener('input', () => {
       if (slider === angle) setOffsetRange();
-      drawSection();
+      inTurn(drawSection);
     });
   }
-  way.addEventListener('input', moveGun);
-  passBox.addEventListener('change', refresh);
+  way.addEventListener('input', () => inTurn(moveGun));
+  passBox.addEventListener('change', () => inTurn(refresh));
   at('film-csv').addEventListener('click', () => {
     const {x, y, z} = scene.geometry.vertices;
     const films = scene.panes.map(pane =>
@@ -223,7 +235,8 @@ const partViewer = async () => {
       [...xyz({x, y, z}, k).map(value => value.toFixed(5)), ...films.map(f => f[k].toFixed(3))]);
     download(`film_${scene.name}.csv`, [['x_m', 'y_m', 'z_m', ...scene.films], ...rows].join('\n') + '\n');
   });
-  await show();
+  inTurn(show);
+  await last;
 };
 
 (async () => {
