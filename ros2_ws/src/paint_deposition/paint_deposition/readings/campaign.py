@@ -10,6 +10,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.readings.off_surface import off_surface_hint
 from paint_deposition.readings.outliers import left_out_lines
 from paint_deposition.readings.readings import PointMeans, Readings
 
@@ -69,7 +70,7 @@ class Experiment:
         normals = None if readings.normals is None else readings.normals[means.first]
         positions = readings.positions_m[means.first]
         place = surface.locate(positions, normals)
-        _refuse_far(readings, means, place.distance_m)
+        _refuse_far(surface, readings, means, place.distance_m)
         if normals is not None:
             _refuse_other_side(readings, means, place.angle_rad)
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
@@ -107,6 +108,19 @@ class Experiment:
     def measured_points(self) -> SurfacePoints:
         """The P measured points without the stencils."""
         return self.points.select(slice(0, len(self)))
+
+    @cached_property
+    def off_surface_m(self) -> np.ndarray:
+        """(P,) how far each point was moved onto the surface [m]."""
+        taken = self.readings.positions_m[self.means.first]
+        return np.linalg.norm(taken - self.measured_points.positions_m, axis=1)
+
+    @property
+    def understood(self) -> str:
+        """How the readings were read and how far off the surface they were, in one line."""
+        median, largest = 1e3 * np.median(self.off_surface_m), 1e3 * self.off_surface_m.max()
+        moved = f'moved onto the surface by {median:.1f} mm (median), {largest:.1f} mm at most'
+        return f'{self.readings.understood or self.readings.source}; {moved}'
 
     @property
     def groups(self) -> np.ndarray:
@@ -194,7 +208,9 @@ class Campaign:
         )
 
 
-def _refuse_far(readings: Readings, means: PointMeans, distance_m: np.ndarray) -> None:
+def _refuse_far(
+    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
+) -> None:
     far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
     if not len(far):
         return
@@ -203,7 +219,7 @@ def _refuse_far(readings: Readings, means: PointMeans, distance_m: np.ndarray) -
     raise ReadingsError(
         f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
         f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
-        f'm (limit {MAX_DISTANCE_M:g}); give positions in the mesh frame, in metres'
+        f'm (limit {MAX_DISTANCE_M:g}); {off_surface_hint(surface, readings.positions_m)}'
     )
 
 

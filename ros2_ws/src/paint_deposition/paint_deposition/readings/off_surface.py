@@ -1,0 +1,42 @@
+"""Why points lie off a part: another unit, another frame, or single wrong points."""
+
+import numpy as np
+
+from paint_deposition.part.surface import Surface
+
+# Ways in which a file may have been meant, by the factor on its positions.
+OTHER_UNITS = {
+    0.001: 'they fit in millimetres: the file says metres, or the unit is wrong',
+    1000.0: 'they fit in metres: the file says millimetres, or the unit is wrong',
+    0.0254: 'they fit in inches',
+}
+NEAR_M = 0.02
+# Boxes whose sides agree this well are the same part at another place.
+ALIKE = 0.25
+
+
+def off_surface_hint(surface: Surface, positions_m: np.ndarray) -> str:
+    """Both bounding boxes and the likely cause, in one line.
+
+    Args:
+        surface: the part.
+        positions_m: (N, 3) of the readings [m].
+    """
+    vertices = surface.vertices_m
+    boxes = f'the readings span {_box_words(positions_m)} m and the part {_box_words(vertices)} m'
+    for factor, words in OTHER_UNITS.items():
+        if np.median(surface.locate(factor * positions_m).distance_m) < NEAR_M:
+            return f'{boxes}; {words}'
+    distance = surface.locate(positions_m).distance_m
+    if np.median(distance) < NEAR_M:
+        return f'{boxes}; most points lie on the part: check these'
+    extents = np.ptp(positions_m, axis=0), np.ptp(vertices, axis=0)
+    fits = bool((np.sort(extents[0]) <= (1.0 + ALIKE) * np.sort(extents[1]) + NEAR_M).all())
+    if fits:
+        return f'{boxes}; they look like positions in another frame: give them in the mesh frame'
+    return f'{boxes}; give positions in the mesh frame, in metres, or name their unit with unit:'
+
+
+def _box_words(points_m: np.ndarray) -> str:
+    low, high = points_m.min(axis=0), points_m.max(axis=0)
+    return ' x '.join(f'{a:.3g} to {b:.3g}' for a, b in zip(low, high, strict=True))
