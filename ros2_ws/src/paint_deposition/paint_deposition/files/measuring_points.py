@@ -52,8 +52,8 @@ class MeasuringPoints:
             other = first.setdefault(label, row)
             if not label:
                 table.complaints.at(table.lines[row], 'the point has no label')
-            elif other != row:
-                same = f"point '{label}' is in line {table.lines[other]} already"
+            elif not np.array_equal(positions[row], positions[other]):
+                same = f"point '{label}' is elsewhere in line {table.lines[other]}"
                 table.complaints.at(table.lines[row], f'{same}; keep one')
         table.complaints.refuse_any()
         words = f'{place_words} of {len(labels)} points in {path.name} ({table.form})'

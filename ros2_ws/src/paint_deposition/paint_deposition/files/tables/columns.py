@@ -71,24 +71,39 @@ class Columns:
     @property
     def score(self) -> int:
         """How much is known: of two ways to read a file the one that knows more is right."""
-        return len(self.at) + 2 * ('thickness' in self.at) + 4 * self.own
+        labels = len(set(self.at) - {'unit'})
+        return labels + 2 * ('thickness' in self.at) + 2 * self.is_thickness_named + 100 * self.own
+
+    @property
+    def is_thickness_named(self) -> bool:
+        """Whether a heading says thickness, not value or µm alone."""
+        return any(trade.is_thickness(trade.words_of(self.headings[k])) for k in self.repeats)
 
 
 def find_columns(sheet: Sheet, layout: Layout) -> Columns | None:
     """The columns under the row of headings that says most; None where no row says anything."""
     if layout.columns and all(isinstance(name, int) for name in layout.columns.values()):
         return _numbered(sheet, layout)
-    best = None
-    for comments in (False, True):
-        for row in range(min(len(sheet.rows), MOST_LINES_ABOVE)):
-            if is_comment(sheet.rows[row]) != comments:
-                continue
-            found = _columns(sheet, row, layout)
-            if found and (best is None or found.score > best.score):
-                best = found
-        if best is not None and ('thickness' in best.at or best.has_place):
-            return best
-    return best
+    found = [
+        columns
+        for row in range(min(len(sheet.rows), MOST_LINES_ABOVE))
+        if (columns := _columns(sheet, row, layout)) is not None
+    ]
+    # '#' alone is a heading over numbers; a commented line only heads a table without another.
+    plain = [c for c in found if not is_comment(sheet.rows[c.header]) or c.headings[0] == '#']
+    if not any('thickness' in columns.at or columns.has_place for columns in plain):
+        plain = found
+    return max(plain, key=lambda columns: columns.score, default=None)
+
+
+def unheaded_points(sheet: Sheet) -> Columns | None:
+    """The columns of a list without headings: label, x, y, z and perhaps the normal, in order."""
+    rows = [row for row in sheet.rows if not is_comment(row)]
+    widths = {len(row) for row in rows}
+    if widths not in ({4}, {7}) or not all(is_value(cell) for row in rows for cell in row[1:]):
+        return None
+    names = ('point', *AXES, *NORMALS)[: widths.pop()]
+    return Columns(-1, 0, {name: k for k, name in enumerate(names)}, (), list(names), {})
 
 
 def is_comment(row: list[Cell]) -> bool:
@@ -127,7 +142,8 @@ def _columns(sheet: Sheet, row: int, layout: Layout) -> Columns | None:
     units_row = _units_row(below[0], headings) if below else {}
     parts = [(words, units_row.get(k, unit)) for k, (words, unit) in enumerate(parts)]
     filled = {k for r in below for k, cell in enumerate(r) if is_value(cell)}
-    at = _places(parts, filled) | _labels(parts)
+    at = {q: headings.index(OWN[q]) for q in ('session', 'sigma') if OWN[q] in headings}
+    at |= _places(parts, filled) | _labels(parts, below)
     at |= {q: column for q, column in named.items() if column is not None}
     taken = {column for quantity, column in at.items() if quantity != 'unit'}
     repeats, rivals = _thickness(headings, parts, filled - taken)
@@ -214,25 +230,27 @@ def _only(parts: list[Part], filled: set[int], letter: str) -> int | None:
     return None
 
 
-def _labels(parts: list[Part]) -> dict[str, int]:
+def _labels(parts: list[Part], below: list[list[Cell]]) -> dict[str, int]:
     """Columns of the point, the group and the unit."""
-    at = {}
-    ranked = []
+    at, ranked = {}, []
     for column, (words, _) in enumerate(parts):
         known = set(words)
         if not known:
             continue
-        if known & trade.POINT and known <= trade.POINT | trade.BESIDE_POINT:
-            ranked.append((0, column))
-        elif known & trade.RUNNING_NUMBER and known <= trade.BESIDE_POINT:
-            ranked.append((1, column))
         if known <= trade.UNIT:
             at['unit'] = column
-        if known <= trade.GROUP:
+        elif known <= trade.GROUP:
             at['group'] = column
+        elif known & trade.POINT and known <= trade.POINT | trade.BESIDE_POINT:
+            ranked.append((0, column))
+        elif known & trade.RUNNING_NUMBER and known <= trade.BESIDE_POINT:
+            # Running numbers count readings, not points; other labels tell the points apart.
+            labels = {text_of(row[column]) for row in below if column < len(row)} - {''}
+            named = len(labels) > 1 and not any(label.isdigit() for label in labels)
+            ranked.append((1 if named else 2, column))
     if ranked:
         rank, column = min(ranked)
-        at['point' if rank == 0 else 'number'] = column
+        at['point' if rank < 2 else 'number'] = column
     return at
 
 

@@ -11,6 +11,7 @@ from paint_deposition.files.tables.columns import (
     Layout,
     find_columns,
     is_comment,
+    unheaded_points,
 )
 from paint_deposition.files.tables.complaints import Complaints
 from paint_deposition.files.tables.rows import numbers_among, sorted_rows
@@ -44,7 +45,8 @@ def read_table(path: Path, needs: str, layout: Layout) -> Table:
         raise complaints.of_file('no readings below the header')
     width = len(columns.headings)
     cells = [[*sheet.rows[k][:width], *[''] * (width - len(sheet.rows[k]))] for k in rows.kept]
-    form = sheet.form + (', decimal comma' if decimals.mark == ',' else '')
+    form = sheet.form + ('' if columns.header >= 0 else ', no headings')
+    form += ', decimal comma' if decimals.mark == ',' else ''
     return Table(
         path, columns, cells, [sheet.lines[k] for k in rows.kept], form, rows.left_out_words,
         decimals, layout, _film_unit_above(sheet, columns), complaints,
@@ -62,37 +64,41 @@ def _sheet_and_columns(
             raise complaints.of_file(f"there is no sheet '{layout.sheet}' (there are: {there})")
         sheets = named
     found = [(sheet, find_columns(sheet, layout)) for sheet in sheets]
-    fitting = [
-        (sheet, columns)
-        for sheet, columns in found
-        if columns is not None
-        and ('thickness' in columns.at if needs == 'thickness' else columns.has_place)
-    ]
-    if not fitting:
-        raise complaints.of_file(_no_table(found, needs, layout))
-    best = max(fitting, key=_likelihood)
-    alike = [s.form for s, columns in fitting if columns.score == best[1].score]
+    if needs == 'place' and not any(columns and columns.has_place for _, columns in found):
+        found += [(sheet, unheaded_points(sheet)) for sheet in sheets]
+    known = [(sheet, columns) for sheet, columns in found if columns is not None]
+    best = max(known, key=lambda pair: _likelihood(*pair, needs), default=None)
+    if best is None or not _fits(best[1], needs):
+        raise complaints.of_file(
+            _no_table(sheets, None if best is None else best[1], needs, layout)
+        )
+    alike = [s.form for s, c in known if _fits(c, needs) and c.score == best[1].score]
     if len(alike) > 1 and best[0].form.startswith('sheet'):
         raise complaints.of_file(f'there are readings in {" and ".join(alike)}; name one, sheet:')
     return best
 
 
-def _likelihood(pair: tuple[Sheet, Columns]) -> tuple[bool, int, int]:
+def _fits(columns: Columns, needs: str) -> bool:
+    return 'thickness' in columns.at if needs == 'thickness' else columns.has_place
+
+
+def _likelihood(sheet: Sheet, columns: Columns, needs: str) -> tuple[int | bool, ...]:
     """Orders ways to read a file: blanks may stand within a cell, so they separate last."""
-    sheet, columns = pair
-    return not sheet.form.startswith('blanks'), columns.score, len(columns.headings)
+    blanks = sheet.form.startswith('blanks')
+    serves = _fits(columns, needs) or (needs == 'thickness' and bool(columns.rivals))
+    return serves, not blanks, columns.score, len(columns.headings)
 
 
-def _no_table(found: list[tuple[Sheet, Columns | None]], needs: str, layout: Layout) -> str:
+def _no_table(sheets: list[Sheet], best: Columns | None, needs: str, layout: Layout) -> str:
     """Why no sheet serves, and what to do."""
-    best = max((c for _, c in found if c is not None), key=lambda c: c.score, default=None)
     if best is not None and best.rivals and needs == 'thickness':
         rivals = ', '.join(f"'{heading}'" for heading in best.rivals)
         return f'the thickness may be in {rivals}; name one, columns: {{thickness: ...}}'
-    rows = [row for sheet, _ in found for row in sheet.rows if not is_comment(row)]
+    rows = [row for sheet in sheets for row in sheet.rows if not is_comment(row)]
     if not rows:
         return 'there is nothing to read in it; give a table with a heading over each column'
-    headings = [text_of(c) for c in rows[0]] if best is None else best.headings
+    widest = max((sheet.rows[0] for sheet in sheets if sheet.rows), key=len)
+    headings = [text_of(cell) for cell in widest] if best is None else best.headings
     shown = f'(columns: {", ".join(repr(heading) for heading in headings if heading) or "none"})'
     for quantity, name in layout.columns.items():
         if isinstance(name, str) and name not in headings:

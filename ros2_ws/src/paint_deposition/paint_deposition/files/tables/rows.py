@@ -100,17 +100,15 @@ def _statistics(rows: dict[int, list[Cell]], columns: Columns) -> set[int]:
     for ways in (order, order[::-1]):
         inside = False
         for k in ways:
-            # A letter alone, n or s, is a statistic beside others; elsewhere it is a point.
-            inside = k in found or (inside and _is_letter(rows[k]))
+            inside = k in found or (inside and _may_be_statistic(rows[k], columns))
             if inside:
                 found.add(k)
     return found
 
 
 def _is_statistic(row: list[Cell], columns: Columns) -> bool:
-    text = _first_text(row)
-    place = [columns.at[q] for q in (*AXES, *ON_FACE) if q in columns.at]
-    if is_value(text) or (place and all(c < len(row) and is_value(row[c]) for c in place)):
+    text, place = _first_text(row), _place(row, columns)
+    if is_value(text) or (place and all(map(is_value, place))):
         return False
     words, _ = trade.split_unit(text.partition('=')[0].partition(':')[0])
     if '=' in text and len(words) == 1 and words[0] in trade.STATISTICS_LETTERS:
@@ -120,9 +118,18 @@ def _is_statistic(row: list[Cell], columns: Columns) -> bool:
     return bool(known & trade.STATISTICS) and known <= beside
 
 
-def _is_letter(row: list[Cell]) -> bool:
-    words = trade.words_of(_first_text(row))
-    return len(words) == 1 and words[0] in trade.STATISTICS_LETTERS
+def _may_be_statistic(row: list[Cell], columns: Columns) -> bool:
+    """Beside other statistics a lone letter, n or s, is one, and a text without a place."""
+    text, place = _first_text(row), _place(row, columns)
+    words = trade.words_of(text)
+    if len(words) == 1 and words[0] in trade.STATISTICS_LETTERS:
+        return True
+    return bool(place) and not is_value(text) and all(cell == '' for cell in place)
+
+
+def _place(row: list[Cell], columns: Columns) -> list[Cell]:
+    at = [columns.at[q] for q in (*AXES, *ON_FACE) if q in columns.at]
+    return [row[k] if k < len(row) else '' for k in at]
 
 
 def _first_text(row: list[Cell]) -> str:

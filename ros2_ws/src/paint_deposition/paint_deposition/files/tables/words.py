@@ -75,7 +75,8 @@ STATISTICS = MEANS | {
     'cv', 'range', 'spannweite', 'median', 'count', 'anzahl', 'nombre', 'numero', 'total', 'sum',
     'summe', 'lowest', 'highest', 'low', 'high', 'cp', 'cpk', 'ndft', 'statistics', 'statistik',
     'statistiques', 'statistica', 'ecart', 'type', 'deviazione', 'desviacion', 'estandar',
-    'scarto', 'kleinster', 'grosster', 'limit', 'limits', 'usl', 'lsl', 'abw', 'summary',
+    'scarto', 'readings', 'messungen', 'kleinster', 'grosster', 'limit', 'limits',
+    'usl', 'lsl', 'abw', 'summary',
 }  # fmt: skip
 BESIDE_STATISTICS = THICKNESS | VALUES | RUNNING_NUMBER | {
     'of', 'thickness', 'schichtdicke', 'value', 'upper', 'lower', 'dev', 'batch', 'all', 'de',
