@@ -54,6 +54,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output)
+    say_all('warning', comparison.warnings)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
 
