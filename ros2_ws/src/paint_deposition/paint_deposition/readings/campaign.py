@@ -13,6 +13,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.readings.off_surface import off_surface_hint
 from paint_deposition.readings.outliers import left_out_lines
 from paint_deposition.readings.readings import PointMeans, Readings
+from paint_deposition.readings.rows_and_columns import columns_or_rows
 
 # Readings further from the surface, or facing more away from it, do not belong to the part.
 MAX_DISTANCE_M = 0.02
@@ -61,7 +62,7 @@ class Experiment:
         settings: Mapping[str, float] | None = None,
         switched_off: frozenset[str] = frozenset(),
     ) -> 'Experiment':
-        """Match readings to the surface.
+        """Match readings to the surface; those without groups get the rows or columns found.
 
         Raises:
             ReadingsError: readings too far off the surface or on its other side.
@@ -74,6 +75,9 @@ class Experiment:
         if normals is not None:
             _refuse_other_side(readings, means, place.angle_rad)
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
+        if not readings.group.astype(bool).any():
+            lines = columns_or_rows(surface, path, place.positions_m)
+            readings = replace(readings, group=lines[means.owner])
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
             name, surface, path, readings, means, points, readings, used, files or {},

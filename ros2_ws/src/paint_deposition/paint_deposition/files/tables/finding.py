@@ -67,7 +67,7 @@ def _sheet_and_columns(
     if needs == 'place' and not any(columns and columns.has_place for _, columns in found):
         found += [(sheet, unheaded_points(sheet)) for sheet in sheets]
     known = [(sheet, columns) for sheet, columns in found if columns is not None]
-    best = max(known, key=lambda pair: _likelihood(*pair, needs), default=None)
+    best = max(known, key=lambda pair: _likelihood(pair[0], pair[1], needs), default=None)
     if best is None or not _fits(best[1], needs):
         raise complaints.of_file(
             _no_table(sheets, None if best is None else best[1], needs, layout)
