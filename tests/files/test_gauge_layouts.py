@@ -117,7 +117,7 @@ def test_elcometer(file):
     require_the_four_readings(readings)
     assert readings.understood == (
         "batch.csv: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from 'Reading'; "
-        'left out: 1 rows without a reading, 7 rows of statistics'
+        'left out: 1 row without a reading, 7 rows of statistics'
     )
 
 

@@ -120,7 +120,7 @@ def places_of(table: Table, surface: Surface | None) -> tuple[np.ndarray, np.nda
         )
     raise table.complaints.of_file(
         f'the readings have no coordinates (columns: {shown}); give x, y, z, or a list of '
-        'measuring points with points:'
+        'measuring points (points: in a campaign, --points with simulate)'
     )
 
 

@@ -72,7 +72,8 @@ class Columns:
     def score(self) -> int:
         """How much is known: of two ways to read a file the one that knows more is right."""
         labels = len(set(self.at) - {'unit'})
-        return labels + 2 * ('thickness' in self.at) + 2 * self.is_thickness_named + 100 * self.own
+        film = 2 * ('thickness' in self.at) + 3 * bool(self.rivals)
+        return labels + film + 2 * self.is_thickness_named + 100 * self.own
 
     @property
     def is_thickness_named(self) -> bool:
@@ -146,7 +147,10 @@ def _columns(sheet: Sheet, row: int, layout: Layout) -> Columns | None:
     at |= _places(parts, filled) | _labels(parts, below)
     at |= {q: column for q, column in named.items() if column is not None}
     taken = {column for quantity, column in at.items() if quantity != 'unit'}
-    repeats, rivals = _thickness(headings, parts, filled - taken)
+    running = {k for k in filled if _is_running(below, k)}
+    repeats, rivals = _thickness(headings, parts, filled - taken - running)
+    if not repeats and not rivals:
+        repeats, rivals = _thickness(headings, parts, filled - taken)
     if 'thickness' in named:
         repeats, rivals = (at['thickness'],), ()
     elif repeats:
@@ -155,6 +159,12 @@ def _columns(sheet: Sheet, row: int, layout: Layout) -> Columns | None:
         return None
     units = {q: unit for q, column in at.items() if (unit := parts[column][1])}
     return Columns(row, row + (2 if units_row else 1), at, repeats, headings, units, rivals=rivals)
+
+
+def _is_running(rows: list[list[Cell]], column: int) -> bool:
+    """Whether a column counts its rows: 1, 2, 3."""
+    cells = [text_of(row[column]) for row in rows[:2] if column < len(row)]
+    return cells == ['1', '2']
 
 
 def _named(name: str | int, headings: list[str]) -> int | None:
@@ -243,7 +253,9 @@ def _labels(parts: list[Part], below: list[list[Cell]]) -> dict[str, int]:
             at['group'] = column
         elif known & trade.POINT and known <= trade.POINT | trade.BESIDE_POINT:
             ranked.append((0, column))
-        elif known & trade.RUNNING_NUMBER and known <= trade.BESIDE_POINT:
+        elif known <= trade.BESIDE_POINT and (
+            known & trade.RUNNING_NUMBER or _is_running(below, column)
+        ):
             # Running numbers count readings, not points; other labels tell the points apart.
             labels = {text_of(row[column]) for row in below if column < len(row)} - {''}
             named = len(labels) > 1 and not any(label.isdigit() for label in labels)
@@ -281,6 +293,10 @@ def _thickness_rank(words: list[str], unit: float | None) -> int | None:
         return 2 if named or unit else None
     if named:
         return 0
-    if known & trade.VALUES or unit in trade.FILM_UNITS[:2]:
+    if (
+        known & trade.VALUES
+        or any(map(trade.REPEAT.fullmatch, words))
+        or unit in trade.FILM_UNITS[:2]
+    ):
         return 1
     return None

@@ -49,7 +49,7 @@ def read_table(path: Path, needs: str, layout: Layout) -> Table:
     form += ', decimal comma' if decimals.mark == ',' else ''
     return Table(
         path, columns, cells, [sheet.lines[k] for k in rows.kept], form, rows.left_out_words,
-        decimals, layout, _film_unit_above(sheet, columns), complaints,
+        decimals, layout, _units_above(sheet, columns), complaints,
     )  # fmt: skip
 
 
@@ -107,17 +107,22 @@ def _no_table(sheets: list[Sheet], best: Columns | None, needs: str, layout: Lay
     if needs == 'thickness':
         return (
             f'no column with numbers is known as the thickness {shown}; call it thickness, or '
-            'name it with columns: {thickness: ...}'
+            'give its heading or number with columns: {thickness: ...}'
         )
     return f'no columns with numbers are known as x, y, z, or from_left, height {shown}'
 
 
-def _film_unit_above(sheet: Sheet, columns: Columns) -> float | None:
-    """The unit of the thickness where a line above the table tells it: 'Units: mils'."""
+def _units_above(sheet: Sheet, columns: Columns) -> dict[str, float]:
+    """Units that lines above the table tell: 'Units: mils', or 'Position [mm]' over x, y, z."""
+    told = {}
     for row in sheet.rows[: max(columns.header, 0)]:
         cells = [part for cell in row for part in text_of(cell).split(':')]
         for name, value in pairwise(cells):
             known, unit = set(trade.words_of(name)), trade.unit_of(value)
-            if known and known <= trade.UNIT and unit in trade.FILM_UNITS:
-                return unit
-    return None
+            if unit and known and known <= trade.UNIT:
+                told['thickness' if unit in trade.FILM_UNITS[:2] else 'position'] = unit
+    for cell in sheet.rows[columns.header - 1] if columns.header > 0 else []:
+        words, unit = trade.split_unit(text_of(cell))
+        if unit and unit in trade.LENGTH_UNITS and set(words) & trade.BESIDE_AXIS:
+            told['position'] = unit
+    return told

@@ -34,13 +34,9 @@ class Rows:
     @property
     def left_out_words(self) -> str:
         """What was not taken for a reading, for the user."""
-        parts = []
-        if self.blank:
-            parts.append(f'{self.blank} rows without a reading')
-        if self.statistics:
-            parts.append(f'{self.statistics} rows of statistics')
-        if self.other:
-            parts.append(f'{self.other} other rows')
+        kinds = {'without a reading': self.blank, 'of statistics': self.statistics}
+        kinds['of other text'] = self.other
+        parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in kinds.items() if n]
         return f'left out: {", ".join(parts)}' if parts else ''
 
 

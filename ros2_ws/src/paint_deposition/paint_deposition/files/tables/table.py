@@ -29,7 +29,7 @@ class Table:
         left_out: what was not taken for a row, for the user.
         decimals: how numbers are written.
         layout: what the user said of it.
-        film_unit_m: metres in the unit of the thickness where a line above the table tells it.
+        units_above: metres in the unit of 'position' and 'thickness' where lines above tell it.
         complaints: gathered while values are taken.
     """
 
@@ -41,7 +41,7 @@ class Table:
     left_out: str
     decimals: Decimals
     layout: Layout
-    film_unit_m: float | None
+    units_above: dict[str, float]
     complaints: Complaints
 
     def __len__(self) -> int:
@@ -95,9 +95,10 @@ class Table:
         return values, behind
 
     def unit_m(self, quantity: str) -> float | None:
-        """Metres in the unit of a column where the user or its heading tells it."""
+        """Metres in the unit of a column where the user, its heading or a line above it tells."""
         kind = 'position' if quantity in LENGTHS else 'thickness'
-        return self.layout.unit.get(kind, self.columns.units.get(quantity))
+        of_heading = self.columns.units.get(quantity, self.units_above.get(kind))
+        return self.layout.unit.get(kind, of_heading)
 
     def complain(self, row: int, text: str) -> None:
         """Note what is wrong in a row."""
@@ -126,8 +127,8 @@ class Table:
             largest = float(np.nanmax(np.abs(values), initial=0.0))
             unit = 1e-3 if largest > LARGEST_PART_M else 1.0
             how = f' (no unit is given; the largest is {largest:.4g})'
-        # A division by 1000 gives the same number as the text in metres does.
-        metres = values if unit == 1.0 else values / round(1.0 / unit, 9)
+        # A division by 1000 comes nearer to the text than a product with 0.001.
+        metres = values / round(1.0 / unit) if unit in (1.0, 1e-2, 1e-3) else values * unit
         return metres, f'{", ".join(quantities)} in {trade.UNIT_NAMES[unit]}{how}'
 
     def films_um(self) -> tuple[np.ndarray, np.ndarray, str]:
@@ -148,7 +149,7 @@ class Table:
         else:
             beside = self._units_beside()[row]
             units = np.where(np.isnan(units), beside, units)
-        common = self.unit_m('thickness') or self.film_unit_m
+        common = self.unit_m('thickness')
         untold = common is None and bool(np.isnan(units).any())
         units = np.where(np.isnan(units), common or 1e-6, units)
         factor = np.round(units * 1e6, 9)

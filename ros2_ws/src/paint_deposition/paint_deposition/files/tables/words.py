@@ -33,6 +33,8 @@ VALUES = {
     'valore', 'medida', 'lectura', 'valor', 'meting', 'waarde', 'd',
 }  # fmt: skip
 MEANS = {'mean', 'average', 'avg', 'mittelwert', 'mittel', 'mw', 'moyenne', 'media', 'gemiddelde'}
+# Repeats side by side: R1, R2, R3.
+REPEAT = re.compile(r'[rmdv]\d+')
 # What stands beside a thickness without being one.
 LIMITS = {
     'min', 'max', 'minimum', 'maximum', 'std', 'stdev', 'sd', 'stdabw', 'standardabweichung',
@@ -60,7 +62,7 @@ OTHER_SIDE = {'right', 'rechts', 'droite', 'destra', 'derecha', 'top', 'oben', '
 POINT = {
     'point', 'points', 'punkt', 'messpunkt', 'messpunkte', 'messstelle', 'stelle', 'spot',
     'location', 'messort', 'ort', 'position', 'pos', 'label', 'bezeichnung', 'punto', 'mp', 'pt',
-    'feature', 'merkmal', 'element', 'meetpunt',
+    '点', '测点', '測定点', 'feature', 'merkmal', 'element', 'meetpunt',
 }  # fmt: skip
 RUNNING_NUMBER = {'no', 'nr', 'num', 'number', 'nummer', 'numero', '#', 'id', 'name', 'n', 'index'}
 BESIDE_POINT = RUNNING_NUMBER | VALUES | {
@@ -75,11 +77,11 @@ STATISTICS = MEANS | {
     'cv', 'range', 'spannweite', 'median', 'count', 'anzahl', 'nombre', 'numero', 'total', 'sum',
     'summe', 'lowest', 'highest', 'low', 'high', 'cp', 'cpk', 'ndft', 'statistics', 'statistik',
     'statistiques', 'statistica', 'ecart', 'type', 'deviazione', 'desviacion', 'estandar',
-    'scarto', 'readings', 'messungen', 'kleinster', 'grosster', 'limit', 'limits',
-    'usl', 'lsl', 'abw', 'summary',
+    'scarto', 'quer', 'hi', 'lo', 'readings', 'messungen', 'kleinster', 'grosster', 'limit',
+    'limits', 'usl', 'lsl', 'abw', 'summary',
 }  # fmt: skip
 BESIDE_STATISTICS = THICKNESS | VALUES | RUNNING_NUMBER | {
-    'of', 'thickness', 'schichtdicke', 'value', 'upper', 'lower', 'dev', 'batch', 'all', 'de',
+    'x', 'of', 'thickness', 'schichtdicke', 'value', 'upper', 'lower', 'dev', 'batch', 'all', 'de',
     'dry',
 }  # fmt: skip
 STATISTICS_LETTERS = {'n', 's', 'r', 'v', 'x', 'σ', 'μ', 'xq', 'vk', 'q'}
