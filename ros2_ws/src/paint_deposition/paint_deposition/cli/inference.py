@@ -54,6 +54,7 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output)
+    say_all('note', data.understood)
     say_all('warning', comparison.warnings)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
@@ -106,6 +107,7 @@ def diagnose_command(
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('note', data.understood)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -143,6 +145,7 @@ def refit_command(
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_all('note', data.understood)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 

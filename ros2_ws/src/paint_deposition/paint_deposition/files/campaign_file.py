@@ -121,9 +121,7 @@ def _read_experiment(
     points = None if entry.points is None else folder / entry.points
     readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)
-    experiment = Experiment.of(name, surface, path, readings, files, trajectory.settings, off)
-    progress(f'{name}: {experiment.understood}')
-    return experiment
+    return Experiment.of(name, surface, path, readings, files, trajectory.settings, off)
 
 
 def _layout(entry: _Entry) -> Layout:

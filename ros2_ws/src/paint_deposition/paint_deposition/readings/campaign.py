@@ -203,6 +203,11 @@ class Campaign:
         return replace(self, experiments=tuple(kept))
 
     @property
+    def understood(self) -> tuple[str, ...]:
+        """How the readings of each experiment were read, a line each."""
+        return tuple(f'{e.name}: {e.understood}' for e in self.experiments)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
         return tuple(

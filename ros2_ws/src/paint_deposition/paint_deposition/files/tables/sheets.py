@@ -114,7 +114,8 @@ def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
             for name in workbook.sheet_names
         }
     except CalamineError as error:
-        raise ReadingsError(f'{path}: cannot be read as a workbook ({error})') from None
+        reason = ' '.join(str(error).split())
+        raise ReadingsError(f'{path}: cannot be read as a workbook ({reason})') from None
     return [
         Sheet.of(
             enumerate(([_cell(value) for value in row] for row in rows), 1), f"sheet '{name}'"
