@@ -13,7 +13,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.files.tables.columns import Layout
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.words import UNITS_M, words_of
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.part.facing import toward_the_gun

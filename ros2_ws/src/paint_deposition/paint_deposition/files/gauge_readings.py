@@ -9,8 +9,8 @@ import numpy as np
 
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.measuring_points import MeasuringPoints, places_of
-from paint_deposition.files.tables.columns import Layout
 from paint_deposition.files.tables.finding import read_table
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table
 from paint_deposition.part.surface import Surface

@@ -1,11 +1,11 @@
 """Which column of a sheet holds what, by its heading or as the user names it."""
 
 import re
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from typing import Any
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 from paint_deposition.files.tables import words as trade
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.sheets import Cell, Sheet, text_of
 
 OWN = {
@@ -20,23 +20,6 @@ NORMALS = ('nx', 'ny', 'nz')
 NUMBERS = (*LENGTHS, *NORMALS, 'thickness', 'sigma')
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What the user says of a table; what is left out is found.
-
-    Attributes:
-        columns: heading, or number from 1, of a quantity's column.
-        unit: metres in the unit of 'position' and of 'thickness'.
-        decimal: '.' or ',', or '' where it is to be found.
-        sheet: name of a workbook's sheet, or ''.
-    """
-
-    columns: Mapping[Any, str | int] = field(default_factory=dict)
-    unit: Mapping[Any, float] = field(default_factory=dict)
-    decimal: str = ''
-    sheet: str = ''
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,12 @@ from paint_deposition.files.tables import words as trade
 from paint_deposition.files.tables.columns import (
     NUMBERS,
     Columns,
-    Layout,
     find_columns,
     is_comment,
     unheaded_points,
 )
 from paint_deposition.files.tables.complaints import Complaints
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.rows import numbers_among, sorted_rows
 from paint_deposition.files.tables.sheets import Sheet, sheets_of, text_of
 from paint_deposition.files.tables.table import Table

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.files.tables import words as trade
-from paint_deposition.files.tables.columns import LENGTHS, Columns, Layout
+from paint_deposition.files.tables.columns import LENGTHS, Columns
 from paint_deposition.files.tables.complaints import Complaints
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.numbers import MARKS, Decimals, is_nothing
 from paint_deposition.files.tables.sheets import Cell, text_of
 
