@@ -10,7 +10,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.readings.off_surface import off_surface_hint
+from paint_deposition.readings.off_surface import lie_on_a_spot, off_surface_hint
 from paint_deposition.readings.outliers import left_out_lines
 from paint_deposition.readings.readings import PointMeans, Readings
 from paint_deposition.readings.rows_and_columns import columns_or_rows
@@ -222,6 +222,9 @@ def _refuse_far(
 ) -> None:
     far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
     if not len(far):
+        if lie_on_a_spot(surface, readings.positions_m):
+            hint = off_surface_hint(surface, readings.positions_m)
+            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
         return
     worst = far[np.argmax(distance_m[far])]
     where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
