@@ -98,7 +98,7 @@ def _separated(path: Path, text: str, separator: str) -> Iterator[tuple[int, lis
     reader = csv.reader(StringIO(text, newline=''), delimiter=separator)
     try:
         for row in reader:
-            yield reader.line_num, [cell.strip() for cell in row]
+            yield reader.line_num, [_in_one_line(cell) for cell in row]
     except csv.Error as error:
         reason = f'{path}: line {reader.line_num}: cannot be read as CSV text ({error})'
         raise ReadingsError(reason) from None
@@ -127,7 +127,11 @@ def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
 def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    return str(value).strip()
+    return _in_one_line(str(value))
+
+
+def _in_one_line(text: str) -> str:
+    return ' '.join(text.strip().splitlines())
 
 
 def text_of(cell: Cell) -> str:
