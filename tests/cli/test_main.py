@@ -9,6 +9,7 @@ import click
 import pytest
 
 import paint_deposition
+from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
@@ -64,12 +65,14 @@ def test_wrong_options_are_refused_in_a_line():
 
 
 @pytest.mark.slow
+@pytest.mark.slow
 def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
     pipe = tmp_path / 'readings.csv'
     os.mkfifo(pipe)
     process = subprocess.Popen(
-        ['paint', 'simulate', '--mesh', 'door.stl', '--trajectory', 'bag', '--at', str(pipe),
-         '-o', str(tmp_path / 'out')],
+        ['paint', 'simulate', '--mesh', SAMPLES / 'door.stl',
+         '--trajectory', SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
+         '--at', pipe, '-o', tmp_path / 'out'],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         # A shell starts what runs in its background deaf to interrupts, and so are its children.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),

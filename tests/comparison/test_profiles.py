@@ -1,5 +1,7 @@
 """Profiles along columns of readings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from paint_deposition.comparison.profiles import profiles_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.fitting.study import Study
+from paint_deposition.readings.campaign import Experiment
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
@@ -48,12 +51,31 @@ def test_single_passes_add_up_to_the_film(profiles):
         assert profile.passes_um.sum(axis=0) == pytest.approx(profile.lines_um[1], rel=1e-6)
 
 
-def test_readings_without_groups_fall_into_strips(tmp_path):
-    campaign = small_campaign(tmp_path, experiments=('door',), style='random')
-    study = Study.of(campaign)
+def test_readings_without_rows_or_columns_fall_into_strips_with_a_line(tmp_path):
+    """On a flat panel the passes leave the same film all along: at the middle of a strip, too."""
+    study = Study.of(small_campaign(tmp_path, experiments=('panel',), style='random'))
+    assert not any(study.campaign.readings.group)
     profiles = profiles_of(study, [DepositionModel()])
     rows = np.concatenate([p.rows for p in profiles])
     assert np.array_equal(np.sort(rows), np.arange(len(study)))
+    predicted = study.forward.predict_um(DepositionModel())
     for profile in profiles:
-        assert len(profile.line_m) == 0
         assert np.all(np.diff(profile.position_m) >= 0.0)
+        assert len(profile.line_m) > len(profile.rows)
+        middle = profile.lines_um[0][np.searchsorted(profile.line_m, profile.position_m)]
+        assert middle == pytest.approx(predicted[profile.rows], rel=0.03)
+
+
+def test_readings_whose_groups_are_lost_have_the_same_profiles(tmp_path):
+    named = Study.of(small_campaign(tmp_path, experiments=('panel',)))
+    (panel,) = named.campaign.experiments
+    lost = replace(panel.readings, group=np.full(len(panel.readings), ''))
+    again = Experiment.of(panel.name, panel.surface, panel.path, lost)
+    found = Study.of(replace(named.campaign, experiments=(again,)))
+    before, after = (
+        {tuple(p.rows): p.lines_um for p in profiles_of(study, [DepositionModel()])}
+        for study in (named, found)
+    )
+    assert before.keys() == after.keys()
+    for rows, lines_um in before.items():
+        assert after[rows] == pytest.approx(lines_um)

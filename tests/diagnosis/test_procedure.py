@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 from paint_deposition.comparison.comparison import compare
+from paint_deposition.diagnosis import procedure
+from paint_deposition.diagnosis.model_space import SURE
 from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.procedure import diagnose
 from paint_deposition.diagnosis.refit import refit
@@ -97,6 +99,27 @@ def test_a_wrong_footprint_is_not_blamed_on_physics(tmp_path):
     assert set(diagnosis.accepted) <= {'learned:footprint'}
     assert diagnosis.unknown.kind == 'footprint'
     assert 'eq. (1)' in diagnosis.reason
+
+
+def test_a_strong_effect_with_another_law_is_named_though_a_shapeless_cause_fits_better(
+    tmp_path, monkeypatch
+):
+    """A draught displaces droplets with the square of the way: a footprint follows that closely.
+
+    On one door sprayed one way a draught, a tilted gun and a shifted part look alike.
+    """
+    hidden = {'seed': 1, 'truth': 'air_drift~square', 'amplitude': 0.04, 'readings': 120}
+    campaign = small_campaign(tmp_path, **DOOR | hidden)
+    diagnosis = diagnose(campaign, DepositionModel(), EFFECTS)
+    assert diagnosis.verdict == 'effect_missing'
+    group = diagnosis.classes[0]
+    assert 'air_drift' in group.members
+    assert {EFFECTS[name].family for name in group.members} == {'lateral shift'}
+    assert group.probability > SURE
+    assert diagnosis.history[-1].rmse_um < 0.7 * diagnosis.history[0].rmse_um
+    monkeypatch.setattr(procedure, 'STRONG', np.inf)
+    closest = diagnose(campaign, DepositionModel(), EFFECTS)
+    assert closest.verdict == 'unknown_effect'
 
 
 def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):

@@ -103,7 +103,7 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'measurements': 'none.csv'}, "experiment 'door': .*none.csv: no such file"),
         ({'pose_topic': '/pose'}, "experiment 'door': .*/atomizer/pose"),
         ({'measurement': 'door.csv'}, "unknown key 'measurement'; did you mean 'measurements'"),
-        ({'speed': 1}, "experiment 1: unknown key 'speed'; there are: mesh, traj"),
+        ({'flux': 1}, "experiment 1: unknown key 'flux'; there are: mesh, traj"),
         ({'mesh_scale': 0}, 'mesh_scale is 0; expected a number above 0: metres per unit'),
         ({'mesh_scale': True}, 'mesh_scale is True; expected a number above 0'),
         (
@@ -114,6 +114,16 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'down': 'z'}, r"down is 'z'; expected \[x, y, z\]"),
         ({'down': [0, 0, float('nan')]}, r'down.2 is nan; expected \[x, y, z\]'),
         ({'down': [0, 0, 0]}, 'give the direction of gravity'),
+        (
+            {'columns': {'thick': 'DFT'}},
+            "columns.thick is 'thick'; expected the heading.* x, y, z",
+        ),
+        ({'columns': 'DFT'}, "columns is 'DFT'; expected the heading"),
+        ({'columns': {'thickness': 'DFT'}}, r"door\.csv: no column 'DFT' for thickness"),
+        ({'unit': {'thickness': 'inches'}}, "thickness is 'inches'; expected position: m, mm"),
+        ({'decimal': ';'}, "decimal is ';'; expected 'comma' or 'point'"),
+        ({'points': 'none.csv'}, r'none\.csv: no such file'),
+        ({'sheet': 'Messung'}, "there is no sheet 'Messung'"),
         ({'switched_off': ['light']}, r"switched_off.0 is 'light'; expected"),
         ({'top': {'models': 'm.yaml'}}, "campaign: unknown key 'models'; .* 'model'"),
         ({'top': {'model': 3}}, 'campaign: model is 3; expected the name of a model file'),
@@ -162,8 +172,53 @@ def test_readings_in_millimetres_are_refused_with_the_remedy(campaign, folder):
         return [str(1e3 * float(v)) if k in ('x_m', 'y_m', 'z_m') else v for k, v in row.items()]
 
     path = campaign(measurements=changed_readings(folder, in_millimetres))
-    with pytest.raises(PaintError, match=r"lie off the part's surface.*mesh frame, in metres"):
+    with pytest.raises(PaintError, match=r"lie off the part's surface.*they fit in millimetres"):
         read_campaign(path)
+    read = read_campaign(
+        campaign(
+            measurements=path.with_name('changed.csv').name,
+            columns={'x': 'x_m', 'y': 'y_m', 'z': 'z_m'},
+            unit={'position': 'mm'},
+        )
+    )
+    as_before = read_campaign(campaign()).experiments[0].readings
+    assert read.experiments[0].readings.positions_m == pytest.approx(as_before.positions_m)
+
+
+def test_readings_in_another_frame_are_refused_with_both_boxes(campaign, folder):
+    def moved(row):
+        return [str(3.0 + float(v)) if k in ('x_m', 'y_m') else v for k, v in row.items()]
+
+    path = campaign(measurements=changed_readings(folder, moved))
+    with pytest.raises(PaintError, match=r'readings span 2\.\d+ to .* the part -.* another frame'):
+        read_campaign(path)
+
+
+def test_readings_a_few_mm_off_are_moved_and_it_is_said(campaign, folder):
+    def off(row):
+        return [str(float(v) - 0.004) if k == 'y_m' else v for k, v in row.items()]
+
+    read = read_campaign(campaign(measurements=changed_readings(folder, off)))
+    (line,) = read.understood
+    assert line.startswith('door: changed.csv: ')
+    assert 'commas, UTF-8; x, y, z in m, thickness in µm; moved onto the surface by' in line
+    door = read.experiments[0]
+    assert 0.003 < np.median(door.off_surface_m) <= door.off_surface_m.max() < 0.0041
+    assert f'{1e3 * np.median(door.off_surface_m):.1f} mm (median)' in line
+
+
+def test_readings_join_their_listed_points(campaign, folder):
+    rows = [row.split(',') for row in (folder / 'door.csv').read_text().splitlines()]
+    at = {name: rows[0].index(name) for name in rows[0]}
+    film = ['Messpunkt;Schichtdicke [µm]']
+    film += [f'{r[at["point"]]};{r[at["thickness_um"]].replace(".", ",")}' for r in rows[1:]]
+    (folder / 'film.txt').write_bytes('\n'.join(film).encode('cp1252'))
+    read = read_campaign(campaign(measurements='film.txt', points='door.csv'))
+    as_before = read_campaign(campaign()).experiments[0].readings
+    joined = read.experiments[0].readings
+    assert joined.thickness_um.tolist() == as_before.thickness_um.tolist()
+    assert joined.positions_m.tolist() == as_before.positions_m.tolist()
+    assert joined.point.tolist() == as_before.point.tolist()
 
 
 def test_readings_off_the_surface_are_counted_and_the_worst_named(campaign, folder):

@@ -18,6 +18,7 @@ from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
+from paint_deposition.fitting.panel_reach import Reach, short_reaches
 from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
 
@@ -64,13 +65,15 @@ def compare(
     """
     model = model or _model_of(campaign)
     progress('fitting the pattern')
+    reaches: tuple[Reach, ...] = ()
     if model is None:
         study, fit = sifted(campaign, DepositionModel(), starts=STARTS)
         model = fit.model
+        reaches = short_reaches(study.campaign, model)
     else:
         study, _ = sifted(campaign, model, model.effects)
     progress('comparing')
-    return compared(study, model)
+    return replace(compared(study, model), warnings=tuple(map(str, reaches)))
 
 
 def compare_models(
@@ -122,7 +125,8 @@ def diagnose(
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
     start, known = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
-    return replace(found, library=library)
+    reaches = () if known else short_reaches(found.study.campaign, found.model)
+    return replace(found, library=library, remarks=(*found.remarks, *map(str, reaches)))
 
 
 def refit(

@@ -71,6 +71,8 @@ def compare_command(
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output, pictures=pictures)
+    say_all('note', data.understood)
+    say_all('warning', comparison.warnings)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
 
@@ -146,6 +148,7 @@ def diagnose_command(
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell, pictures)
+    say_all('note', data.understood)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -190,6 +193,7 @@ def refit_command(
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell, pictures)
+    say_all('note', data.understood)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 

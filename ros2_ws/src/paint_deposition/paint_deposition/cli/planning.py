@@ -92,6 +92,7 @@ def calibrate_command(
         tell('writing')
         files = write_results(result, output, start=start, pictures=pictures)
     if not as_json:
+        say_all('note', data.understood)
         say_all('warning', result.warnings)
     say_results(files, as_json, [*_calibration_lines(result), *file_lines(files)])
 

@@ -45,8 +45,13 @@ if TYPE_CHECKING:
 @output_option('film.ply, film.csv, stats.json and film.png')
 @click.option(
     '--at', 'readings_file', type=FILE,
-    help='Gauge readings, CSV: also write predicted.csv, their columns and predicted_um, what '
-    'the gauge should show at exactly those points: the film with effects on the gauge.',
+    help='Gauge readings, CSV or a workbook: also write predicted.csv, their columns and '
+    'predicted_um, what the gauge should show at exactly those points: the film with effects on '
+    'the gauge.',
+)  # fmt: skip
+@click.option(
+    '--points', 'points_file', type=FILE,
+    help='Measuring points, label and x, y, z, of readings that name their point only.',
 )  # fmt: skip
 @click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.')
 @click.option(
@@ -71,6 +76,7 @@ def simulate_command(
     model_file: Path | None,
     output: Path,
     readings_file: Path | None,
+    points_file: Path | None,
     pose_topic: str | None,
     state_topic: str | None,
     gun_signal: str | None,
@@ -91,10 +97,12 @@ def simulate_command(
         tell('loading')
         tell('reading')
         model = read_given_model(model_file)
-        readings = pd.read_readings(readings_file) if readings_file else None
         recorded = pd.read_recording(trajectory, pose_topic, state_topic, gun_signal)
         tell('refining the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        readings = None
+        if readings_file:
+            readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(surface, recorded, model, readings=readings, progress=tell, **wanted)
         made_from = {
             'mesh_file': str(mesh),
@@ -104,6 +112,7 @@ def simulate_command(
         tell('writing and drawing')
         files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
+    say_all('note', [readings.understood] if readings else [])
     say_all('warning', filter(None, [film.warning]))
     say_results(files, as_json, [*_lines(film), *file_lines(files)])
 

@@ -49,6 +49,7 @@ class Comparison:
         dependences: strongest first.
         regions: where the misfit is significant, strongest first.
         model: what was compared with the readings.
+        warnings: why a model that was fitted to the readings is not to be trusted.
     """
 
     study: Study
@@ -58,6 +59,7 @@ class Comparison:
     dependences: tuple[Dependence, ...]
     regions: tuple[Region, ...]
     model: DepositionModel
+    warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return (
@@ -79,7 +81,7 @@ class Comparison:
             ],
             'regions': [region.to_dict() for region in self.regions],
             'dependences': [asdict(dependence) for dependence in self.dependences],
-            'notes': list(self.study.notes),
+            'notes': [*self.warnings, *self.study.notes],
         }
 
 

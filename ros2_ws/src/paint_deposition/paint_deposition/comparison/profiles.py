@@ -5,7 +5,7 @@ of each single pass.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,11 +16,11 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import STENCIL_M, Experiment
+from paint_deposition.readings.rows_and_columns import FEWEST_ON_A_LINE, passes_are_level
 
 # Model lines are drawn through points this close along the surface [m].
 LINE_STEP_M = 0.01
-FEWEST_ON_A_LINE = 3
-# Readings without groups are shown in strips of the part, about this many to a strip.
+# Readings without rows or columns are shown in strips of the part, about this many to a strip.
 READINGS_A_STRIP = 20
 MOST_STRIPS = 6
 
@@ -34,7 +34,7 @@ class Profile:
         axis: what the position is measured along, in words.
         rows: (n,) points of the study, in order along the line.
         position_m: (n,) of the points along the axis [m].
-        line_m: (L,) positions of the model's lines [m]; empty where the readings form no line.
+        line_m: (L,) positions of the model's lines [m]; empty where there are too few readings.
         lines_um: (models, L) what a gauge would show there [um].
         passes_um: (passes, L) paint that each single pass brought, last model [um].
     """
@@ -52,6 +52,8 @@ class Profile:
 def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile]:
     """Profiles of every group of readings; of strips of the part where readings have no group.
 
+    A model's line runs through the readings of a group, and along the middle of a strip.
+
     Args:
         study: the readings.
         models: whose lines are wanted; single passes are those of the last.
@@ -60,10 +62,8 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     for index, experiment in enumerate(study.campaign.experiments):
         rows = np.flatnonzero(study.campaign.experiment_of == index)
         lines = [_Line.of(experiment, label, members) for label, members in _grouped(experiment)]
-        grouped = bool(lines)
-        if not grouped:
-            lines = list(_strips(experiment))
-        drawn = [line for line in lines if grouped and len(line.members) >= FEWEST_ON_A_LINE]
+        lines = lines or list(_strips(experiment))
+        drawn = [line for line in lines if len(line.members) >= FEWEST_ON_A_LINE]
         films = _films_along(experiment, drawn, models)
         for line in lines:
             at, lines_um, passes_um = films.get(line.label, _nothing(len(models)))
@@ -80,6 +80,7 @@ class _Line:
     axis: str
     members: np.ndarray
     position_m: np.ndarray
+    places_m: np.ndarray
 
     @staticmethod
     def of(
@@ -91,7 +92,20 @@ class _Line:
         position = height_m if upright else across_m
         axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
         order = np.argsort(position, kind='stable')
-        return _Line(label, axis, members[order], position[order])
+        places = experiment.points.positions_m[members[order]]
+        return _Line(label, axis, members[order], position[order], places)
+
+    @staticmethod
+    def along_strip(
+        experiment: Experiment, label: str, members: np.ndarray, upright: bool
+    ) -> '_Line':
+        """A line whose places lie along the middle of the strip."""
+        line = _Line.of(experiment, label, members, upright)
+        surface = experiment.surface
+        across = across_axis(surface.outward, surface.down)
+        aside = across if upright else -surface.down
+        away = line.places_m @ aside
+        return replace(line, places_m=line.places_m - np.outer(away - np.median(away), aside))
 
 
 def _axes(experiment: Experiment, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -120,18 +134,14 @@ def _strips(experiment: Experiment) -> Iterator[_Line]:
     if not len(members):
         return
     height_m, across_m = _axes(experiment, members)
-    path = experiment.path
-    spraying = path.flow > 0.0
-    motion = path.velocity_m_per_s[spraying]
-    rising = float(np.abs(motion @ experiment.surface.down).sum())
-    upright = 2.0 * rising < float(np.linalg.norm(motion, axis=1).sum())
+    upright = passes_are_level(experiment.path, experiment.surface.down)
     aside = across_m if upright else height_m
     count = int(np.clip(round(len(members) / READINGS_A_STRIP), 1, MOST_STRIPS))
     for part in np.array_split(np.argsort(aside, kind='stable'), count):
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
         what = 'across' if upright else 'height'
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
-        yield _Line.of(experiment, label, members[part], upright)
+        yield _Line.along_strip(experiment, label, members[part], upright)
 
 
 def _films_along(
@@ -159,14 +169,13 @@ def _films_along(
 
 
 def _along(experiment: Experiment, line: _Line) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions along the axis, points near the surface and normals, through all readings."""
-    members = line.members
+    """Positions along the axis, points near the surface and normals, through all places."""
     at = line.position_m
     steps = max(2, int(np.ceil((at[-1] - at[0]) / LINE_STEP_M)) + 1)
     wanted = np.unique(np.concatenate([np.linspace(at[0], at[-1], steps), at]))
     along = [
-        np.column_stack([np.interp(wanted, at, column[members, k]) for k in range(3)])
-        for column in (experiment.points.positions_m, experiment.points.normals)
+        np.column_stack([np.interp(wanted, at, column[:, k]) for k in range(3)])
+        for column in (line.places_m, experiment.points.normals[line.members])
     ]
     return wanted, along[0], along[1]
 

@@ -34,7 +34,7 @@ ROUNDS = 4
 TRIALS, LEAST_LAW = 3, 0.4
 # Least log evidence of such a cause, and its share of all that there was: less may be what the
 # laws that were accepted leave over.
-STRONG, LEFT_OVER = 15.0, 0.15
+STRONG, LEFT_OVER = 25.0, 0.15
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
 # Share by which learned laws must lower the error on points left out.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
@@ -13,6 +13,8 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.tables.words import UNITS_M, words_of
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.readings.campaign import Campaign, Experiment
@@ -23,6 +25,9 @@ MAX_EDGE_LENGTH_M = 0.02
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Quantity = Literal['x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session']
+Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
+_QUANTITIES = ', '.join(get_args(Quantity))
 
 
 Name = Annotated[str, BeforeValidator(str)]
@@ -75,6 +80,20 @@ class _Entry(BaseModel, extra='forbid'):
     down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
         None, description='[x, y, z], the direction of gravity in the mesh frame'
     )
+    points: Text | None = Field(
+        None,
+        description='the name of a file of measuring points, for readings that name theirs',
+    )
+    columns: dict[Quantity, Text | int] = Field(
+        {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
+    )
+    unit: dict[Literal['position', 'thickness'], Unit] = Field(
+        {}, description='position: m, mm, cm or inch, and thickness: um, mil or mm'
+    )
+    decimal: Literal['comma', 'point'] | None = Field(
+        None, description="'comma' or 'point', how the readings' numbers are written"
+    )
+    sheet: Text | None = Field(None, description="the name of a workbook's sheet")
     switched_off: list[Literal['voltage', 'draught']] = Field(
         [], description="a list of what the cell had switched off, of 'voltage' and 'draught'"
     )
@@ -128,6 +147,16 @@ def _read_experiment(
         progress(f'{name}: {note}')
     if counts.rejected:
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
-    readings = read_readings(files['measurements'])
+    points = None if entry.points is None else folder / entry.points
+    readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)
     return Experiment.of(name, surface, path, readings, files, trajectory.settings, off)
+
+
+def _layout(entry: _Entry) -> Layout:
+    return Layout(
+        columns=entry.columns,
+        unit={kind: UNITS_M[words_of(unit)[0]] for kind, unit in entry.unit.items()},
+        decimal={None: '', 'comma': ',', 'point': '.'}[entry.decimal],
+        sheet=entry.sheet or '',
+    )

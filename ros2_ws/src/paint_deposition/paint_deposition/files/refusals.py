@@ -49,7 +49,7 @@ def _field(model: type[BaseModel] | None, place: tuple[int | str, ...]) -> Field
 def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     first, others = error.errors()[0], error.error_count() - 1
     more = f' (and {others} more)' if others else ''
-    key = '.'.join(str(part) for part in first['loc'])
+    key = '.'.join(str(part) for part in first['loc'] if part != '[key]')
     if first['type'] == 'value_error':
         return f'{where}: {f"{key}: " if key else ""}{first["ctx"]["error"]}{more}'
     if not first['loc']:

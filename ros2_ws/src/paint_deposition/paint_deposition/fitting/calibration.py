@@ -16,6 +16,7 @@ from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.panel_reach import shifts, short_reaches
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.posterior import posterior_of
 from paint_deposition.fitting.sifting import sifted
@@ -70,6 +71,8 @@ class Calibration:
         residuals: of each experiment's points.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
         warnings: what the reader must know, a sentence each.
+        shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
+            reach the pattern's edges; they widen the uncertainties.
     """
 
     study: Study
@@ -79,6 +82,7 @@ class Calibration:
     residuals: tuple[Residuals, ...]
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
+    shifts: np.ndarray
 
     def __repr__(self) -> str:
         known = sum(value.determined for value in self.parameters)
@@ -130,7 +134,7 @@ class Calibration:
     @property
     def posterior(self) -> Posterior:
         """What is known of the model's parameters: a prior for other jobs."""
-        return posterior_of(self.fit, self.study.campaign)
+        return posterior_of(self.fit, self.study.campaign, self.shifts)
 
     @property
     def chi_square_per_freedom(self) -> float:
@@ -167,13 +171,23 @@ def calibrate(
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
-    fit = _best_fit(study, model, panels, given=start is not None, seed=seed)
-    values = estimates(fit)
+
+    def best_fit(study: Study) -> Fit:
+        return _best_fit(study, model, panels, given=start is not None, seed=seed)
+
+    fit = best_fit(study)
+    reaches = short_reaches(study.campaign, fit.model)
+    moved = shifts(study, fit, reaches, best_fit)
+    values = estimates(fit, moved)
     pairs = correlations(fit)
     residuals = study.residuals_by_experiment(fit.predicted_um)
-    return Calibration(
-        study, fit, values, pairs, residuals, panels, tuple(_warnings(study, fit, values, pairs))
-    )
+    warnings = [
+        f'{reach}; the intervals are widened by what the fit changes without the readings at '
+        'the ends'
+        for reach in reaches
+    ]
+    warnings += _warnings(study, fit, values, pairs)
+    return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
 
 def _panel_fit(study: Study, number: int) -> PanelFit | None:

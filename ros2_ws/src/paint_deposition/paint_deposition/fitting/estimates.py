@@ -56,15 +56,16 @@ class Correlation:
         return abs(self.value) > TOO_CLOSE
 
 
-def estimates(fit: Fit) -> tuple[Estimate, ...]:
+def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
     """Every varied parameter with its uncertainty.
 
-    The covariance is widened where residuals are larger than the noise. Intervals are quantiles
+    The covariance is widened where residuals are larger than the noise, and by ``shifts``, see
+    ``scaled_covariance``. Intervals are quantiles
     of the fit's normal distribution carried over to the parameters, in which a logarithm becomes
     a ratio and two components of the asymmetry its size and phase.
     """
-    covariance = scaled_covariance(fit)
-    sigma = np.sqrt(np.diag(_spread(fit)))
+    covariance = scaled_covariance(fit, shifts)
+    sigma = np.sqrt(np.diag(_spread(fit, covariance)))
     learned = np.sqrt(np.diag(covariance)) <= LEARNED * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
@@ -91,7 +92,7 @@ def estimates(fit: Fit) -> tuple[Estimate, ...]:
 
 def correlations(fit: Fit) -> tuple[Correlation, ...]:
     """Correlations of all pairs of parameters, strongest first."""
-    spread = _spread(fit)
+    spread = _spread(fit, scaled_covariance(fit))
     sigma = np.sqrt(np.diag(spread))
     matrix = spread / np.outer(sigma, sigma)
     names = _names(fit)
@@ -103,12 +104,17 @@ def correlations(fit: Fit) -> tuple[Correlation, ...]:
     return tuple(sorted(pairs, key=lambda pair: -abs(pair.value)))
 
 
-def scaled_covariance(fit: Fit) -> np.ndarray:
-    """(k, k) covariance of the fit's vector, widened where residuals exceed the noise."""
+def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
+    """(k, k) covariance of the fit's vector, widened where residuals exceed the noise.
+
+    ``shifts`` (n, k) of the vector, each as likely as not, are added as further standard
+    deviations of their own directions.
+    """
     freedom = max(len(fit.residual) - len(fit.vector), 1)
     widening = max(fit.chi_square / freedom, 1.0)
     data = fit.jacobian.T @ fit.jacobian / widening
-    return np.linalg.inv(data + fit.parameters.prior.precision)
+    covariance = np.linalg.inv(data + fit.parameters.prior.precision)
+    return covariance if shifts is None else covariance + shifts.T @ shifts
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
@@ -122,14 +128,14 @@ def _around_phase(values: np.ndarray, centre: np.ndarray) -> np.ndarray:
     return away
 
 
-def _spread(fit: Fit) -> np.ndarray:
+def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
     """(k, k) covariance of the parameters, linearised."""
     low, high = fit.parameters.bounds
     steps = STEP * np.eye(len(fit.vector))
     up, down = np.minimum(fit.vector + steps, high), np.maximum(fit.vector - steps, low)
     change = _around_phase(fit.parameters.values(up), fit.parameters.values(down))
     by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
-    return by_vector @ scaled_covariance(fit) @ by_vector.T
+    return by_vector @ covariance @ by_vector.T
 
 
 def _intervals(

@@ -11,12 +11,12 @@ from paint_deposition.readings.campaign import Campaign
 OTHER_SETTING = 0.05
 
 
-def posterior_of(fit: Fit, campaign: Campaign) -> Posterior:
-    """The posterior of a fit to a campaign, widened where residuals exceed the noise."""
+def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> Posterior:
+    """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is."""
     parameters = fit.parameters
     names, scale = parameters.coordinates, parameters.scale
     mean = parameters.offset + scale * fit.vector
-    covariance = scaled_covariance(fit.marginal) * np.outer(scale, scale)
+    covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     rows = 0.5 * (covariance + covariance.T)
     known = parameters.known.readings if parameters.known else ()
     return Posterior(

@@ -101,11 +101,20 @@ class Study:
         """The same without some points, by their row."""
         if not slips:
             return self
-        left_out = np.isin(self.campaign.means.owner, list(slips))
+        kept = ~np.isin(np.arange(len(self)), list(slips))
+        return replace(self.of_points(kept), slips=tuple(slips.values()))
+
+    def of_points(self, kept: np.ndarray) -> 'Study':
+        """The same with some of the points only, (P,) bool.
+
+        Raises:
+            ReadingsError: an experiment has no reading left.
+        """
+        left_out = ~kept[self.campaign.means.owner]
         campaign = self.campaign.without(left_out)
         noise = self.noise.select(~left_out)
         study = Study._with(campaign, self.forward.at(campaign), noise, self.texture)
-        return replace(study, slips=tuple(slips.values()))
+        return replace(study, slips=self.slips)
 
     @property
     def gauge_um(self) -> np.ndarray:

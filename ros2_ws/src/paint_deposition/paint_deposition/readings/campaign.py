@@ -10,8 +10,10 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.readings.off_surface import lie_on_a_spot, off_surface_hint
 from paint_deposition.readings.outliers import left_out_lines
 from paint_deposition.readings.readings import PointMeans, Readings
+from paint_deposition.readings.rows_and_columns import columns_or_rows
 
 # Readings further from the surface, or facing more away from it, do not belong to the part.
 MAX_DISTANCE_M = 0.02
@@ -60,7 +62,7 @@ class Experiment:
         settings: Mapping[str, float] | None = None,
         switched_off: frozenset[str] = frozenset(),
     ) -> 'Experiment':
-        """Match readings to the surface.
+        """Match readings to the surface; those without groups get the rows or columns found.
 
         Raises:
             ReadingsError: readings too far off the surface or on its other side.
@@ -69,10 +71,13 @@ class Experiment:
         normals = None if readings.normals is None else readings.normals[means.first]
         positions = readings.positions_m[means.first]
         place = surface.locate(positions, normals)
-        _refuse_far(readings, means, place.distance_m)
+        _refuse_far(surface, readings, means, place.distance_m)
         if normals is not None:
             _refuse_other_side(readings, means, place.angle_rad)
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
+        if not readings.group.astype(bool).any():
+            lines = columns_or_rows(surface, path, place.positions_m)
+            readings = replace(readings, group=lines[means.owner])
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
             name, surface, path, readings, means, points, readings, used, files or {},
@@ -107,6 +112,19 @@ class Experiment:
     def measured_points(self) -> SurfacePoints:
         """The P measured points without the stencils."""
         return self.points.select(slice(0, len(self)))
+
+    @cached_property
+    def off_surface_m(self) -> np.ndarray:
+        """(P,) how far each point was moved onto the surface [m]."""
+        taken = self.readings.positions_m[self.means.first]
+        return np.linalg.norm(taken - self.measured_points.positions_m, axis=1)
+
+    @property
+    def understood(self) -> str:
+        """How the readings were read and how far off the surface they were, in one line."""
+        median, largest = 1e3 * np.median(self.off_surface_m), 1e3 * self.off_surface_m.max()
+        moved = f'moved onto the surface by {median:.1f} mm (median), {largest:.1f} mm at most'
+        return f'{self.readings.understood or self.readings.source}; {moved}'
 
     @property
     def groups(self) -> np.ndarray:
@@ -190,6 +208,11 @@ class Campaign:
         return replace(self, experiments=tuple(kept))
 
     @property
+    def understood(self) -> tuple[str, ...]:
+        """How the readings of each experiment were read, a line each."""
+        return tuple(f'{e.name}: {e.understood}' for e in self.experiments)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
         return tuple(
@@ -199,16 +222,21 @@ class Campaign:
         )
 
 
-def _refuse_far(readings: Readings, means: PointMeans, distance_m: np.ndarray) -> None:
+def _refuse_far(
+    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
+) -> None:
     far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
     if not len(far):
+        if lie_on_a_spot(surface, readings.positions_m):
+            hint = off_surface_hint(surface, readings.positions_m)
+            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
         return
     worst = far[np.argmax(distance_m[far])]
     where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
     raise ReadingsError(
         f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
         f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
-        f'm (limit {MAX_DISTANCE_M:g}); give positions in the mesh frame, in metres'
+        f'm (limit {MAX_DISTANCE_M:g}); {off_surface_hint(surface, readings.positions_m)}'
     )
 
 

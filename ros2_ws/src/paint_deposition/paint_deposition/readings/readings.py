@@ -24,6 +24,7 @@ class Readings:
         normals: (N, 3) outward normals, or None.
         source: the file they came from, for messages.
         session: (N,) labels of the gauge session; '' where none.
+        understood: how their file was read, in one line for the user; '' for none.
     """
 
     positions_m: np.ndarray
@@ -34,6 +35,7 @@ class Readings:
     normals: np.ndarray | None = None
     source: str = 'readings'
     session: np.ndarray = field(default_factory=lambda: np.array(''))
+    understood: str = ''
 
     def __post_init__(self) -> None:
         sessions = np.broadcast_to(self.session, len(self.thickness_um))
@@ -90,6 +92,7 @@ class Readings:
             None if self.normals is None else self.normals[rows],
             self.source,
             self.session[rows],
+            self.understood,
         )
 
     @property

@@ -84,6 +84,7 @@ class ModelComparison(PaintingNode):
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
         self._readings = read_readings(self.values['measurements_file'])
+        self.get_logger().info(self._readings.understood)
         self._noise = gauge_noise(self._readings)
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
