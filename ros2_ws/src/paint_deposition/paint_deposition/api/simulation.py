@@ -11,17 +11,21 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
+from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.part.facing import facing, toward_the_gun
+from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import Readings
 
 Progress = Callable[[str, float], None]
+# A part whose thickest film is thinner got no paint: no gauge shows it.
+NO_PAINT_UM = 0.05
 
 
 @dataclass(frozen=True)
@@ -34,6 +38,7 @@ class Film:
         model: the deposition model.
         film_um: (V,) film at the vertices of the surface [um].
         statistics: of the film, weighted by area.
+        geometry: how the gun ran over the part.
         readings: places where the gauge should be predicted, or None.
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
     """
@@ -45,6 +50,7 @@ class Film:
     model: DepositionModel
     film_um: np.ndarray
     statistics: FilmStatistics
+    geometry: SprayGeometry
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
 
@@ -61,21 +67,13 @@ class Film:
         return (*self.surface.notes, *self.trajectory.notes)
 
     @property
-    def warning(self) -> str:
-        """Why the part stays bare, or nothing."""
-        if self.statistics.coverage > 0.0:
-            return ''
-        spraying = self.path.select(self.path.flow > 0.0)
-        if not len(spraying):
-            return 'the part stays bare: the gun never sprays; check --state-topic'
-        seen = facing(self.surface, spraying.position_m, spraying.rotation[:, :, 2])
-        if seen.front:
-            return f'the part stays bare: the gun sprays {self.path.spraying_time_s:.3g} s only'
-        distance = np.linalg.norm(spraying.position_m - self.surface.centre_m, axis=1).min()
-        return (
-            f'the part stays bare: the gun never looks at it and stays {distance:.3g} m or more '
-            'from its centre; check that mesh and poses are in one frame, and --mesh-scale'
+    def warnings(self) -> tuple[str, ...]:
+        """What is odd in the geometry, each with its likely cause."""
+        bare = (
+            f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
+            f'sprays {self.path.spraying_time_s:.3g} s only'
         )
+        return self.geometry.warnings or ((bare,) if self.statistics.coverage == 0.0 else ())
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the film and of how it was painted, as in ``stats.json``."""
@@ -85,7 +83,9 @@ class Film:
             'effects': [effect.id for effect in self.model.effects],
             'spraying_time_s': self.path.spraying_time_s,
             'poses': self.counts.to_dict(),
+            'geometry': self.geometry.to_dict(),
             'notes': list(self.notes),
+            'warnings': list(self.warnings),
         }
 
 
@@ -112,16 +112,22 @@ def simulate(
         progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
-        RecordingError: the poses make no motion.
+        RecordingError: the poses make no motion, the gun never sprays, or no paint lands on the
+            part; says why.
         ReadingsError: readings that are not on the part.
     """
     model = model or DepositionModel()
     path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
     _require_motion(trajectory.source, path, counts, max_pose_gap_s)
+    require_spraying(trajectory, path)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     painted = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     painted.add(path, lambda done: progress('painting', done / len(path)))
     film_um = painted.film_um
+    geometry = spray_geometry(surface, path, model, trajectory.frame_id)
+    if film_um.max() < NO_PAINT_UM:
+        cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
+        raise RecordingError(f'{trajectory.source}: no paint lands on the part: {cause}')
     statistics = film_statistics(
         film_um, surface.vertex_areas_m2, painted.emitted_cm3,
         target_um=target_um, target_tolerance_um=tolerance_um,
@@ -134,8 +140,9 @@ def simulate(
         campaign = Campaign((Experiment.of('part', surface, path, each),))
         predicted_um = Forward(campaign).predict_um(model)
     return Film(
-        surface, trajectory, path, counts, model, film_um, statistics, readings, predicted_um
-    )
+        surface, trajectory, path, counts, model, film_um, statistics, geometry, readings,
+        predicted_um,
+    )  # fmt: skip
 
 
 def _require_motion(

@@ -101,12 +101,13 @@ def simulate_command(
         tell('writing and drawing')
         files = write_results(film, output, made_from=made_from)
     say_all('note', film.notes)
-    say_all('warning', filter(None, [film.warning]))
+    say_all('warning', film.warnings)
     say_results(files, as_json, [*_lines(film), *file_lines(files)])
 
 
 def _lines(film: pd.Film) -> Iterator[str]:
     s, counts = film.statistics, film.counts
+    yield film.geometry.sentence
     yield (
         f'film {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
         f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
