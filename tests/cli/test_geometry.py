@@ -214,3 +214,59 @@ def test_the_samples_are_not_warned_of(mesh, bag, tmp_path):
     assert done.stderr == ''
     passes = json.loads(done.stdout)['geometry']['passes']
     assert passes == np.sum(np.diff(recorded.trigger_flow) > 0.0)
+
+
+@pytest.fixture
+def campaign(panel, tmp_path):
+    """Write a campaign: the panel, readings of a plausible film, and a motion."""
+
+    def written(motion: Trajectory):
+        write_pose_bag(tmp_path / 'run', motion)
+        x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.4, 0.4, 6), [-0.2, 0.0, 0.2]))
+        y = 0.03 * ((x / 0.6) ** 2 + (z / 0.4) ** 2) - 0.03
+        film_um = 12.0 - 10.0 * x**2 - 20.0 * z**2
+        rows = [','.join(f'{v:.4f}' for v in row) for row in zip(x, y, z, film_um, strict=True)]
+        (tmp_path / 'panel.csv').write_text('\n'.join(['x_m,y_m,z_m,thickness_um', *rows]))
+        (tmp_path / 'model.yaml').write_text('planar: {K1_cm3_per_s: 1.9}\n')
+        (tmp_path / 'campaign.yaml').write_text(
+            f'experiments:\n  - {{name: test panel, mesh: {panel}, trajectory: run, '
+            'state_topic: /atomizer/state, measurements: panel.csv}\n'
+        )
+        return tmp_path / 'campaign.yaml', '--model', tmp_path / 'model.yaml'
+
+    return written
+
+
+@pytest.mark.slow
+def test_a_campaign_says_how_each_part_was_painted(campaign, tmp_path):
+    done = paint('compare', *campaign(three_passes()), '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith('test panel: 3 passes, 0.40 m/s, TCP 0.2')
+    assert 'warning' not in done.stderr
+    figures = json.loads((tmp_path / 'out/comparison.json').read_text())['geometry']['test panel']
+    assert figures['sentence'] in done.stdout
+    assert figures['passes'] == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('command', ['compare', 'calibrate'])
+def test_a_campaign_with_odd_geometry_is_warned_of_by_its_experiment(command, campaign, tmp_path):
+    done = paint(command, *campaign(shifted(0.3, 0.0, 0.0)), '--json', '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert 'warning: test panel: the passes lie 0.30 m aside' in done.stderr
+    (found,) = json.loads(done.stdout)['geometry']['test panel']['warnings']
+    assert found in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('command', ['compare', 'calibrate', 'diagnose'])
+def test_a_campaign_without_paint_is_refused_by_its_experiment(command, campaign, tmp_path):
+    files = campaign(tool_turned('x', 180.0))
+    done = paint(command, *files, '-o', tmp_path / 'out')
+    assert_refused(done, "experiment 'test panel'", 'no paint lands', 'tool z is reversed')
+
+
+def test_a_campaign_whose_trigger_never_opens_is_refused(campaign, tmp_path):
+    closed = replace(three_passes(), trigger_flow=0.0 * three_passes().trigger_flow)
+    done = paint('compare', *campaign(closed), '-o', tmp_path / 'out')
+    assert_refused(done, "experiment 'test panel'", 'never sprays', '--state-topic')

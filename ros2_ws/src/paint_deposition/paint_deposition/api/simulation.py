@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
-from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.fitting.forward import Forward
@@ -24,8 +24,6 @@ from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import Readings
 
 Progress = Callable[[str, float], None]
-# A part whose thickest film is thinner got no paint: no gauge shows it.
-NO_PAINT_UM = 0.05
 
 
 @dataclass(frozen=True)

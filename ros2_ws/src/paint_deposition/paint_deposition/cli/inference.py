@@ -13,10 +13,12 @@ from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    geometry_lines,
     model_option,
     output_option,
     read_inputs,
     say_all,
+    say_geometry,
     say_results,
     seed_option,
     write_results,
@@ -54,10 +56,12 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output)
+    say_geometry(comparison)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
 
 def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
+    yield from geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -105,6 +109,7 @@ def diagnose_command(
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -142,6 +147,7 @@ def refit_command(
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -194,5 +200,6 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:
         yield f'note: {note}'
+    yield from geometry_lines(diagnosis)
     yield f'model: {output / "model.yaml"}'
     yield f'report: {output / "report.html"}'

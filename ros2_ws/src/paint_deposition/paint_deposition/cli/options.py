@@ -138,6 +138,17 @@ def say_all(label: str, lines: Iterable[str]) -> None:
         click.echo(f'{label}: {line}', err=True)
 
 
+def say_geometry(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> None:
+    """Print what was odd in how the gun ran over the parts of a campaign, on stderr."""
+    for name, found in result.geometry.items():
+        say_all('warning', (f'{name}: {line}' for line in found.warnings))
+
+
+def geometry_lines(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> Iterator[str]:
+    """How the gun ran over each part of a campaign."""
+    return (f'{name}: {found.sentence}' for name, found in result.geometry.items())
+
+
 def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
     """Write a result to its folder, all or nothing, and return the files."""
     with results_in(output) as folder:

@@ -22,12 +22,14 @@ from paint_deposition.cli.options import (
     POSITIVE,
     direction_option,
     file_lines,
+    geometry_lines,
     max_edge_length_option,
     model_option,
     output_option,
     read_given_model,
     read_inputs,
     say_all,
+    say_geometry,
     say_results,
     seed_option,
     write_results,
@@ -84,12 +86,14 @@ def calibrate_command(
         result = pd.calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
         files = write_results(result, output, start=start)
+    say_geometry(result)
     if not as_json:
         say_all('warning', result.warnings)
     say_results(files, as_json, [*_calibration_lines(result), *file_lines(files)])
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
+    yield from geometry_lines(result)
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'

@@ -123,6 +123,7 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
+    yield film.geometry.facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (
             f'{counts.rejected} of {counts.received} poses dropped, {counts.gaps} gaps taken as '

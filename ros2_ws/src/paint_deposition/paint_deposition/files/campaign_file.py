@@ -14,6 +14,7 @@ from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
+from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.readings.campaign import Campaign, Experiment
 
@@ -94,6 +95,7 @@ def _read_experiment(
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down)
     trajectory = read_trajectory(files['trajectory'], entry.pose_topic, entry.state_topic)
     path, counts = spray_path(trajectory, entry.max_pose_gap_s)
+    require_spraying(trajectory, path)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     for note in (*surface.notes, *trajectory.notes):
         progress(f'{name}: {note}')
@@ -101,4 +103,6 @@ def _read_experiment(
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
     readings = read_readings(files['measurements'])
     off = frozenset(entry.switched_off)
-    return Experiment.of(name, surface, path, readings, files, trajectory.settings, off)
+    return Experiment.of(
+        name, surface, path, readings, files, trajectory.settings, off, trajectory.frame_id
+    )

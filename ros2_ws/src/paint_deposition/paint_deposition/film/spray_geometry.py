@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.facet_error import facet_error
 from paint_deposition.film.geometry_warnings import geometry_warnings
 from paint_deposition.film.gun_view import GunView
 from paint_deposition.motion.path import SprayPath
@@ -31,6 +32,8 @@ class SprayGeometry:
         off_normal_deg: median angle between tool z and the way to that surface [deg].
         paint_over_part: share of the spray's straight rays that meet the outward side of the
             part, 0 to 1.
+        facet_error: worst error of the film from flat facets of a curved part, as a share of the
+            thickest film; see ``film.facet_error``.
         warnings: what is odd, a line each, with its likely cause.
     """
 
@@ -41,6 +44,7 @@ class SprayGeometry:
     standoff_high_m: float
     off_normal_deg: float
     paint_over_part: float
+    facet_error: float
     warnings: tuple[str, ...] = ()
 
     @property
@@ -58,6 +62,11 @@ class SprayGeometry:
             'paint over the part'
         )
 
+    @property
+    def facet_sentence(self) -> str:
+        """What the coarseness of the mesh costs."""
+        return f'coarseness of the mesh: up to {100 * self.facet_error:.1f} % of the peak film'
+
     def to_dict(self) -> dict[str, Any]:
         """The figures by name, with the sentence and the warnings."""
         return {**vars(self), 'sentence': self.sentence, 'warnings': list(self.warnings)}
@@ -74,6 +83,7 @@ def spray_geometry(
         model: its pattern and projection count, its effects do not.
         frame_id: of the poses, for the warnings.
     """
+    facets = facet_error(surface, path, model)
     view = GunView(surface, path, model)
     low, middle, high, lean = [math.nan] * 4
     if view.over.any():
@@ -88,5 +98,6 @@ def spray_geometry(
         standoff_high_m=high,
         off_normal_deg=lean,
         paint_over_part=float(view.landing.mean()),
-        warnings=tuple(geometry_warnings(view, frame_id)),
+        facet_error=facets.share,
+        warnings=tuple(filter(None, [*geometry_warnings(view, frame_id), facets.warning])),
     )
