@@ -1,6 +1,7 @@
 """Wrong geometry, fed to the real command, is named by its cause."""
 
 import json
+import shutil
 from dataclasses import replace
 from functools import partial
 
@@ -270,3 +271,27 @@ def test_a_campaign_whose_trigger_never_opens_is_refused(campaign, tmp_path):
     closed = replace(three_passes(), trigger_flow=0.0 * three_passes().trigger_flow)
     done = paint('compare', *campaign(closed), '-o', tmp_path / 'out')
     assert_refused(done, "experiment 'test panel'", 'never sprays', '--state-topic')
+
+
+def test_a_mesh_that_is_too_coarse_is_warned_of(simulate, tmp_path):
+    """A panel with a fold of 40 degrees within 60 mm, cut into edges of 24 and of 6 mm."""
+
+    def folded(edge_m: float):
+        z = np.arange(-0.24, 0.2401, edge_m)
+        x = np.array([-0.3, 0.0, 0.3])
+        y = 0.84 * 0.01 * np.logaddexp(0.0, z / 0.01)
+        points = np.stack([np.tile(x, len(z)), np.repeat(y, 3), np.repeat(z, 3)], axis=1)
+        corner = (3 * np.arange(len(z) - 1)[:, None] + [0, 1]).ravel()
+        faces = [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
+        path = tmp_path / f'fold{1e3 * edge_m:.0f}.stl'
+        trimesh.Trimesh(points, np.concatenate([np.stack(f, axis=1) for f in faces])).export(path)
+        return path
+
+    passes = serpentine((0.15, -0.15), half_width_m=0.6, opens_at_m=0.4)
+    (line,) = warnings_of(simulate(passes, mesh=folded(0.024)))
+    assert 'coarser than its curvature allows' in line
+    assert 'an edge of 2' in line
+    shutil.rmtree(tmp_path / 'bag')
+    done = simulate(passes, *TRIGGER, '--json', mesh=folded(0.006))
+    assert done.stderr == ''
+    assert 0.0 < json.loads(done.stdout)['geometry']['facet_error'] < 0.01

@@ -74,7 +74,7 @@ def test_diagnose_names_the_hidden_effect(diagnosed):
 def test_diagnose_says_how_each_part_was_painted(diagnosed):
     done, folder = diagnosed
     geometry = json.loads((folder / 'diagnosis.json').read_text())['geometry']
-    assert list(geometry) == ['door']
+    assert list(geometry) == ['panel', 'door']
     for name, found in geometry.items():
         assert f'{name}: {found["sentence"]}' in done.stdout
         assert found['warnings'] == []

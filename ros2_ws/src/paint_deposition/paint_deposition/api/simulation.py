@@ -8,17 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.api.geometry import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
-from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import Readings
@@ -115,14 +114,11 @@ def simulate(
         ReadingsError: readings that are not on the part.
     """
     model = model or DepositionModel()
-    path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
-    _require_motion(trajectory.source, path, counts, max_pose_gap_s)
-    require_spraying(trajectory, path)
-    surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
+    seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
+    surface, path, geometry = seen.surface, seen.path, seen.geometry
     painted = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     painted.add(path, lambda done: progress('painting', done / len(path)))
     film_um = painted.film_um
-    geometry = spray_geometry(surface, path, model, trajectory.frame_id)
     if film_um.max() < NO_PAINT_UM:
         cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
         raise RecordingError(f'{trajectory.source}: no paint lands on the part: {cause}')
@@ -138,25 +134,6 @@ def simulate(
         campaign = Campaign((Experiment.of('part', surface, path, each),))
         predicted_um = Forward(campaign).predict_um(model)
     return Film(
-        surface, trajectory, path, counts, model, film_um, statistics, geometry, readings,
+        surface, trajectory, path, seen.counts, model, film_um, statistics, geometry, readings,
         predicted_um,
     )  # fmt: skip
-
-
-def _require_motion(
-    source: str, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
-) -> None:
-    if len(path):
-        return
-    reasons = {
-        'not finite': counts.not_finite,
-        'without a unit quaternion': counts.not_unit_quaternions,
-        'with a repeated stamp': counts.repeated_stamps,
-        'with a backward stamp': counts.backward_stamps,
-        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
-    }
-    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
-    raise RecordingError(
-        f'{source}: no two of its {counts.received} poses make a motion'
-        f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
-    )

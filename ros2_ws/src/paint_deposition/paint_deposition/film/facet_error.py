@@ -15,9 +15,9 @@ from paint_deposition.part.surface import Surface
 
 # Vertices among which the thickest film is looked for.
 VERTICES = 4000
-# Where a curve begins the error goes with the edges, elsewhere with their square; the estimate
-# itself is good to a third.
-WANTED, SAFETY = 0.01, 0.75
+# Where a curve begins the error goes with the edges, elsewhere with their square; by how much it
+# depends on where the first corner lies, so half of what the first says is advised.
+WANTED, SAFETY = 0.01, 0.5
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class FacetError:
         return (
             f'the mesh is coarser than its curvature allows: the film is off by up to '
             f'{100 * self.share:.1f} % of its peak near ({place}) m, where an edge of '
-            f'{1e3 * self.edge_m:.0f} mm turns by {self.turn_deg:.0f} degrees; export it with '
-            f'edges of {wanted_mm:.2g} mm there for less than 1 %'
+            f'{1e3 * self.edge_m:.0f} mm turns by {self.turn_deg:.0f} degrees; export it finer, '
+            f'with edges of about {wanted_mm:.1g} mm there'
         )
 
 

@@ -99,5 +99,6 @@ def spray_geometry(
         off_normal_deg=lean,
         paint_over_part=float(view.landing.mean()),
         facet_error=facets.share,
-        warnings=tuple(filter(None, [*geometry_warnings(view, frame_id), facets.warning])),
+        # Wrong geometry also makes facets cost more: it is told alone.
+        warnings=tuple(geometry_warnings(view, frame_id)) or tuple(filter(None, [facets.warning])),
     )

@@ -14,7 +14,6 @@ from paint_deposition.fitting.slips import FEWEST, Slip, slips
 from paint_deposition.fitting.smooth_misfit import Misfit, Scatter
 from paint_deposition.fitting.study import TEXTURE_SHARE, Study, Texture
 from paint_deposition.readings.campaign import Campaign
-from paint_deposition.readings.geometry import require_paint
 
 # Starts of the fit beside which readings are judged.
 STARTS = 3
@@ -38,11 +37,9 @@ def sifted(
         known: of the parameters from another job.
 
     Raises:
-        ReadingsError: readings in another unit, or a part without paint, with the remedy.
+        ReadingsError: readings in another unit, with the remedy.
     """
     study = Study.of(campaign, effects)
-    bare = start.model_copy(update={'effects': ()})
-    require_paint(study.campaign, bare, study.forward.predict_um(bare))
     fit = _fitted(study, start, starts, seed, known)
     if len(study) < FEWEST or not fit.predicted_um.any():
         return study, fit

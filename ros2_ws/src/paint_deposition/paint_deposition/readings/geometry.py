@@ -4,7 +4,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.readings.campaign import Campaign
 
@@ -17,22 +17,26 @@ def geometry_by_experiment(campaign: Campaign, model: DepositionModel) -> dict[s
     }
 
 
-def require_paint(campaign: Campaign, model: DepositionModel, film_um: np.ndarray) -> None:
+def require_paint(campaign: Campaign, model: DepositionModel) -> None:
     """Refuse an experiment in which no paint lands at any measured point.
 
     Args:
         campaign: painted parts with readings.
-        model: that predicts the film.
-        film_um: (P,) its film at the points [um].
+        model: its pattern and projection count, its effects do not.
 
     Raises:
         ReadingsError: one line with the likely cause.
     """
-    for number, one in enumerate(campaign.experiments):
-        if film_um[campaign.experiment_of == number].max() >= NO_PAINT_UM:
+    plain = model.model_copy(update={'effects': ()})
+    for one in campaign.experiments:
+        painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
+        painted.add(one.path)
+        if painted.raw_um.max() >= NO_PAINT_UM:
             continue
-        found = spray_geometry(one.surface, one.path, model, one.frame_id)
-        cause = found.warnings[0] if found.warnings else found.sentence
+        cause = 'the gun never sprays'
+        if np.any(one.path.flow > 0.0):
+            found = spray_geometry(one.surface, one.path, plain, one.frame_id)
+            cause = found.warnings[0] if found.warnings else found.sentence
         raise ReadingsError(
             f"experiment '{one.name}': no paint lands where it was measured: {cause}"
         )

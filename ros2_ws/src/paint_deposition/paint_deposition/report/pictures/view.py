@@ -32,6 +32,18 @@ class View:
         right = np.cross(up, toward)
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
 
+    def from_the_right(self) -> 'View':
+        """The same part seen from the right of this picture."""
+        return View(
+            -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
+        )
+
+    def from_above(self) -> 'View':
+        """The same part seen from the top of this picture, its front below."""
+        return View(
+            self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
+        )
+
     def flat(self, points_m: np.ndarray) -> np.ndarray:
         """(..., 2) where points (..., 3) lie in the picture [m]."""
         return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
