@@ -274,7 +274,7 @@ def test_a_campaign_whose_trigger_never_opens_is_refused(campaign, tmp_path):
 
 
 def test_a_mesh_that_is_too_coarse_is_warned_of(simulate, tmp_path):
-    """A panel with a fold of 40 degrees within 60 mm, cut into edges of 24 and of 6 mm."""
+    """A panel with a fold of 40 degrees within 60 mm, cut into edges of 24 and of 5 mm."""
 
     def folded(edge_m: float):
         z = np.arange(-0.24, 0.2401, edge_m)
@@ -292,6 +292,6 @@ def test_a_mesh_that_is_too_coarse_is_warned_of(simulate, tmp_path):
     assert 'coarser than its curvature allows' in line
     assert 'an edge of 2' in line
     shutil.rmtree(tmp_path / 'bag')
-    done = simulate(passes, *TRIGGER, '--json', mesh=folded(0.006))
+    done = simulate(passes, *TRIGGER, '--json', mesh=folded(0.0045))
     assert done.stderr == ''
     assert 0.0 < json.loads(done.stdout)['geometry']['facet_error'] < 0.01

@@ -13,8 +13,8 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-# Vertices among which the thickest film is looked for.
-VERTICES = 4000
+# Sub-steps that stand for a longer path, and vertices among which the thickest film is looked for.
+SUB_STEPS, VERTICES = 4000, 2000
 # Where a curve begins the error goes with the edges, elsewhere with their square; by how much it
 # depends on where the first corner lies, so half of what the first says is advised.
 WANTED, SAFETY = 0.01, 0.5
@@ -72,7 +72,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> Fa
         np.concatenate([edges.normals, edges.curved_normals, surface.normals[some]]),
     )
     painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
-    painted.add(path)
+    painted.add(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
     film_um = painted.raw_um
     count, peak_um = len(edges), film_um.max()
     if peak_um == 0.0:

@@ -23,7 +23,7 @@ LEAST_ERROR = 5e-4
 GUN_M = 0.3
 # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
 LEAST_EDGE_M = 0.004
-MOST_EDGES = 20_000
+MOST_EDGES = 5_000
 
 
 @dataclass(frozen=True)
