@@ -31,13 +31,14 @@ def show_gun_on_part(
     pose_topic: str | None,
     state_topic: str | None,
     mesh_scale: float,
+    body: str | None,
     down: np.ndarray | None,
 ) -> None:
     """Print how the gun ran over a part and what is odd, and draw it if a picture is wanted."""
     with Progress('inspect') as tell:
         tell('reading')
         recorded = pd.read_recording(motion, pose_topic, state_topic, gun_signal)
-        surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down)
+        surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down, body)
         model = read_given_model(model_file)
         seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:

@@ -91,8 +91,12 @@ GUN_SIGNAL = click.option(
 )
 MESH_SCALE = click.option(
     '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-    help='Metres per unit of the mesh file; 0.001 for millimetres.',
+    help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP tell their '
+    'unit: leave it out there.',
 )  # fmt: skip
+BODY = click.option(
+    '--body', help='The one body to take of a mesh file with several; default: all as one part.'
+)
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
     help='A longer time between poses is a gap: gun off.',

@@ -12,6 +12,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli.options import (
+    BODY,
     CAMPAIGN,
     FILE,
     JSON,
@@ -152,7 +153,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@click.option('--mesh', required=True, type=FILE, help='STL, PLY or OBJ.')
+@click.option('--mesh', required=True, type=FILE, help='STL, PLY, OBJ, glTF, 3MF or STEP.')
 @MODEL
 @passes_wanted
 @click.option(
@@ -171,6 +172,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
 @direction_option('--down', 'Gravity in the mesh frame; default: -z, or -y for a lying part.')
 @MESH_SCALE
+@BODY
 @max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
 @output_option('the bag, passes.csv, passes.mod, plan.json and the film')
@@ -182,6 +184,7 @@ def plan_command(
     travel_deg: float,
     down: np.ndarray | None,
     mesh_scale: float,
+    body: str | None,
     max_edge_length_m: float,
     frame_id: str,
     as_json: bool,
@@ -191,7 +194,7 @@ def plan_command(
     model = read_given_model(model_file)
     with Progress('plan') as tell:
         tell('reading the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         result = pd.plan(
             surface, model, frame_id=frame_id, progress=tell, travel_rad=math.radians(travel_deg),
             **wanted,

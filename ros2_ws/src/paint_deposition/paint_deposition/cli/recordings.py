@@ -10,6 +10,7 @@ import click
 from tqdm import tqdm
 
 from paint_deposition.cli.options import (
+    BODY,
     FILE,
     GUN_SIGNAL,
     JSON,
@@ -40,6 +41,7 @@ from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files
 @click.option('--state-topic', help='Trigger of the gun; default: it sprays whenever poses flow.')
 @GUN_SIGNAL
 @MESH_SCALE
+@BODY
 @direction_option('--down', 'Gravity in the mesh frame; default: as guessed.')
 @MAX_POSE_GAP
 @JSON

@@ -11,6 +11,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli.options import (
+    BODY,
     FILE,
     GUN_SIGNAL,
     JSON,
@@ -34,7 +35,9 @@ if TYPE_CHECKING:
 
 
 @click.command('simulate')
-@click.option('--mesh', required=True, type=FILE, help='The part: STL, PLY or OBJ.')
+@click.option(
+    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
+)
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
@@ -54,6 +57,7 @@ if TYPE_CHECKING:
 )
 @GUN_SIGNAL
 @MESH_SCALE
+@BODY
 @max_edge_length_option(0.01)
 @MAX_POSE_GAP
 @direction_option(
@@ -73,6 +77,7 @@ def simulate_command(
     state_topic: str | None,
     gun_signal: str | None,
     mesh_scale: float,
+    body: str | None,
     max_edge_length_m: float,
     down: np.ndarray | None,
     as_json: bool,
@@ -91,7 +96,7 @@ def simulate_command(
         readings = pd.read_readings(readings_file) if readings_file else None
         recorded = pd.read_recording(trajectory, pose_topic, state_topic, gun_signal)
         tell('refining the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         film = pd.simulate(surface, recorded, model, readings=readings, progress=tell, **wanted)
         made_from = {
             'mesh_file': str(mesh),

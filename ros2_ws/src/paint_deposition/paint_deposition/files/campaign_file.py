@@ -42,6 +42,7 @@ class _Entry(BaseModel, extra='forbid'):
     pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
     state_topic: Text | None = Field(None, description='the name of a topic of the recording')
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
+    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
         DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
@@ -92,7 +93,7 @@ def _read_experiment(
     kinds = ('mesh', 'trajectory', 'measurements')
     files = {kind: str(folder / getattr(entry, kind)) for kind in kinds}
     down = None if entry.down is None else np.array(entry.down)
-    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down)
+    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
     trajectory = read_trajectory(files['trajectory'], entry.pose_topic, entry.state_topic)
     path, counts = spray_path(trajectory, entry.max_pose_gap_s)
     require_spraying(trajectory, path)
