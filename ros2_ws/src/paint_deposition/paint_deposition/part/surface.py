@@ -86,7 +86,8 @@ class Surface:
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
         vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
         if down is None:
-            down = gravity(normals, vertex_areas)
+            down, guess = gravity(vertices, normals, vertex_areas)
+            notes = (*notes, guess) if guess else notes
         down = np.asarray(down, dtype=np.float64)
         return Surface(
             vertices,

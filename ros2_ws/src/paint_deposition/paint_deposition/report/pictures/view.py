@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.part.axes import downhill_axis
+
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
 
@@ -26,8 +28,9 @@ class View:
         """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
         toward, down = _snapped(outward), _snapped(down)
         up = -down + (down @ toward) * toward
-        if np.linalg.norm(up) < 0.1:  # a part seen from straight above: its y is up
-            up = np.eye(3)[1] - toward[1] * toward
+        if np.linalg.norm(up) < 0.1:  # a part seen from straight above, a hood: its front below
+            up = -_snapped(downhill_axis(outward, down))
+            up = up - (up @ toward) * toward
         up /= np.linalg.norm(up)
         right = np.cross(up, toward)
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
