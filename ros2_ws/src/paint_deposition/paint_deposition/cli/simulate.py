@@ -61,7 +61,7 @@ if TYPE_CHECKING:
 @max_edge_length_option(0.01)
 @MAX_POSE_GAP
 @direction_option(
-    '--down', 'Gravity in the mesh frame; default: -z, or -y for a part that lies in x-y.'
+    '--down', 'Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.'
 )
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,

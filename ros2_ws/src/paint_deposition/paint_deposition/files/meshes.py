@@ -35,7 +35,7 @@ def read_mesh(
         scale: metres per unit of the file, 0.001 for millimetres. glTF is in metres, and 3MF and
             STEP tell their unit: there it comes on top, for files whose unit is wrong.
         max_edge_length_m: longest edge after refinement [m].
-        down: gravity in the mesh frame; default: -z if the part stands, -y if it lies in x-y.
+        down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.
 
     Raises:
