@@ -170,7 +170,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @click.option('--acceleration', 'acceleration_m_per_s2', default=2.0, show_default=True,
               type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
-@direction_option('--down', 'Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.')
+@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @MESH_SCALE
 @BODY
 @max_edge_length_option(0.02)
