@@ -33,7 +33,7 @@ SMALL = 0.02
 def write_geometry_picture(
     path: str | Path, surface: Surface, spray: SprayPath, geometry: SprayGeometry, title: str
 ) -> Path:
-    """Draw part and motion from the front, from the right and from above.
+    """Draw part and motion from the gun, and from the right and the top of that picture.
 
     Args:
         path: PNG to write.
@@ -54,7 +54,7 @@ def write_geometry_picture(
         height_ratios=_ratios(sizes[0][1], sizes[2][1]),
     )  # fmt: skip
     size_m = float(np.linalg.norm(box_extent_m(corners)))
-    places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from the right', 'from above')
+    places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
     for place, view, name in zip(places, views, names, strict=True):
         axes = figure.add_subplot(grid[place])
         _draw(axes, view, surface, spray, size_m)
