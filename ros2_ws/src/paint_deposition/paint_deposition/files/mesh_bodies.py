@@ -57,6 +57,8 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
     kind = path.suffix.lower()
     scene = _scene(path, kind)
     found = _by_name(scene)
+    if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
+        found = {path.stem: next(iter(found.values()))}
     notes = []
     unit_m = 1.0
     if kind in WITH_UNIT:
