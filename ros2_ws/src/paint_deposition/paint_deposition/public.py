@@ -1,5 +1,6 @@
 """The public names: what a script or a notebook needs."""
 
+from paint_deposition.api.geometry import GunOnPart, look_at
 from paint_deposition.api.inference import calibrate, compare, diagnose, refit
 from paint_deposition.api.pictures import plot
 from paint_deposition.api.planning import plan, recommend
@@ -30,6 +31,7 @@ __all__ = [
     'DepositionModel',
     'Diagnosis',
     'Film',
+    'GunOnPart',
     'PaintError',
     'Plan',
     'Readings',
@@ -39,6 +41,7 @@ __all__ = [
     'calibrate',
     'compare',
     'diagnose',
+    'look_at',
     'plan',
     'plot',
     'read_campaign',

@@ -13,10 +13,12 @@ from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    geometry_lines,
     model_option,
     output_option,
     read_inputs,
     say_all,
+    say_geometry,
     say_results,
     seed_option,
     write_results,
@@ -55,11 +57,13 @@ def compare_command(campaign: Path, model_file: Path | None, output: Path, as_js
         tell('writing the report')
         files = write_results(comparison, output)
     say_all('note', data.understood)
+    say_geometry(comparison)
     say_all('warning', comparison.warnings)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
 
 def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
+    yield from geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -108,6 +112,7 @@ def diagnose_command(
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
     say_all('note', data.understood)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -146,6 +151,7 @@ def refit_command(
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell)
     say_all('note', data.understood)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -198,5 +204,6 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:
         yield f'note: {note}'
+    yield from geometry_lines(diagnosis)
     yield f'model: {output / "model.yaml"}'
     yield f'report: {output / "report.html"}'
