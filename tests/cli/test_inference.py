@@ -71,6 +71,16 @@ def test_diagnose_names_the_hidden_effect(diagnosed):
 
 
 @pytest.mark.slow
+def test_diagnose_says_how_each_part_was_painted(diagnosed):
+    done, folder = diagnosed
+    geometry = json.loads((folder / 'diagnosis.json').read_text())['geometry']
+    assert list(geometry) == ['panel', 'door']
+    for name, found in geometry.items():
+        assert f'{name}: {found["sentence"]}' in done.stdout
+        assert found['warnings'] == []
+
+
+@pytest.mark.slow
 def test_diagnose_writes_all_that_it_says(diagnosed):
     _, folder = diagnosed
     names = {path.name for path in folder.iterdir()}
@@ -111,7 +121,8 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     assert done.returncode == 0, done.stderr
     content = json.loads((tmp_path / 'comparison.json').read_text())
     assert set(content) == {
-        'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences', 'notes',
+        'geometry', 'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences',
+        'notes',
     }  # fmt: skip
     assert content['noise']['source'] == 'repeats'
     door = content['misfits'][0]

@@ -214,28 +214,6 @@ def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_p
     assert 'turned round' in films[1][1]
 
 
-def test_a_bare_part_is_told_with_the_reason(panel, one_pass, tmp_path):
-    away = trimesh.load_mesh(panel, process=False)
-    away.apply_translation([0.0, 0.0, 9.0])
-    away.export(tmp_path / 'away.stl')
-    done = paint(
-        'simulate', '--mesh', tmp_path / 'away.stl', '--trajectory', one_pass, *COARSE,
-        '-o', tmp_path / 'out',
-    )  # fmt: skip
-    assert done.returncode == 0
-    (line,) = done.stderr.splitlines()
-    assert line.startswith('warning: the part stays bare: the gun never looks at it and stays 8.9')
-    never = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([0.0]))
-    bag = write_pose_bag(tmp_path / 'off', never)
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', bag, *TRIGGER, *COARSE, '--json',
-        '-o', tmp_path / 'out',
-    )  # fmt: skip
-    assert done.returncode == 0
-    assert 'the gun never sprays; check --state-topic' in done.stderr
-    assert json.loads(done.stdout)['capture_fraction'] is None
-
-
 def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
     log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
     bag = write_pose_bag(tmp_path / 'pass', log)

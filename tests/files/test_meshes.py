@@ -161,8 +161,8 @@ def test_broken_files_are_refused_in_one_line(tmp_path, name, kind, says):
 def test_a_missing_file_and_a_foreign_type_are_named(tmp_path):
     with pytest.raises(MeshError, match=r'gone\.stl: no such mesh file'):
         read_mesh(tmp_path / 'gone.stl')
-    with pytest.raises(MeshError, match=r'"\.step" cannot be read; export it as .*\.stl'):
-        read_mesh(tmp_path / 'door.step')
+    with pytest.raises(MeshError, match=r'"\.iges" cannot be read; export it as .*\.stl'):
+        read_mesh(tmp_path / 'door.iges')
 
 
 @pytest.mark.parametrize(

@@ -4,8 +4,10 @@ import pickle
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from trimesh.creation import box
 
+from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 
@@ -76,6 +78,34 @@ def test_a_standing_part_has_z_up_and_a_lying_one_y(triangles, flat):
     np.testing.assert_array_equal(standing.down, [0, 0, -1])
     np.testing.assert_array_equal(lying.down, [0, -1, 0])
     np.testing.assert_array_equal(told.down, [0, 1, 0])
+    assert (standing.notes, told.notes) == ((), ())
+    assert 'gravity is taken along -y' in lying.notes[0]
+
+
+def hood(triangles, lean_deg, height_m=0.9):
+    """A crowned hood in car coordinates, x to the rear, z up; it falls toward the front."""
+    vertices, faces = triangles(lambda x, z: 0.3 * (x**2 + 0.5 * z**2), 0.05, half_width_m=0.6)
+    lying = vertices @ np.array([[0, 1, 0], [0, 0, -1], [-1, 0, 0]], dtype=float)
+    turn = Rotation.from_euler('y', -lean_deg, degrees=True)
+    return Surface.from_triangles(turn.apply(lying) + height_m * np.eye(3)[2], faces, 0.05)
+
+
+def test_a_hood_lies_in_the_booth_and_its_front_is_below(triangles):
+    surface = hood(triangles, 8.0)
+    assert surface.outward[2] > 0.98
+    np.testing.assert_array_equal(surface.down, [0, 0, -1])
+    assert 'as a hood or a roof does: gravity is taken along -z' in surface.notes[0]
+    # From above, with the front below, the right side of the picture is that of -y.
+    across = across_axis(surface.outward, surface.down)
+    np.testing.assert_allclose(across, [0, -1, 0], atol=1e-4)
+    assert downhill_axis(surface.outward, surface.down)[0] < -0.98
+
+
+def test_a_level_roof_keeps_the_axes_of_its_mesh(triangles):
+    surface = hood(triangles, 0.5, height_m=1.4)
+    np.testing.assert_array_equal(surface.down, [0, 0, -1])
+    across = across_axis(surface.outward, surface.down)
+    np.testing.assert_allclose(across, [1, 0, 0], atol=1e-4)
 
 
 def test_height_runs_from_the_lowest_to_the_highest_point(make_surface, flat):

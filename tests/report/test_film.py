@@ -30,7 +30,10 @@ X, Y, Z = np.eye(3)
         (X, -Z, Y, ('y [m]', 'z [m]')),
         (Z, -Y, X, ('x [m]', 'y [m]')),
         (Z, -Z, X, ('x [m]', 'y [m]')),
-        (-Z, -Z, -X, ('x [m]', 'y [m]')),
+        # A part overhead has the same right side in words and in the picture: see across_axis.
+        (-Z, -Z, X, ('x [m]', 'y [m]')),
+        # A hood that falls toward -x has its front below.
+        (Z * 0.98 - X * 0.2, -Z, -Y, ('y [m]', 'x [m]')),
         (-Y * 0.97 + Z * 0.24, -Z, X, ('x [m]', 'z [m]')),
     ],
 )

@@ -65,7 +65,7 @@ def generate_launch_description():
         DeclareLaunchArgument(
             'mesh',
             default_value=shared('samples', 'door.stl'),
-            description="The part's mesh: STL, PLY or OBJ [path]",
+            description="The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]",
         ),
         DeclareLaunchArgument(
             'model',

@@ -1,5 +1,6 @@
 """The public names: what a script or a notebook needs."""
 
+from paint_deposition.api.geometry import GunOnPart, look_at
 from paint_deposition.api.inference import calibrate, compare, compare_models, diagnose, refit
 from paint_deposition.api.pictures import plot
 from paint_deposition.api.planning import plan, recommend
@@ -30,6 +31,7 @@ __all__ = [
     'DepositionModel',
     'Diagnosis',
     'Film',
+    'GunOnPart',
     'PaintError',
     'Plan',
     'Readings',
@@ -41,6 +43,7 @@ __all__ = [
     'compare',
     'compare_models',
     'diagnose',
+    'look_at',
     'plan',
     'plot',
     'read_campaign',

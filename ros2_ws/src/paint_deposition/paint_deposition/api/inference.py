@@ -21,6 +21,7 @@ from paint_deposition.fitting.calibration import calibrate as calibrated
 from paint_deposition.fitting.panel_reach import Reach, short_reaches
 from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
+from paint_deposition.readings.geometry import require_paint
 
 Progress = Callable[[str], None]
 MOST_MODELS = 6
@@ -50,7 +51,9 @@ def calibrate(
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
     """
-    return calibrated(campaign, model or _model_of(campaign), seed, progress)
+    model = model or _model_of(campaign)
+    require_paint(campaign, model or DepositionModel())
+    return calibrated(campaign, model, seed, progress)
 
 
 def compare(
@@ -64,6 +67,7 @@ def compare(
         progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
+    require_paint(campaign, model or DepositionModel())
     progress('fitting the pattern')
     reaches: tuple[Reach, ...] = ()
     if model is None:
@@ -160,11 +164,13 @@ def refit(
 def _start(
     campaign: Campaign, model: DepositionModel | None, posterior: Posterior | None
 ) -> tuple[DepositionModel, Posterior | None]:
-    """The model to start from and what is known of it."""
+    """The model to start from, by which all parts get paint, and what is known of it."""
     if model is None and campaign.model_file:
         file = read_model_file(campaign.model_file)
-        return file.model, posterior or file.posterior
-    return model or DepositionModel(), posterior
+        model, posterior = file.model, posterior or file.posterior
+    model = model or DepositionModel()
+    require_paint(campaign, model)
+    return model, posterior
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:

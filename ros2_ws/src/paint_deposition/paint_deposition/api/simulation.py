@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.api.geometry import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
-from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import Readings
@@ -34,6 +35,7 @@ class Film:
         model: the deposition model.
         film_um: (V,) film at the vertices of the surface [um].
         statistics: of the film, weighted by area.
+        geometry: how the gun ran over the part.
         readings: places where the gauge should be predicted, or None.
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
     """
@@ -45,6 +47,7 @@ class Film:
     model: DepositionModel
     film_um: np.ndarray
     statistics: FilmStatistics
+    geometry: SprayGeometry
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
 
@@ -61,21 +64,13 @@ class Film:
         return (*self.surface.notes, *self.trajectory.notes)
 
     @property
-    def warning(self) -> str:
-        """Why the part stays bare, or nothing."""
-        if self.statistics.coverage > 0.0:
-            return ''
-        spraying = self.path.select(self.path.flow > 0.0)
-        if not len(spraying):
-            return 'the part stays bare: the gun never sprays; check --state-topic'
-        seen = facing(self.surface, spraying.position_m, spraying.rotation[:, :, 2])
-        if seen.front:
-            return f'the part stays bare: the gun sprays {self.path.spraying_time_s:.3g} s only'
-        distance = np.linalg.norm(spraying.position_m - self.surface.centre_m, axis=1).min()
-        return (
-            f'the part stays bare: the gun never looks at it and stays {distance:.3g} m or more '
-            'from its centre; check that mesh and poses are in one frame, and --mesh-scale'
+    def warnings(self) -> tuple[str, ...]:
+        """What is odd in the geometry, each with its likely cause."""
+        bare = (
+            f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
+            f'sprays {self.path.spraying_time_s:.3g} s only'
         )
+        return self.geometry.warnings or ((bare,) if self.statistics.coverage == 0.0 else ())
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the film and of how it was painted, as in ``stats.json``."""
@@ -85,7 +80,9 @@ class Film:
             'effects': [effect.id for effect in self.model.effects],
             'spraying_time_s': self.path.spraying_time_s,
             'poses': self.counts.to_dict(),
+            'geometry': self.geometry.to_dict(),
             'notes': list(self.notes),
+            'warnings': list(self.warnings),
         }
 
 
@@ -112,16 +109,19 @@ def simulate(
         progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
-        RecordingError: the poses make no motion.
+        RecordingError: the poses make no motion, the gun never sprays, or no paint lands on the
+            part; says why.
         ReadingsError: readings that are not on the part.
     """
     model = model or DepositionModel()
-    path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
-    _require_motion(trajectory.source, path, counts, max_pose_gap_s)
-    surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
+    seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
+    surface, path, geometry = seen.surface, seen.path, seen.geometry
     painted = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     painted.add(path, lambda done: progress('painting', done / len(path)))
     film_um = painted.film_um
+    if film_um.max() < NO_PAINT_UM:
+        cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
+        raise RecordingError(f'{trajectory.source}: no paint lands on the part: {cause}')
     statistics = film_statistics(
         film_um, surface.vertex_areas_m2, painted.emitted_cm3,
         target_um=target_um, target_tolerance_um=tolerance_um,
@@ -134,24 +134,6 @@ def simulate(
         campaign = Campaign((Experiment.of('part', surface, path, each),))
         predicted_um = Forward(campaign).predict_um(model)
     return Film(
-        surface, trajectory, path, counts, model, film_um, statistics, readings, predicted_um
-    )
-
-
-def _require_motion(
-    source: str, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
-) -> None:
-    if len(path):
-        return
-    reasons = {
-        'not finite': counts.not_finite,
-        'without a unit quaternion': counts.not_unit_quaternions,
-        'with a repeated stamp': counts.repeated_stamps,
-        'with a backward stamp': counts.backward_stamps,
-        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
-    }
-    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
-    raise RecordingError(
-        f'{source}: no two of its {counts.received} poses make a motion'
-        f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
-    )
+        surface, trajectory, path, seen.counts, model, film_um, statistics, geometry, readings,
+        predicted_um,
+    )  # fmt: skip

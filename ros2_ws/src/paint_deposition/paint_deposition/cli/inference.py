@@ -14,10 +14,12 @@ from paint_deposition.cli.options import (
     FILE,
     JSON,
     PICTURES,
+    geometry_lines,
     model_option,
     output_option,
     read_inputs,
     say_all,
+    say_geometry,
     say_results,
     seed_option,
     write_results,
@@ -72,6 +74,7 @@ def compare_command(
         tell('writing the report')
         files = write_results(comparison, output, pictures=pictures)
     say_all('note', data.understood)
+    say_geometry(comparison)
     say_all('warning', comparison.warnings)
     say_results(files, as_json, _comparison_lines(comparison, output))
 
@@ -99,6 +102,7 @@ def _side_by_side_lines(beside: pd.SideBySide, output: Path) -> Iterator[str]:
 
 
 def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
+    yield from geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -149,6 +153,7 @@ def diagnose_command(
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell, pictures)
     say_all('note', data.understood)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -194,6 +199,7 @@ def refit_command(
         )  # fmt: skip
         files = _write(diagnosis, output, start, tell, pictures)
     say_all('note', data.understood)
+    say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     say_results(files, as_json, _diagnosis_lines(diagnosis, output))
 
@@ -250,5 +256,6 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:
         yield f'note: {note}'
+    yield from geometry_lines(diagnosis)
     yield f'model: {output / "model.yaml"}'
     yield f'report: {output / "report.html"}'

@@ -25,7 +25,7 @@ COMMANDS = {
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
-    'inspect': ('recordings', 'Show what a bag or a RAPID module holds.'),
+    'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 

@@ -95,8 +95,12 @@ GUN_SIGNAL = click.option(
 )
 MESH_SCALE = click.option(
     '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-    help='Metres per unit of the mesh file; 0.001 for millimetres.',
+    help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP tell their '
+    'unit: leave it out there.',
 )  # fmt: skip
+BODY = click.option(
+    '--body', help='The one body to take of a mesh file with several; default: all as one part.'
+)
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
     help='A longer time between poses is a gap: gun off.',
@@ -140,6 +144,17 @@ def say_all(label: str, lines: Iterable[str]) -> None:
     """Print each line behind its label on stderr: notes, warnings."""
     for line in lines:
         click.echo(f'{label}: {line}', err=True)
+
+
+def say_geometry(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> None:
+    """Print what was odd in how the gun ran over the parts of a campaign, on stderr."""
+    for name, found in result.geometry.items():
+        say_all('warning', (f'{name}: {line}' for line in found.warnings))
+
+
+def geometry_lines(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> Iterator[str]:
+    """How the gun ran over each part of a campaign."""
+    return (f'{name}: {found.sentence}' for name, found in result.geometry.items())
 
 
 def write_results(result: Any, output: Path, **more: Any) -> list[Path]:

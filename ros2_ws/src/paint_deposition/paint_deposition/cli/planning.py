@@ -12,6 +12,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli.options import (
+    BODY,
     CAMPAIGN,
     FILE,
     JSON,
@@ -23,12 +24,14 @@ from paint_deposition.cli.options import (
     POSITIVE,
     direction_option,
     file_lines,
+    geometry_lines,
     max_edge_length_option,
     model_option,
     output_option,
     read_given_model,
     read_inputs,
     say_all,
+    say_geometry,
     say_results,
     seed_option,
     write_results,
@@ -91,6 +94,7 @@ def calibrate_command(
         result = pd.calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
         files = write_results(result, output, start=start, pictures=pictures)
+    say_geometry(result)
     if not as_json:
         say_all('note', data.understood)
         say_all('warning', result.warnings)
@@ -98,6 +102,7 @@ def calibrate_command(
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
+    yield from geometry_lines(result)
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
@@ -165,7 +170,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@click.option('--mesh', required=True, type=FILE, help='STL, PLY or OBJ.')
+@click.option('--mesh', required=True, type=FILE, help='STL, PLY, OBJ, glTF, 3MF or STEP.')
 @MODEL
 @passes_wanted
 @click.option(
@@ -182,8 +187,9 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @click.option('--acceleration', 'acceleration_m_per_s2', default=2.0, show_default=True,
               type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
-@direction_option('--down', 'Gravity in the mesh frame; default: -z, or -y for a lying part.')
+@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @MESH_SCALE
+@BODY
 @max_edge_length_option(0.02)
 @click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
 @output_option('the bag, passes.csv, passes.mod, plan.json and the film')
@@ -196,6 +202,7 @@ def plan_command(
     travel_deg: float,
     down: np.ndarray | None,
     mesh_scale: float,
+    body: str | None,
     max_edge_length_m: float,
     frame_id: str,
     pictures: str,
@@ -206,7 +213,7 @@ def plan_command(
     model = read_given_model(model_file)
     with Progress('plan') as tell:
         tell('reading the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         result = pd.plan(
             surface, model, frame_id=frame_id, progress=tell, travel_rad=math.radians(travel_deg),
             **wanted,

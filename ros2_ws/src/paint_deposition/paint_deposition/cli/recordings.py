@@ -4,11 +4,21 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import click
 from tqdm import tqdm
 
-from paint_deposition.cli.options import FILE, GUN_SIGNAL, JSON, MAX_POSE_GAP
+from paint_deposition.cli.options import (
+    BODY,
+    FILE,
+    GUN_SIGNAL,
+    JSON,
+    MAX_POSE_GAP,
+    MESH_SCALE,
+    direction_option,
+    model_option,
+)
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_files import refuse_gun_signal
@@ -20,25 +30,56 @@ from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files
 
 
 @click.command('inspect')
-@click.argument('recording', type=FILE)
-@MAX_POSE_GAP
+@click.argument('recording', type=FILE, required=False)
+@click.option('--mesh', type=FILE, help='A part to set beside the motion.')
+@click.option('--trajectory', type=FILE, help='The motion to set beside the part; or RECORDING.')
+@click.option(
+    '--out', '--output', '-o', 'output', type=FILE,
+    help='Picture to draw, PNG: part, passes and tool axes from three sides.',
+)  # fmt: skip
+@model_option('Model that says where the spray goes; default: a 50 mm bell.')
+@click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.')
+@click.option('--state-topic', help='Trigger of the gun; default: it sprays whenever poses flow.')
 @GUN_SIGNAL
+@MESH_SCALE
+@BODY
+@direction_option('--down', 'Gravity in the mesh frame; default: as guessed.')
+@MAX_POSE_GAP
 @JSON
 def inspect_command(
-    recording: Path, max_pose_gap_s: float, gun_signal: str | None, as_json: bool
+    recording: Path | None,
+    mesh: Path | None,
+    trajectory: Path | None,
+    max_pose_gap_s: float,
+    gun_signal: str | None,
+    as_json: bool,
+    **options: Any,
 ) -> None:
-    """Show what RECORDING holds.
+    """Show what RECORDING holds, or how the gun ran over a part.
 
     Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
     targets, moves, speeds, where the gun is switched, and what could not be followed.
+
+    With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
+    part, and warnings of what is odd, each with its likely cause.
     """
-    if is_rapid(recording):
-        program = read_program(recording, gun_signal=gun_signal)
-        click.echo(_json(asdict(program), recording) if as_json else program_as_text(program))
+    motion = trajectory or recording
+    if motion is None or (trajectory and recording):
+        raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
+    if mesh is not None:
+        from paint_deposition.cli.geometry import show_gun_on_part
+
+        show_gun_on_part(mesh, motion, gun_signal, max_pose_gap_s, as_json, **options)
         return
-    refuse_gun_signal(recording, gun_signal)
-    summary = summarise(recording, max_pose_gap_s)
-    click.echo(_json(asdict(summary), recording) if as_json else _table(summary))
+    if any(options[name] for name in ('output', 'model_file', 'pose_topic', 'state_topic')):
+        raise click.UsageError('--out, --model and topics go with --mesh; give the part')
+    if is_rapid(motion):
+        program = read_program(motion, gun_signal=gun_signal)
+        click.echo(_json(asdict(program), motion) if as_json else program_as_text(program))
+        return
+    refuse_gun_signal(motion, gun_signal)
+    summary = summarise(motion, max_pose_gap_s)
+    click.echo(_json(asdict(summary), motion) if as_json else _table(summary))
 
 
 @click.command('recover')

@@ -11,6 +11,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli.options import (
+    BODY,
     FILE,
     GUN_SIGNAL,
     JSON,
@@ -35,7 +36,9 @@ if TYPE_CHECKING:
 
 
 @click.command('simulate')
-@click.option('--mesh', required=True, type=FILE, help='The part: STL, PLY or OBJ.')
+@click.option(
+    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
+)
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
@@ -60,10 +63,11 @@ if TYPE_CHECKING:
 )
 @GUN_SIGNAL
 @MESH_SCALE
+@BODY
 @max_edge_length_option(0.01)
 @MAX_POSE_GAP
 @direction_option(
-    '--down', 'Gravity in the mesh frame; default: -z, or -y for a part that lies in x-y.'
+    '--down', 'Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.'
 )
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
@@ -81,6 +85,7 @@ def simulate_command(
     state_topic: str | None,
     gun_signal: str | None,
     mesh_scale: float,
+    body: str | None,
     max_edge_length_m: float,
     down: np.ndarray | None,
     pictures: str,
@@ -99,7 +104,7 @@ def simulate_command(
         model = read_given_model(model_file)
         recorded = pd.read_recording(trajectory, pose_topic, state_topic, gun_signal)
         tell('refining the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down)
+        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
@@ -113,12 +118,13 @@ def simulate_command(
         files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
-    say_all('warning', filter(None, [film.warning]))
+    say_all('warning', film.warnings)
     say_results(files, as_json, [*_lines(film), *file_lines(files)])
 
 
 def _lines(film: pd.Film) -> Iterator[str]:
     s, counts = film.statistics, film.counts
+    yield film.geometry.sentence
     yield (
         f'film {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
         f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
@@ -135,6 +141,7 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
+    yield film.geometry.facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (
             f'{counts.rejected} of {counts.received} poses dropped, {counts.gaps} gaps taken as '

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -9,7 +10,9 @@ from scipy.stats import spearmanr
 
 from paint_deposition.comparison.regions import Region, misfit_regions
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.fitting.study import Study
+from paint_deposition.readings.geometry import geometry_by_experiment
 from paint_deposition.readings.residuals import Residuals
 
 
@@ -68,9 +71,15 @@ class Comparison:
             f'{len(self.regions)} regions of misfit)'
         )
 
+    @cached_property
+    def geometry(self) -> dict[str, SprayGeometry]:
+        """How the gun ran over each part, by experiment."""
+        return geometry_by_experiment(self.study.campaign, self.model)
+
     def to_dict(self) -> dict[str, Any]:
         """The content of ``comparison.json``."""
         return {
+            'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'readings': len(self.readings),
             'noise': self.study.noise_figures,
             'left_out': [slip.to_dict() for slip in self.study.slips],

@@ -14,6 +14,7 @@ from paint_deposition.diagnosis.pattern_shift import PatternShift
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.posterior import posterior_of
 from paint_deposition.fitting.random_effects import Amount, amounts
@@ -187,6 +188,11 @@ class Diagnosis:
         """Each model of the history beside the readings."""
         return tuple(compare(self.study, step.model) for step in self.history)
 
+    @property
+    def geometry(self) -> dict[str, SprayGeometry]:
+        """How the gun ran over each part, by experiment."""
+        return self.comparisons[-1].geometry
+
     @cached_property
     def proposals(self) -> tuple[list[Place], list[Spray]]:
         """Places to measure and sprays that would settle the diagnosis, best first."""
@@ -223,5 +229,6 @@ class Diagnosis:
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
             'left_out': [slip.to_dict() for slip in self.study.slips],
+            'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),
         }

@@ -16,6 +16,7 @@ from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.words import UNITS_M, words_of
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
+from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.readings.campaign import Campaign, Experiment
 
@@ -73,6 +74,7 @@ class _Entry(BaseModel, extra='forbid'):
     pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
     state_topic: Text | None = Field(None, description='the name of a topic of the recording')
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
+    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
         DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
@@ -139,9 +141,10 @@ def _read_experiment(
     kinds = ('mesh', 'trajectory', 'measurements')
     files = {kind: str(folder / getattr(entry, kind)) for kind in kinds}
     down = None if entry.down is None else np.array(entry.down)
-    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down)
+    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
     trajectory = read_trajectory(files['trajectory'], entry.pose_topic, entry.state_topic)
     path, counts = spray_path(trajectory, entry.max_pose_gap_s)
+    require_spraying(trajectory, path)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     for note in (*surface.notes, *trajectory.notes):
         progress(f'{name}: {note}')
@@ -150,7 +153,9 @@ def _read_experiment(
     points = None if entry.points is None else folder / entry.points
     readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)
-    return Experiment.of(name, surface, path, readings, files, trajectory.settings, off)
+    return Experiment.of(
+        name, surface, path, readings, files, trajectory.settings, off, trajectory.frame_id
+    )
 
 
 def _layout(entry: _Entry) -> Layout:

@@ -1,17 +1,16 @@
-"""Part meshes in (STL, PLY, OBJ) and painted meshes out (PLY)."""
+"""Part meshes in, and painted meshes out (PLY)."""
 
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.errors import MeshError
 from paint_deposition.files.atomic import replacing
+from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.creases import Edges
 from paint_deposition.part.refinement import face_areas_m2, weld
 from paint_deposition.part.surface import Surface
 
-SUFFIXES = ('.stl', '.ply', '.obj')
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
 # Triangles lower than this have no direction that could be trusted.
@@ -23,6 +22,7 @@ def read_mesh(
     scale: float = 1.0,
     max_edge_length_m: float = 0.02,
     down: np.ndarray | None = None,
+    body: str | None = None,
 ) -> Surface:
     """Read a part and refine it.
 
@@ -31,10 +31,12 @@ def read_mesh(
     are turned to the majority, both with a note in ``Surface.notes``.
 
     Args:
-        path: STL, PLY or OBJ.
-        scale: metres per unit of the file, 0.001 for millimetres.
+        path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
+        scale: metres per unit of the file, 0.001 for millimetres. glTF is in metres, and 3MF and
+            STEP tell their unit: there it comes on top, for files whose unit is wrong.
         max_edge_length_m: longest edge after refinement [m].
-        down: gravity in the mesh frame; default: -z if the part stands, -y if it lies in x-y.
+        down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
+        body: name of the one body to take of several; default: all as one part, with a note.
 
     Raises:
         MeshError: no file, not a mesh, or nothing that could be painted; says what to do.
@@ -45,11 +47,10 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    vertices, faces = _load(path)
-    vertices = vertices * scale
+    read = _load(path, body)
+    vertices, faces, notes = read.vertices * (read.unit_m * scale), read.faces, [*read.notes]
     _check_extent(path, vertices[faces.ravel()])
     vertices, faces = weld(vertices, faces)
-    notes: list[str] = []
     faces = _without_degenerate(path, vertices, faces, notes)
     faces = _oriented(vertices, faces, notes)
     return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
@@ -87,7 +88,7 @@ def _require_positive(name: str, value: float, meaning: str) -> None:
         raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
 
 
-def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
+def _load(path: Path, body: str | None) -> Bodies:
     if path.suffix.lower() not in SUFFIXES:
         raise MeshError(
             f'{path}: a mesh of type "{path.suffix}" cannot be read; '
@@ -95,19 +96,8 @@ def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
         )
     if not path.is_file():
         raise MeshError(f'{path}: no such mesh file; check the path')
-    import trimesh
-
-    kind = path.suffix.lower()[1:]
-    content = _as_utf8(path, kind)
-    try:
-        mesh = trimesh.load_mesh(
-            BytesIO(content), file_type=kind, process=False, validate=False, skip_materials=True
-        )
-        vertices = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
-        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-    except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
-        reason = (str(error).strip() or type(error).__name__).splitlines()[0][:120]
-        raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
+    bodies = read_bodies(path, body)
+    vertices, faces = bodies.vertices, bodies.faces
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -120,24 +110,7 @@ def _load(path: Path) -> tuple[np.ndarray, np.ndarray]:
         raise MeshError(
             f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
         )
-    return vertices, faces
-
-
-def _as_utf8(path: Path, kind: str) -> bytes:
-    """The file's bytes, those of a text with letters of any encoding made readable."""
-    content = path.read_bytes()
-    if kind == 'ply':
-        return content
-    if kind == 'stl':
-        triangles = int.from_bytes(content[80:84], 'little')
-        if len(content) == 84 + 50 * triangles:
-            return content
-        if content and b'facet' not in content:
-            raise MeshError(
-                f'{path}: not readable as a mesh, neither a text STL nor, with its '
-                f'{len(content)} bytes, a complete binary one; export it again'
-            )
-    return content.decode('utf-8', errors='replace').encode()
+    return bodies
 
 
 def _check_extent(path: Path, corners_m: np.ndarray) -> None:

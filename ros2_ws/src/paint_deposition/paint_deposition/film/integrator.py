@@ -33,6 +33,8 @@ BATCH = 2048
 _KERNEL_LOCK = threading.Lock()
 # Fewer rays, points times sub-steps, are painted before other threads wake.
 FEW_RAYS = 500_000
+# Where the thickest film is thinner no paint landed: no gauge shows it.
+NO_PAINT_UM = 0.05
 
 
 @contextmanager

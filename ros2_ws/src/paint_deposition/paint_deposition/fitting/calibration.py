@@ -7,12 +7,14 @@ as every film, so that door and panel alike can be in a campaign.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
@@ -23,6 +25,7 @@ from paint_deposition.fitting.sifting import sifted
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.uniformity import sigma_n_closed_form
 from paint_deposition.readings.campaign import Campaign
+from paint_deposition.readings.geometry import geometry_by_experiment
 from paint_deposition.readings.panel import Panel
 from paint_deposition.readings.plausibility import (
     check_enough,
@@ -123,8 +126,14 @@ class Calibration:
             'converged': self.fit.converged,
             'noise': study.noise_figures,
             'left_out': [slip.to_dict() for slip in study.slips],
+            'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'warnings': list(self.warnings),
         }
+
+    @cached_property
+    def geometry(self) -> dict[str, SprayGeometry]:
+        """How the gun ran over each part, by experiment."""
+        return geometry_by_experiment(self.study.campaign, self.model)
 
     @property
     def model(self) -> DepositionModel:

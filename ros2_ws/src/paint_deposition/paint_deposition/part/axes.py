@@ -2,8 +2,9 @@
 
 import numpy as np
 
-# A part that leans less than this from the horizontal lies flat: it has no right side [rad].
-FLAT_RAD = 1e-3
+# A part that leans less than this from the horizontal lies flat: its lean says not which side is
+# the right one [rad].
+FLAT_RAD = np.radians(3.0)
 
 
 def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:

@@ -59,6 +59,7 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
             surface,
             faces=np.ascontiguousarray(surface.faces[:, ::-1]),
             normals=-surface.normals,
+            curved_edges=surface.curved_edges.turned(),
             notes=(*surface.notes, note),
         )
     if not len(axes) or is_one_sided(surface.normals, surface.vertex_areas_m2):

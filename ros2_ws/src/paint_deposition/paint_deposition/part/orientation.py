@@ -13,6 +13,8 @@ MOST_ROUNDS = 32
 STANDING_COSINE = 0.7
 # Share of a closed body's surface along one direction that makes it a plate.
 PLATE_SHARE = 0.7
+# A part drawn flat is no further from the plane z = 0 of its file.
+DRAWN_FLAT_M = 0.1
 
 
 def outward_side(
@@ -52,20 +54,43 @@ def mean_normal(normals: np.ndarray, areas_m2: np.ndarray | None) -> np.ndarray:
     return np.average(normals, axis=0, weights=areas_m2) if len(normals) else np.zeros(3)
 
 
-def gravity(normals: np.ndarray, areas_m2: np.ndarray) -> np.ndarray:
-    """Guess which way is down: -z for a part that stands, -y for one drawn lying in x-y.
+def gravity(
+    vertices_m: np.ndarray, normals: np.ndarray, areas_m2: np.ndarray
+) -> tuple[np.ndarray, str]:
+    """Guess which way is down, and say so where it is a guess.
 
-    A closed body lies if most of its surface does: that of a plate, not that of a block.
+    Down is -z. A part that lies in x-y does so in the booth, a hood or a roof, if it is away from
+    the plane z = 0. In that plane it was drawn flat, and hangs: down is -y.
+
+    Args:
+        vertices_m: (V, 3) [m]. normals: (V, 3) outward. areas_m2: (V,).
+
+    Returns:
+        (3,) unit vector, and a note for the user, '' for a part that stands.
     """
+    if not _lies(normals, areas_m2):
+        return np.array([0.0, 0.0, -1.0]), ''
+    low, high = vertices_m[:, 2].min() - DRAWN_FLAT_M, vertices_m[:, 2].max() + DRAWN_FLAT_M
+    if low <= 0.0 <= high:
+        return np.array([0.0, -1.0, 0.0]), (
+            'the part lies in x-y at z = 0, as if drawn flat: gravity is taken along -y of the '
+            'mesh; if it lies so in the booth, as a hood or a roof does, give down 0 0 -1'
+        )
+    return np.array([0.0, 0.0, -1.0]), (
+        'the part lies, as a hood or a roof does: gravity is taken along -z of the mesh; if it '
+        'hangs while it is painted, give down'
+    )
+
+
+def _lies(normals: np.ndarray, areas_m2: np.ndarray) -> bool:
+    """Whether most of the surface does; a closed body lies as a plate, not as a block."""
     mean = mean_normal(normals, areas_m2)
     length = np.linalg.norm(mean)
     if length > CANCELLED:
-        lies = abs(mean[2]) >= STANDING_COSINE * length
-    else:
-        spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
-        shares, directions = np.linalg.eigh(spread)
-        lies = shares[-1] > PLATE_SHARE and abs(directions[2, -1]) >= STANDING_COSINE
-    return np.array([0.0, -1.0, 0.0]) if lies else np.array([0.0, 0.0, -1.0])
+        return bool(abs(mean[2]) >= STANDING_COSINE * length)
+    spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
+    shares, directions = np.linalg.eigh(spread)
+    return bool(shares[-1] > PLATE_SHARE and abs(directions[2, -1]) >= STANDING_COSINE)
 
 
 def _facing_side(

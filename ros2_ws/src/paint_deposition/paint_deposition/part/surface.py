@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.part import creases, curvature, edge_distance, hems, slope
+from paint_deposition.part.facets import NO_EDGES, CurvedEdges
 from paint_deposition.part.locating import Location, SurfaceLocator
 from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
@@ -35,6 +36,7 @@ class Surface:
         gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
             of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
+        curved_edges: where the mesh as it was read is coarser than its curvature.
     """
 
     vertices_m: np.ndarray
@@ -46,6 +48,7 @@ class Surface:
     notes: tuple[str, ...] = ()
     gun_side: np.ndarray | None = None
     in_hem: np.ndarray | None = None
+    curved_edges: CurvedEdges = NO_EDGES
 
     def __repr__(self) -> str:
         return f'Surface({len(self.vertices_m)} vertices, {self.area_m2:.2f} m²)'
@@ -78,16 +81,13 @@ class Surface:
         rim = creases.rim_folds(vertices_m, faces, edges)
         origin, patches = creases.split_at_creases(vertices_m, faces, edges, rim)
         strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
-        vertices, normals, fine = refine(
-            vertices_m[origin],
-            surface_normals(vertices_m[origin], patches),
-            patches,
-            max_edge_length_m,
-        )
+        corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
+        vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
         vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
         if down is None:
-            down = gravity(normals, vertex_areas)
+            down, guess = gravity(vertices, normals, vertex_areas)
+            notes = (*notes, guess) if guess else notes
         down = np.asarray(down, dtype=np.float64)
         return Surface(
             vertices,
@@ -98,6 +98,7 @@ class Surface:
             creases.rim_segments_m(vertices_m, faces, edges, rim),
             notes,
             in_hem=hems.carried_over(strip, fine, len(vertices)),
+            curved_edges=CurvedEdges.of(corners, read_normals, patches),
         )
 
     @cached_property

@@ -82,11 +82,6 @@ def pass_axes(
     if not np.linalg.norm(side) > 0.0:
         raise PlanError('outward is a vector of length 0; give the direction to the gun')
     side = side / np.linalg.norm(side)
-    if np.linalg.norm(np.cross(side, surface.down)) < 0.1:
-        raise PlanError(
-            'gravity points along the gun: level is not defined; give gravity in the plane of '
-            'the part (down)'
-        )
     toward = across_axis if direction == 'horizontal' else downhill_axis
     travel = toward(side, surface.down)
     return PassAxes(surface.centre_m, travel, np.cross(-side, travel), side)

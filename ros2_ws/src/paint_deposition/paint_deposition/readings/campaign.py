@@ -38,6 +38,7 @@ class Experiment:
         files: where mesh, trajectory and readings came from, for reports.
         settings: of the process, by name, where known.
         switched_off: of the cell while the part was painted: 'voltage', 'draught'.
+        frame_id: of the recorded poses, '' where not known.
     """
 
     name: str
@@ -51,6 +52,7 @@ class Experiment:
     files: dict[str, str] = field(default_factory=dict)
     settings: Mapping[str, float] = field(default_factory=dict)
     switched_off: frozenset[str] = frozenset()
+    frame_id: str = ''
 
     @staticmethod
     def of(
@@ -61,6 +63,7 @@ class Experiment:
         files: dict[str, str] | None = None,
         settings: Mapping[str, float] | None = None,
         switched_off: frozenset[str] = frozenset(),
+        frame_id: str = '',
     ) -> 'Experiment':
         """Match readings to the surface; those without groups get the rows or columns found.
 
@@ -81,7 +84,7 @@ class Experiment:
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
             name, surface, path, readings, means, points, readings, used, files or {},
-            settings or {}, switched_off,
+            settings or {}, switched_off, frame_id,
         )  # fmt: skip
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
@@ -101,7 +104,7 @@ class Experiment:
         used[used] = ~left_out
         kept = Experiment.of(
             self.name, self.surface, self.path, self.taken.select(used), self.files,
-            self.settings, self.switched_off,
+            self.settings, self.switched_off, self.frame_id,
         )  # fmt: skip
         return replace(kept, taken=self.taken, used=used)
 

@@ -29,7 +29,7 @@ PAINTING = dict(
         **mesh_parameters(max_edge_length_m=0.01),
         down=direction(
             'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
-            'stands, -y for one drawn lying in x-y [-]'
+            'stands or lies, -y for one drawn flat at z = 0 [-]'
         ),
     ),
     part_pose=NodeParameter(

@@ -4,6 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.part.axes import downhill_axis
+
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
 
@@ -26,11 +28,24 @@ class View:
         """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
         toward, down = _snapped(outward), _snapped(down)
         up = -down + (down @ toward) * toward
-        if np.linalg.norm(up) < 0.1:  # a part seen from straight above: its y is up
-            up = np.eye(3)[1] - toward[1] * toward
+        if np.linalg.norm(up) < 0.1:  # a part seen from straight above, a hood: its front below
+            up = -_snapped(downhill_axis(outward, down))
+            up = up - (up @ toward) * toward
         up /= np.linalg.norm(up)
         right = np.cross(up, toward)
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
+
+    def from_the_right(self) -> 'View':
+        """The same part seen from the right of this picture."""
+        return View(
+            -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
+        )
+
+    def from_above(self) -> 'View':
+        """The same part seen from the top of this picture, its front below."""
+        return View(
+            self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
+        )
 
     def flat(self, points_m: np.ndarray) -> np.ndarray:
         """(..., 2) where points (..., 3) lie in the picture [m]."""

@@ -1,0 +1,95 @@
+"""How far the facets of a mesh are from the curved surface that they stand for.
+
+Between two corners the refined mesh is straight, and its normals turn evenly. A curve through the
+corners does neither. Its slope against the edge, averaged along the edge, is zero, since it leaves
+one corner and arrives at the other. The corners' normals say what the slope is at both ends; with
+a parabola for the slope in between, which has that average, the curve's middle is known:
+
+    lean = (n_a + n_b) . e / 2           slope that an even turn has on average, to be taken away
+    normal in the middle:  n - 1.5 lean e
+    point in the middle:   + length turn / 8 along n,   turn = (n_b - n_a) . e
+
+with e along the edge (Vlachos et al., Curved PN triangles, 2001, for the same parabola). On a
+plane both are zero. Where the curvature begins or ends, the corners' normals are off themselves,
+and lean shows that, too.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+# Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
+LEAST_ERROR = 5e-4
+GUN_M = 0.3
+# What a shorter edge costs lies within the spot of a gauge: fillets and hems.
+LEAST_EDGE_M = 0.004
+MOST_EDGES = 5_000
+
+
+@dataclass(frozen=True)
+class CurvedEdges:
+    """Middles of the E edges of a mesh at which it is furthest from a curve.
+
+    Attributes:
+        middles_m, normals: (E, 3) as the refined mesh has them [m], and outward unit normals.
+        curved_m, curved_normals: (E, 3) as the curve has them.
+        lengths_m: (E,) of the edges as they were read [m].
+        turns_rad: (E,) by which the normals turn along the edge [rad].
+    """
+
+    middles_m: np.ndarray
+    normals: np.ndarray
+    curved_m: np.ndarray
+    curved_normals: np.ndarray
+    lengths_m: np.ndarray
+    turns_rad: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.lengths_m)
+
+    def turned(self) -> 'CurvedEdges':
+        """The same of the surface's other side."""
+        return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
+
+    @staticmethod
+    def of(vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> 'CurvedEdges':
+        """Find them on the triangles of a file.
+
+        Facets that meet at a crease, see ``creases.CREASE_RAD``, have corners and normals of their
+        own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
+
+        Args:
+            vertices_m, normals: (V, 3) corners of smooth patches [m], unit normals.
+            faces: (F, 3).
+        """
+        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
+        start, end = np.unique(np.sort(ends, axis=1), axis=0).T
+        along = vertices_m[end] - vertices_m[start]
+        lengths = np.linalg.norm(along, axis=1)
+        along /= lengths[:, None]
+        at_start = np.einsum('ij,ij->i', normals[start], along)
+        at_end = np.einsum('ij,ij->i', normals[end], along)
+        lean, turn = 0.5 * (at_start + at_end), at_end - at_start
+        sagitta = lengths * turn / 8.0
+        error = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
+        error[lengths < LEAST_EDGE_M] = 0.0
+        worst = np.argsort(-error, kind='stable')[:MOST_EDGES]
+        worst = worst[error[worst] > LEAST_ERROR]
+        start, end, along, lean = start[worst], end[worst], along[worst], lean[worst]
+        normal = _unit(normals[start] + normals[end])
+        middle = 0.5 * (vertices_m[start] + vertices_m[end])
+        return CurvedEdges(
+            middle,
+            normal,
+            middle + sagitta[worst, None] * normal,
+            _unit(normal - 1.5 * lean[:, None] * along),
+            lengths[worst],
+            np.arccos(np.clip(np.einsum('ij,ij->i', normals[start], normals[end]), -1.0, 1.0)),
+        )
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+
+
+NO_EDGES = CurvedEdges(*[np.empty((0, 3))] * 4, *[np.empty(0)] * 2)

@@ -1,0 +1,297 @@
+"""Wrong geometry, fed to the real command, is named by its cause."""
+
+import json
+import shutil
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from booth import SAMPLES, serpentine
+from cli.command import assert_refused, paint
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.motion.trajectory import Trajectory
+
+TRIGGER = ('--state-topic', '/atomizer/state')
+COARSE = ('--max-edge-length-m', 0.05)
+
+
+@pytest.fixture(scope='module')
+def panel(tmp_path_factory):
+    """A standing panel of 1.2 m by 0.8 m that looks to -y, bulged by 30 mm, as an STL."""
+    x, z = np.meshgrid(np.linspace(-0.6, 0.6, 25), np.linspace(-0.4, 0.4, 17), indexing='ij')
+    y = 0.03 * ((x / 0.6) ** 2 + (z / 0.4) ** 2) - 0.03
+    corner = np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
+    a, b, c, d = corner, corner + 17, corner + 18, corner + 1
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
+    vertices = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    trimesh.Trimesh(vertices, faces, process=False).export(path)
+    return path
+
+
+def three_passes() -> Trajectory:
+    """Three level passes over the panel at 0.25 m and 0.4 m/s, with a trigger."""
+    return replace(
+        serpentine((0.3, 0.0, -0.3), half_width_m=0.9, opens_at_m=0.7, speed_m_per_s=0.4),
+        frame_id='base_link',
+    )
+
+
+def shifted(x: float, y: float, z: float) -> Trajectory:
+    motion = three_passes()
+    return replace(motion, positions_m=motion.positions_m + np.array([x, y, z]))
+
+
+def tool_turned(axis: str, degrees: float) -> Trajectory:
+    motion = three_passes()
+    turn = Rotation.from_euler(axis, degrees, degrees=True)
+    turned = Rotation.from_quat(motion.quaternions_xyzw) * turn
+    return replace(motion, quaternions_xyzw=turned.as_quat())
+
+
+def in_another_frame(degrees: float, origin_m) -> Trajectory:
+    motion = three_passes()
+    turn = Rotation.from_euler('z', degrees, degrees=True)
+    return replace(
+        motion,
+        positions_m=turn.apply(motion.positions_m) + origin_m,
+        quaternions_xyzw=(turn * Rotation.from_quat(motion.quaternions_xyzw)).as_quat(),
+    )
+
+
+def in_millimetres() -> Trajectory:
+    return replace(three_passes(), positions_m=1000.0 * three_passes().positions_m)
+
+
+def with_one_pass_above() -> Trajectory:
+    return serpentine((1.3, 0.3, 0.0, -0.3), half_width_m=0.9, opens_at_m=0.7, speed_m_per_s=0.4)
+
+
+@pytest.fixture
+def simulate(panel, tmp_path):
+    """Run the command over a motion, its trigger named unless options say otherwise."""
+
+    def run(motion: Trajectory, *options, mesh=panel):
+        bag = write_pose_bag(tmp_path / 'bag', motion)
+        return paint(
+            'simulate', '--mesh', mesh, '--trajectory', bag, *COARSE, *(options or TRIGGER),
+            '-o', tmp_path / 'out',
+        )  # fmt: skip
+
+    return run
+
+
+def warnings_of(done) -> list[str]:
+    assert done.returncode == 0, done.stderr
+    return [line for line in done.stderr.splitlines() if line.startswith('warning: ')]
+
+
+def test_a_right_geometry_is_one_line_without_a_warning(simulate):
+    done = simulate(three_passes(), *TRIGGER, '--json')
+    assert done.stderr == ''
+    found = json.loads(done.stdout)['geometry']
+    assert found['passes'] == 3
+    assert found['speed_m_per_s'] == pytest.approx(0.4, rel=1e-3)
+    # The gun runs 0.25 m before the plane y = 0; the panel bulges from there by up to 30 mm.
+    assert 0.22 < found['standoff_low_m'] < found['standoff_m'] < found['standoff_high_m'] < 0.28
+    assert 0.0 < found['off_normal_deg'] < 10.0
+    # A sheet without folds catches what its straight rays meet.
+    capture = json.loads(done.stdout)['capture_fraction']
+    assert found['paint_over_part'] == pytest.approx(capture, abs=0.005)
+    assert found['warnings'] == []
+
+
+def test_the_line_is_printed_first(simulate):
+    first = simulate(three_passes()).stdout.splitlines()[0]
+    assert first.startswith('3 passes, 0.40 m/s, TCP 0.2')
+    assert ' degrees off its normal, ' in first
+    assert first.endswith(' % of the paint over the part')
+
+
+@pytest.mark.parametrize(
+    ('motion', 'words'),
+    [
+        (partial(tool_turned, 'y', 90.0), ['z runs along the travel', 'tool -x points']),
+        (partial(tool_turned, 'x', 90.0), ['z is 9', 'off the surface normal', 'tool +y points']),
+        (partial(shifted, 0.0, -0.75, 0.0), ['TCP is 0.99', 'the model plane is 0.25 m']),
+        (partial(shifted, 0.0, 0.15, 0.0), ['TCP is 0.09', 'the model plane is 0.25 m']),
+        (partial(shifted, 0.3, 0.0, 0.0), ['0.30 m aside', 'toward +x']),
+        (partial(shifted, -0.3, 0.0, 0.0), ['0.30 m aside', 'toward -x']),
+        (partial(shifted, 0.0, 0.0, 0.3), ['0.30 m aside', 'toward +z']),
+        (partial(shifted, 0.0, 0.0, -0.3), ['0.30 m aside', 'toward -z']),
+        (partial(shifted, 0.75, 0.0, 0.0), ['0.75 m aside', 'toward +x']),
+        (with_one_pass_above, ['pass 1 of 4 misses the part', 'trigger']),
+    ],
+)
+def test_an_odd_geometry_is_warned_of_by_its_cause(simulate, motion, words):
+    (line,) = warnings_of(simulate(motion()))
+    assert all(word in line for word in words), line
+
+
+@pytest.mark.parametrize(
+    ('motion', 'words'),
+    [
+        (partial(tool_turned, 'x', 180.0), ['tool z is reversed']),
+        (partial(shifted, 0.0, 0.75, 0.0), ['behind the part and looks away', "'base_link'"]),
+        (in_millimetres, ['look like millimetres', 'in metres']),
+        (
+            partial(in_another_frame, 90.0, (1.8, 3.2, 1.1)),
+            ['another frame', "'base_link' span x 2.05 to 2.05", 'y 2.50 to 3.90',
+             'z 0.80 to 1.40', 'mesh x -0.60 to 0.60', 'z -0.40 to 0.40', '--part-pose'],
+        ),
+    ],
+)  # fmt: skip
+def test_a_motion_that_paints_nothing_is_refused_by_its_cause(simulate, tmp_path, motion, words):
+    assert_refused(simulate(motion()), 'no paint lands on the part', *words)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_frame_that_is_turned_is_told_with_both_boxes(simulate):
+    (line,) = warnings_of(simulate(in_another_frame(90.0, (0.0, 0.0, 0.0))))
+    assert 'another frame than the mesh' in line
+    assert "'base_link' span x 0.25 to 0.25, y -0.70 to 0.70" in line
+
+
+def test_passes_beside_the_part_are_told_with_both_boxes(simulate):
+    (line,) = warnings_of(simulate(shifted(0.0, 0.0, -1.1)))
+    assert 'the passes miss the part' in line
+    assert "frame 'base_link' span x -0.70 to 0.70" in line
+
+
+def test_a_mesh_in_metres_that_is_read_as_millimetres_is_refused(simulate, panel):
+    done = simulate(three_passes(), *TRIGGER, '--mesh-scale', 0.001)
+    assert_refused(done, 'only 1.2 mm large', 'larger --mesh-scale')
+
+
+def test_a_small_mesh_in_millimetres_is_refused(simulate, panel, tmp_path):
+    """A panel of 40 mm is 40 m in metres: below the size that is refused when it is read."""
+    small = trimesh.load_mesh(panel, process=False)
+    small.apply_scale(1000.0 / 30.0)
+    small.apply_translation([60.0, 0.0, 0.0])
+    small.export(tmp_path / 'mm.stl')
+    done = simulate(
+        serpentine((0.0,), half_width_m=0.12, opens_at_m=0.1), *TRIGGER,
+        '--max-edge-length-m', 1.0, mesh=tmp_path / 'mm.stl',
+    )  # fmt: skip
+    assert_refused(done, 'the mesh looks like millimetres', '--mesh-scale 0.001')
+
+
+def test_a_trigger_that_never_opens_is_refused(simulate):
+    motion = replace(three_passes(), trigger_flow=0.0 * three_passes().trigger_flow)
+    assert_refused(simulate(motion), 'never sprays', 'none of the 6 messages', '--state-topic')
+
+
+def test_a_trigger_of_another_time_is_refused(simulate):
+    motion = three_passes()
+    late = motion.trigger_stamps_ns + 500_000_000_000
+    done = simulate(replace(motion, trigger_stamps_ns=late))
+    assert_refused(done, 'never sprays while there are poses', '501 s after', 'one clock')
+
+
+def test_a_pass_that_misses_without_a_trigger_is_told_to_name_one(simulate):
+    (line,) = warnings_of(simulate(with_one_pass_above(), '--max-pose-gap-s', 0.3))
+    assert 'pass 1 of 4 misses the part' in line
+    assert 'no trigger is known' in line
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('mesh', 'bag'),
+    [
+        ('door.stl', 'door_horizontal'), ('door.stl', 'door_vertical'), ('panel.stl', 'panel_577'),
+        ('measured_door/door.stl', 'measured_door/door'),
+    ],
+)  # fmt: skip
+def test_the_samples_are_not_warned_of(mesh, bag, tmp_path):
+    recorded = read_trajectory(SAMPLES / bag, None, '/atomizer/state')
+    done = paint(
+        'simulate', '--mesh', SAMPLES / mesh, '--trajectory', SAMPLES / bag, *TRIGGER, *COARSE,
+        '--json', '-o', tmp_path,
+    )  # fmt: skip
+    assert done.stderr == ''
+    passes = json.loads(done.stdout)['geometry']['passes']
+    assert passes == np.sum(np.diff(recorded.trigger_flow) > 0.0)
+
+
+@pytest.fixture
+def campaign(panel, tmp_path):
+    """Write a campaign: the panel, readings of a plausible film, and a motion."""
+
+    def written(motion: Trajectory):
+        write_pose_bag(tmp_path / 'run', motion)
+        x, z = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.4, 0.4, 6), [-0.2, 0.0, 0.2]))
+        y = 0.03 * ((x / 0.6) ** 2 + (z / 0.4) ** 2) - 0.03
+        film_um = 12.0 - 10.0 * x**2 - 20.0 * z**2
+        rows = [','.join(f'{v:.4f}' for v in row) for row in zip(x, y, z, film_um, strict=True)]
+        (tmp_path / 'panel.csv').write_text('\n'.join(['x_m,y_m,z_m,thickness_um', *rows]))
+        (tmp_path / 'model.yaml').write_text('planar: {K1_cm3_per_s: 1.9}\n')
+        (tmp_path / 'campaign.yaml').write_text(
+            f'experiments:\n  - {{name: test panel, mesh: {panel}, trajectory: run, '
+            'state_topic: /atomizer/state, measurements: panel.csv}\n'
+        )
+        return tmp_path / 'campaign.yaml', '--model', tmp_path / 'model.yaml'
+
+    return written
+
+
+@pytest.mark.slow
+def test_a_campaign_says_how_each_part_was_painted(campaign, tmp_path):
+    done = paint('compare', *campaign(three_passes()), '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith('test panel: 3 passes, 0.40 m/s, TCP 0.2')
+    assert 'warning' not in done.stderr
+    figures = json.loads((tmp_path / 'out/comparison.json').read_text())['geometry']['test panel']
+    assert figures['sentence'] in done.stdout
+    assert figures['passes'] == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('command', ['compare', 'calibrate'])
+def test_a_campaign_with_odd_geometry_is_warned_of_by_its_experiment(command, campaign, tmp_path):
+    done = paint(command, *campaign(shifted(0.3, 0.0, 0.0)), '--json', '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert 'warning: test panel: the passes lie 0.30 m aside' in done.stderr
+    (found,) = json.loads(done.stdout)['geometry']['test panel']['warnings']
+    assert found in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('command', ['compare', 'calibrate', 'diagnose'])
+def test_a_campaign_without_paint_is_refused_by_its_experiment(command, campaign, tmp_path):
+    files = campaign(tool_turned('x', 180.0))
+    done = paint(command, *files, '-o', tmp_path / 'out')
+    assert_refused(done, "experiment 'test panel'", 'no paint lands', 'tool z is reversed')
+
+
+def test_a_campaign_whose_trigger_never_opens_is_refused(campaign, tmp_path):
+    closed = replace(three_passes(), trigger_flow=0.0 * three_passes().trigger_flow)
+    done = paint('compare', *campaign(closed), '-o', tmp_path / 'out')
+    assert_refused(done, "experiment 'test panel'", 'never sprays', '--state-topic')
+
+
+def test_a_mesh_that_is_too_coarse_is_warned_of(simulate, tmp_path):
+    """A panel with a fold of 40 degrees within 60 mm, cut into edges of 24 and of 5 mm."""
+
+    def folded(edge_m: float):
+        z = np.arange(-0.24, 0.2401, edge_m)
+        x = np.array([-0.3, 0.0, 0.3])
+        y = 0.84 * 0.01 * np.logaddexp(0.0, z / 0.01)
+        points = np.stack([np.tile(x, len(z)), np.repeat(y, 3), np.repeat(z, 3)], axis=1)
+        corner = (3 * np.arange(len(z) - 1)[:, None] + [0, 1]).ravel()
+        faces = [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
+        path = tmp_path / f'fold{1e3 * edge_m:.0f}.stl'
+        trimesh.Trimesh(points, np.concatenate([np.stack(f, axis=1) for f in faces])).export(path)
+        return path
+
+    passes = serpentine((0.15, -0.15), half_width_m=0.6, opens_at_m=0.4)
+    (line,) = warnings_of(simulate(passes, mesh=folded(0.024)))
+    assert 'coarser than its curvature allows' in line
+    assert 'an edge of 2' in line
+    shutil.rmtree(tmp_path / 'bag')
+    done = simulate(passes, *TRIGGER, '--json', mesh=folded(0.0045))
+    assert done.stderr == ''
+    assert 0.0 < json.loads(done.stdout)['geometry']['facet_error'] < 0.01

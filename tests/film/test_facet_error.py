@@ -1,0 +1,143 @@
+"""The film error that is told of a coarse mesh, beside the true one on curves known exactly."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+from trimesh.creation import box
+
+from booth import MODEL, path_of, serpentine
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.facet_error import facet_error
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from surfaces import triangulated
+
+PATH = path_of(serpentine((0.3, 0.1, -0.1, -0.3), half_width_m=0.7, opens_at_m=0.65))
+BELL = DepositionModel()
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A surface y = depth(z) or depth(x, z), outward to -y, and its slopes."""
+
+    depth: Callable[[np.ndarray, np.ndarray], np.ndarray]
+    slopes: Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
+
+    def normals(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        across, up = self.slopes(x, z)
+        normals = np.stack([across, -np.ones_like(x), up], axis=1)
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True)
+
+    def nearest(self, points_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The closest places on the exact surface, and their normals."""
+        x, z = points_m[:, 0].copy(), points_m[:, 2].copy()
+        for _ in range(60):
+            normals = self.normals(x, z)
+            off = points_m - np.stack([x, self.depth(x, z), z], axis=1)
+            along = off - np.einsum('ij,ij->i', off, normals)[:, None] * normals
+            x, z = x + 0.7 * along[:, 0], z + 0.7 * along[:, 2]
+        return np.stack([x, self.depth(x, z), z], axis=1), self.normals(x, z)
+
+
+def round_fold(radius_m: float, turn_deg: float) -> Curve:
+    """Flat and level below, an arc about z = 0, flat and leaning back above."""
+    half = radius_m * np.tan(np.radians(turn_deg) / 2.0)
+    end = radius_m * np.sin(np.radians(turn_deg)) - half
+    steep = np.tan(np.radians(turn_deg))
+
+    def slope(x, z):
+        share = np.clip((z + half) / radius_m, 0.0, np.sin(np.radians(turn_deg)))
+        return np.zeros_like(z), share / np.sqrt(1.0 - share**2)
+
+    def depth(x, z):
+        arc = np.clip(z, -half, end) + half
+        return radius_m - np.sqrt(radius_m**2 - arc**2) + steep * np.maximum(z - end, 0.0)
+
+    return Curve(depth, slope)
+
+
+def soft_fold(soft_m: float, steep: float) -> Curve:
+    """A change of slope that is spread smoothly, as in a pressed door."""
+    return Curve(
+        lambda x, z: steep * soft_m * np.logaddexp(0.0, z / soft_m),
+        lambda x, z: (np.zeros_like(z), steep * 0.5 * (1.0 + np.tanh(0.5 * z / soft_m))),
+    )
+
+
+def cap(radius_m: float) -> Curve:
+    def root(x, z):
+        return np.sqrt(radius_m**2 - x**2 - z**2)
+
+    return Curve(lambda x, z: radius_m - root(x, z), lambda x, z: (x / root(x, z), z / root(x, z)))
+
+
+def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, float]:
+    """The error told, and the worst one over the refined mesh, as shares of the peak."""
+    vertices, faces = triangulated(curve.depth, edge_m, 0.12, jitter=jitter)
+    surface = Surface.from_triangles(vertices, faces, min(0.01, edge_m / 2.0))
+    exact_m, normals = curve.nearest(surface.vertices_m)
+    films = []
+    for points in (surface.points(), SurfacePoints(exact_m, normals)):
+        painted = FilmIntegrator(points, BELL)
+        painted.add(PATH)
+        films.append(painted.film_um)
+    told = facet_error(surface, PATH, BELL).share
+    return told, np.abs(films[0] - films[1]).max() / films[1].max()
+
+
+@pytest.mark.parametrize('jitter', [0.0, 0.3])
+@pytest.mark.parametrize('edge_m', [0.024, 0.012, 0.006])
+@pytest.mark.parametrize(
+    'curve',
+    [round_fold(0.04, 30.0), round_fold(0.08, 45.0), soft_fold(0.01, 0.8), soft_fold(0.02, 0.3)],
+)
+def test_the_error_is_told_within_a_third(curve, edge_m, jitter):
+    told, true = told_and_true(curve, edge_m, jitter)
+    assert 0.66 * true < told < 1.34 * true, (told, true)
+
+
+@pytest.mark.parametrize('radius_m', [0.25, 0.5])
+def test_on_even_curvature_only_the_sagitta_counts(radius_m):
+    told, true = told_and_true(cap(radius_m), 0.05, 0.3)
+    assert 0.66 * true < told < 1.34 * true, (told, true)
+    assert told < 0.01
+
+
+def test_flat_and_sharp_parts_cost_nothing():
+    vertices, faces = triangulated(lambda x, z: 0.3 * x, 0.1)
+    flat = Surface.from_triangles(vertices, faces, 0.02)
+    body = box((0.4, 0.3, 0.3))
+    sharp = Surface.from_triangles(body.vertices, np.asarray(body.faces), 0.02)
+    bent = Surface.from_triangles(*triangulated(lambda x, z: 0.7 * np.abs(z), 0.1), 0.02)
+    for surface in (flat, sharp, bent):
+        assert facet_error(surface, PATH, MODEL).share == 0.0
+
+
+def test_unpainted_curvature_costs_nothing():
+    """A flat front with a round back, and the same part turned to the gun."""
+    front, faces = triangulated(lambda x, z: 0.0 * x, 0.02)
+    back, _ = triangulated(lambda x, z: round_fold(0.04, 45.0).depth(x, -z) + 0.1, 0.02)
+    both = np.concatenate([faces, faces[:, ::-1] + len(front)])
+    surface = Surface.from_triangles(np.concatenate([front, back]), both, 0.02)
+    assert len(surface.curved_edges) > 0
+    assert facet_error(surface, PATH, BELL).share == 0.0
+    over = np.array([1.0, -1.0, 1.0])
+    turned = Surface.from_triangles(
+        np.concatenate([front, back]) * over + [0.0, 0.1, 0.0], both[:, ::-1], 0.02
+    )
+    assert facet_error(turned, PATH, BELL).share > 0.01
+
+
+def test_the_warning_names_the_place_and_a_length_that_helps():
+    curve = round_fold(0.08, 45.0)
+    vertices, faces = triangulated(curve.depth, 0.024, 0.12)
+    found = facet_error(Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    assert found.share > 0.02
+    assert abs(found.where_m[2]) < 0.08
+    wanted_m = 1e-3 * float(found.warning.split('edges of about ')[1].split(' mm')[0])
+    vertices, faces = triangulated(curve.depth, wanted_m, 0.12)
+    finer = facet_error(Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
+    assert finer.share < 0.5 * found.share
