@@ -4,6 +4,7 @@ from booth import SAMPLES
 from paint_deposition.diagnosis.verdict import EffectClass
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.place import PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.report.words import (
@@ -71,9 +72,10 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
     assert learned_words(passes)[1] == ('over', '1 to 6', '')
     fog = LEARNED['height_fraction'](kind='addition', learned=(2.0, -0.5))
     assert learned_words(fog)[0] == ('addition', '−0.5 to 2', 'µm')
-    map_ = LEARNED['place'](low_m=(-0.5, -0.2), high_m=(0.5, 0.2), learned=(0.1, 0.0, 0.0, -0.2))
+    grid = PartGrid(part_m=(1.2, 0.1, 0.5), low_m=(-0.5, -0.2), high_m=(0.5, 0.2), columns=2, rows=2)
+    map_ = LEARNED['place'](maps=(grid,), learned=(0.1, 0.0, 0.0, -0.2))
     assert learned_words(map_) == [
-        ('factor', '0.8 to 1.1', ''), ('over', '1000 × 400', 'mm of the part'),
+        ('factor', '0.8 to 1.1', ''), ('over', '1000 × 400', 'mm of a part'),
     ]  # fmt: skip
     # Mean and first harmonic add up on the heavier side.
     ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
