@@ -14,6 +14,7 @@ from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.data import ReportData
@@ -29,6 +30,9 @@ from paint_deposition.results.plan import write_plan
 from paint_deposition.results.residual_mesh import write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
 
+# What a robot's own frame is called where nobody says (REP-105 and most URDFs).
+ROBOT_FRAME = 'base_link'
+
 
 @singledispatch
 def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
@@ -40,6 +44,8 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         start: of a calibration or a diagnosis, the ``ModelFile`` that it started from: its name,
             history and uncertainties are carried on.
         made_from: of a film or a plan, more to say in its figures, such as the files used.
+        part_pose, frame_id: of a plan, where the part stands in the robot's frame, [x y z qx qy qz
+            qw], and the name of that frame; its files have their poses in that frame then.
 
     Returns:
         The paths written.
@@ -94,9 +100,16 @@ def _(result: Recommendation, folder: str | Path) -> list[Path]:
 
 
 @write.register
-def _(result: Plan, folder: str | Path, made_from: Mapping[str, Any] | None = None) -> list[Path]:
+def _(
+    result: Plan,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    frame_id: str = ROBOT_FRAME,
+) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
-    files = write_plan(folder, result, result.surface, about)
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    files = write_plan(folder, result, result.surface, about, part)
     picture = write_door_picture(
         Path(folder) / 'film.png', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,

@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli.model_choice import campaign_model_words
 from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    PART_POSE,
     geometry_lines,
     model_option,
     output_option,
@@ -44,22 +46,30 @@ OWN_EFFECTS = click.option(
 @CAMPAIGN
 @model_option("Model to judge as it is; default: the campaign's, else one fitted to it.")
 @OUTPUT
+@PART_POSE
 @JSON
-def compare_command(campaign: Path, model_file: Path | None, output: Path, as_json: bool) -> None:
+def compare_command(
+    campaign: Path,
+    model_file: Path | None,
+    output: Path,
+    part_pose: list[float] | None,
+    as_json: bool,
+) -> None:
     """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
 
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
     report.html.
     """
     with Progress('compare') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output)
     say_all('note', data.understood)
     say_geometry(comparison)
     say_all('warning', comparison.warnings)
-    say_results(files, as_json, _comparison_lines(comparison, output))
+    words = campaign_model_words(data, model_file, start, fitted='')
+    say_results(files, as_json, _comparison_lines(comparison, output), model=words)
 
 
 def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
@@ -87,6 +97,7 @@ def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
 @OUTPUT
 @OWN_EFFECTS
 @SEED
+@PART_POSE
 @JSON
 def diagnose_command(
     campaign: Path,
@@ -94,6 +105,7 @@ def diagnose_command(
     output: Path,
     effect_files: tuple[Path, ...],
     seed: int,
+    part_pose: list[float] | None,
     as_json: bool,
 ) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
@@ -105,7 +117,7 @@ def diagnose_command(
 
     own = [load_effect_file(file) for file in effect_files]
     with Progress('diagnose') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.diagnose(
             data, start.model if start else None, posterior=start.posterior if start else None,
             own_effects=own, seed=seed, progress=tell,
@@ -114,7 +126,8 @@ def diagnose_command(
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
 
 
 @click.command('refit')
@@ -127,9 +140,16 @@ def diagnose_command(
 @MODEL
 @OUTPUT
 @SEED
+@PART_POSE
 @JSON
 def refit_command(
-    campaign: Path, effect: str, model_file: Path | None, output: Path, seed: int, as_json: bool
+    campaign: Path,
+    effect: str,
+    model_file: Path | None,
+    output: Path,
+    seed: int,
+    part_pose: list[float] | None,
+    as_json: bool,
 ) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
@@ -144,7 +164,7 @@ def refit_command(
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     with Progress('refit') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.refit(
             data, added, start.model if start else None,
             posterior=start.posterior if start else None, seed=seed, progress=tell,
@@ -153,7 +173,8 @@ def refit_command(
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
 
 
 def _write(
