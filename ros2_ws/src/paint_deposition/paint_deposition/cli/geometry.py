@@ -40,7 +40,7 @@ def show_gun_on_part(
         tell('reading')
         recorded = pd.read_recording(motion, pose_topic, state_topic, gun_signal)
         surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down, body)
-        model = model_for(model_file, trajectory).model
+        model = model_for(model_file, motion).model
         seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
             from paint_deposition.report.pictures.geometry import write_geometry_picture
