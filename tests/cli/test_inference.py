@@ -52,7 +52,9 @@ def table(path) -> list[dict[str, str]]:
 def test_diagnose_names_the_hidden_effect(diagnosed):
     done, folder = diagnosed
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(f'effect missing: The readings show {HIDDEN}.')
+    model, verdict, *_ = done.stdout.splitlines()
+    assert model == 'model: fitted to the campaign, from a 50 mm bell'
+    assert verdict.startswith(f'effect missing: The readings show {HIDDEN}.')
     assert str(folder / 'report.html') in done.stdout
     content = json.loads((folder / 'diagnosis.json').read_text())
     probability = content['classes'][0]['probability']

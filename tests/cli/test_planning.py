@@ -187,8 +187,8 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     assert content['sigma_n'] < content['plane']['sigma_n_on_part']
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert names == {
-        MARKER, 'film.csv', 'film.ply', 'film.png', 'passes.csv', 'passes.mod', 'plan.json',
-        'stats.json', 'trajectory',
+        MARKER, 'film.csv', 'film.ply', 'film.png', 'model.yaml', 'passes.csv', 'passes.mod',
+        'plan.json', 'stats.json', 'trajectory',
     }  # fmt: skip
     assert read_program(tmp_path / 'plan' / 'passes.mod').moves
     assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000

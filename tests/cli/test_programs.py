@@ -10,7 +10,7 @@ from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.planning.pass_motion import PlannedMove
+from paint_deposition.motion.programmed import Move
 from scenes import straight_pass
 
 
@@ -38,7 +38,7 @@ def test_a_program_paints_like_the_recording_of_its_motion(tmp_path):
     begin_m, end_m = recorded.positions_m[[0, -1]]
     speed_m_per_s = float(np.linalg.norm(end_m - begin_m)) / recorded.duration_s
     moves = [
-        PlannedMove(place_m, LOOKING_ALONG_Y, speed_m_per_s, spraying)
+        Move(place_m, LOOKING_ALONG_Y, speed_m_per_s, spraying)
         for place_m, spraying in ((begin_m, False), (end_m, True))
     ]
     module = tmp_path / 'passes.mod'
@@ -62,7 +62,7 @@ def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
     module.write_text('')
     given = ('--mesh', SAMPLES / 'door.stl', '-o', tmp_path / 'out', '--trajectory')
     done = paint('simulate', *given, module, '--state-topic', '/atomizer/state')
-    assert_refused(done, 'is a RAPID module without topics; give --gun-signal')
+    assert_refused(done, '--state-topic is for bags', 'is a RAPID module; leave it out')
     for command in (('inspect',), ('simulate', *given)):
         done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
         assert_refused(done, '--gun-signal is for RAPID modules')

@@ -87,3 +87,22 @@ def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
 @pytest.mark.parametrize('command', ['inspect', 'recover'])
 def test_nothing_there_is_one_line(command, tmp_path):
     assert_refused(paint(command, 'nowhere', cwd=tmp_path), 'nowhere')
+
+
+def test_a_table_of_poses_says_what_was_understood(tmp_path):
+    (tmp_path / 'poses.csv').write_text(
+        't [ms];X [mm];Y [mm];Z [mm];A [deg];B [deg];C [deg]\n'
+        '0;15,0;0;0;0;0;0\n20;95,0;0;0;0;0;0\n'
+    )
+    done = paint('inspect', tmp_path / 'poses.csv')
+    assert done.returncode == 0, done.stderr
+    first, understood = done.stdout.splitlines()
+    assert first.startswith('2 poses in a frame that is not named over 0.020 s: x 0.015 to 0.095,')
+    assert understood.startswith('2 poses: x y z in mm; Euler angles A [deg] B [deg] C [deg]')
+    told = json.loads(paint('inspect', tmp_path / 'poses.csv', '--json').stdout)
+    assert told['high_m'] == [0.095, 0.0, 0.0]
+
+
+def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
+    done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
+    assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout

@@ -14,6 +14,7 @@ from paint_deposition.motion.trajectory import Trajectory
 START_NS = 1_760_000_000_123_456_789
 POSE = 'geometry_msgs/msg/PoseStamped'
 BOOL = 'std_msgs/msg/Bool'
+TF = 'tf2_msgs/msg/TFMessage'
 STATE_TYPES = {
     'paint_msgs/msg/AtomizerState': (
         'std_msgs/Header header\nbool spraying\nfloat64 flow\nfloat64 shaping_air_l_per_min\n'
@@ -45,7 +46,10 @@ class Messages:
     def __init__(self, ros1: bool = False, state_types: dict[str, str] | None = None) -> None:
         self.ros1 = ros1
         self.store = get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.ROS2_HUMBLE)
-        if not ros1:
+        if ros1:  # not among the standard ones of rosbags
+            text = 'geometry_msgs/TransformStamped[] transforms'
+            self.store.register(get_types_from_msg(text, TF))
+        else:
             for name, text in (state_types or STATE_TYPES).items():
                 self.store.register(get_types_from_msg(text, name))
 
@@ -71,6 +75,29 @@ class Messages:
     def state(self, stamp_ns: int, spraying: bool, flow: float, voltage_kv: float = 0.0):
         state = self.store.types['paint_msgs/msg/AtomizerState']
         return state(self.header(stamp_ns), spraying, flow, 0.0, 0.0, voltage_kv)
+
+    def joints(self, stamp_ns: int, names, positions):
+        """A JointState."""
+        none = np.empty(0)
+        state = self.store.types['sensor_msgs/msg/JointState']
+        values = np.array(positions, dtype=float)
+        return state(self.header(stamp_ns, ''), list(names), values, none, none)
+
+    def transforms(self, *rows: tuple[int, str, str, object]):
+        """A TFMessage of (stamp, parent, child, x y z qx qy qz qw) each."""
+        types = self.store.types
+        made = [
+            types['geometry_msgs/msg/TransformStamped'](
+                self.header(stamp, parent),
+                child,
+                types['geometry_msgs/msg/Transform'](
+                    types['geometry_msgs/msg/Vector3'](*map(float, values[:3])),
+                    types['geometry_msgs/msg/Quaternion'](*map(float, values[3:])),
+                ),
+            )
+            for stamp, parent, child, values in rows
+        ]
+        return types[TF](made)
 
     def serialised(self, message) -> bytes:
         kind = message.__msgtype__

@@ -10,7 +10,7 @@ from paint_deposition.files.rapid.motion import program_trajectory
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.planning.pass_motion import PlannedMove
+from paint_deposition.motion.programmed import Move
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -125,7 +125,7 @@ def test_a_written_plan_is_flown_as_planned(tmp_path):
     places = [(0.0, 0.0), (1.0, 0.0), (1.1, 0.0), (1.1, 0.3), (1.0, 0.3), (0.0, 0.3)]
     spraying = [False, True, False, False, False, True]
     moves = [
-        PlannedMove(np.array([x, y, 0.25]), scenes.LOOKING_DOWN, 0.4, on)
+        Move(np.array([x, y, 0.25]), scenes.LOOKING_DOWN, 0.4, on)
         for (x, y), on in zip(places, spraying, strict=True)
     ]
     (tmp_path / 'passes.mod').write_text(module_text(moves))

@@ -7,9 +7,9 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
-from paint_deposition.files.rapid.program import GunSwitch, RapidProgram, read_program
+from paint_deposition.files.rapid.program import RapidProgram, read_program
 from paint_deposition.files.rapid.writer import module_text
-from paint_deposition.planning.pass_motion import PlannedMove
+from paint_deposition.motion.programmed import GunSwitch, Move
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 IDENTITY = [0.0, 0.0, 0.0, 1.0]
@@ -233,12 +233,12 @@ quaternions = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.
 
 
 @st.composite
-def planned_moves(draw) -> list[PlannedMove]:
+def planned_moves(draw) -> list[Move]:
     moves = []
     for number in range(draw(st.integers(1, 12))):
         quaternion = np.array(draw(quaternions))
         moves.append(
-            PlannedMove(
+            Move(
                 position_m=np.array([draw(coordinates) for _ in range(3)]),
                 quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
                 speed_m_per_s=draw(st.floats(0.01, 5.0)),
@@ -265,9 +265,9 @@ def test_what_is_written_is_read_back(tmp_path_factory, moves):
     assert all(move.switches == () for move in read)
 
 
-def one_pass(speed_m_per_s: float = 0.6) -> list[PlannedMove]:
-    approach = PlannedMove(np.zeros(3), np.array(IDENTITY), 1.0, False)
-    return [approach, PlannedMove(np.array([1.0, 0, 0]), np.array(IDENTITY), speed_m_per_s, True)]
+def one_pass(speed_m_per_s: float = 0.6) -> list[Move]:
+    approach = Move(np.zeros(3), np.array(IDENTITY), 1.0, False)
+    return [approach, Move(np.array([1.0, 0, 0]), np.array(IDENTITY), speed_m_per_s, True)]
 
 
 def test_a_program_ends_with_the_gun_off():

@@ -28,8 +28,9 @@ from files.recorded import START_NS, straight_pass
 from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.bags import read_trajectory, stamp_ns, write_pose_bag
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer

@@ -31,7 +31,8 @@ from files.recorded import (
 from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.bags import stamp_ns, write_pose_bag
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import qos
 

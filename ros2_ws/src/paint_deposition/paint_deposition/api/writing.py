@@ -17,6 +17,7 @@ from paint_deposition.files.model_file import ModelFile
 from paint_deposition.files.provenance import origin
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.study import Study
+from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.data import ReportData
@@ -33,6 +34,8 @@ from paint_deposition.results.residual_mesh import file_name, write_residual_mes
 from paint_deposition.results.residuals import write_residuals
 
 PNG = 'png'
+# What a robot's own frame is called where nobody says (REP-105 and most URDFs).
+ROBOT_FRAME = 'base_link'
 
 
 @singledispatch
@@ -46,7 +49,9 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
             history and uncertainties are carried on.
         made_from: of a film, a plan or a recommendation, more to say in its figures, such as the
             files used.
-        model: of a plan or a recommendation, what it was computed with.
+        model: of a recommendation, what it was computed with.
+        part_pose, frame_id: of a plan, where the part stands in the robot's frame, [x y z qx qy qz
+            qw], and the name of that frame; its files have their poses in that frame then.
 
     Returns:
         The paths written.
@@ -137,12 +142,14 @@ def _(
     result: Plan,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
-    model: DepositionModel | None = None,
+    part_pose: Sequence[float] | None = None,
+    frame_id: str = ROBOT_FRAME,
     pictures: str = PNG,
 ) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
-    about |= _provenance(model, _files(about))
-    files = write_plan(folder, result, result.surface, about)
+    about |= _provenance(result.model, _files(about))
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    files = write_plan(folder, result, result.surface, about, part)
     picture = write_film_picture(
         Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import click
 
 import paint_deposition as pd
-from paint_deposition.cli.options import read_given_model, say_all
+from paint_deposition.cli.model_choice import model_for
+from paint_deposition.cli.options import say_all
 from paint_deposition.cli.progress import Progress
 from paint_deposition.files.json_files import json_text
 
@@ -39,7 +40,7 @@ def show_gun_on_part(
         tell('reading')
         recorded = pd.read_recording(motion, pose_topic, state_topic, gun_signal)
         surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down, body)
-        model = read_given_model(model_file)
+        model = model_for(model_file, motion).model
         seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
             from paint_deposition.report.pictures.geometry import write_geometry_picture

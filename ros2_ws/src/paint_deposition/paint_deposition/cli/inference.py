@@ -9,10 +9,12 @@ from typing import TYPE_CHECKING
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli.model_choice import campaign_model_words
 from paint_deposition.cli.options import (
     CAMPAIGN,
     FILE,
     JSON,
+    PART_POSE,
     PICTURES,
     geometry_lines,
     model_option,
@@ -49,10 +51,16 @@ OWN_EFFECTS = click.option(
     'models are set side by side.',
 )  # fmt: skip
 @OUTPUT
+@PART_POSE
 @PICTURES
 @JSON
 def compare_command(
-    campaign: Path, model_files: tuple[Path, ...], output: Path, pictures: str, as_json: bool
+    campaign: Path,
+    model_files: tuple[Path, ...],
+    output: Path,
+    part_pose: list[float] | None,
+    pictures: str,
+    as_json: bool,
 ) -> None:
     """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
 
@@ -61,22 +69,24 @@ def compare_command(
     """
     with Progress('compare') as tell:
         if len(model_files) > 1:
-            data, _ = read_inputs(campaign, None, tell)
+            data, _ = read_inputs(campaign, None, tell, part_pose)
             models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
             beside = pd.compare_models(data, models, progress=tell)
             tell('writing the report')
             files = write_results(beside, output, pictures=pictures)
-            say_results(files, as_json, _side_by_side_lines(beside, output))
+            words = ', '.join(map(str, model_files))
+            say_results(files, as_json, _side_by_side_lines(beside, output), model=words)
             return
         model_file = model_files[0] if model_files else None
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
         files = write_results(comparison, output, pictures=pictures)
     say_all('note', data.understood)
     say_geometry(comparison)
     say_all('warning', comparison.warnings)
-    say_results(files, as_json, _comparison_lines(comparison, output))
+    words = campaign_model_words(data, model_file, start, fitted='')
+    say_results(files, as_json, _comparison_lines(comparison, output), model=words)
 
 
 def _names(files: tuple[Path, ...]) -> list[str]:
@@ -126,6 +136,7 @@ def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
 @OUTPUT
 @OWN_EFFECTS
 @SEED
+@PART_POSE
 @PICTURES
 @JSON
 def diagnose_command(
@@ -134,6 +145,7 @@ def diagnose_command(
     output: Path,
     effect_files: tuple[Path, ...],
     seed: int,
+    part_pose: list[float] | None,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -146,7 +158,7 @@ def diagnose_command(
 
     own = [load_effect_file(file) for file in effect_files]
     with Progress('diagnose') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.diagnose(
             data, start.model if start else None, posterior=start.posterior if start else None,
             own_effects=own, seed=seed, progress=tell,
@@ -155,7 +167,8 @@ def diagnose_command(
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
 
 
 @click.command('refit')
@@ -168,6 +181,7 @@ def diagnose_command(
 @MODEL
 @OUTPUT
 @SEED
+@PART_POSE
 @PICTURES
 @JSON
 def refit_command(
@@ -176,6 +190,7 @@ def refit_command(
     model_file: Path | None,
     output: Path,
     seed: int,
+    part_pose: list[float] | None,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -192,7 +207,7 @@ def refit_command(
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     with Progress('refit') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.refit(
             data, added, start.model if start else None,
             posterior=start.posterior if start else None, seed=seed, progress=tell,
@@ -201,7 +216,8 @@ def refit_command(
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output))
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
 
 
 def _write(

@@ -25,6 +25,7 @@ COMMANDS = {
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
+    'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
@@ -42,6 +43,15 @@ class Commands(click.Group):
             raise click.UsageError(f'no command is called {name!r}; {remedy}')
         module = importlib.import_module(f'paint_deposition.cli.{COMMANDS[name][0]}')
         return getattr(module, f'{name}_command')
+
+    def resolve_command(
+        self, context: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """A pose may also be given in one piece, in quotes."""
+        name, command, rest = super().resolve_command(context, args)
+        for place in [k for k, word in enumerate(rest) if word == '--part-pose'][::-1]:
+            rest[place + 1 : place + 2] = ' '.join(rest[place + 1 : place + 2]).split()
+        return name, command, rest
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section('Commands'):

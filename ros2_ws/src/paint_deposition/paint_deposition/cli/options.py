@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator
+from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -90,6 +91,25 @@ def _vector(
     return None if given is None else np.array(given)
 
 
+def _pose(
+    ctx: click.Context, param: click.Parameter, given: tuple[float, ...] | None
+) -> list[float] | None:
+    from paint_deposition.motion.part_frame import is_pose
+
+    if given is not None and not is_pose(given):
+        norm = math.hypot(*given[3:])
+        raise click.BadParameter(
+            f'the quaternion qx qy qz qw has the norm {norm:.4g}, not 1', ctx, param
+        )
+    return None if given is None else list(given)
+
+
+def _listed(
+    ctx: click.Context, param: click.Parameter, given: tuple[str, ...] | None
+) -> list[str] | None:
+    return None if given is None else list(given)
+
+
 GUN_SIGNAL = click.option(
     '--gun-signal', help='Digital output that opens the gun, for a RAPID module that sets several.'
 )
@@ -107,6 +127,84 @@ MAX_POSE_GAP = click.option(
 )  # fmt: skip
 
 
+def pose_option(name: str, text: str) -> Callable:
+    """A pose, seven numbers in a list, or None."""
+    return click.option(
+        name, nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose, help=text
+    )
+
+
+PART_POSE = pose_option(
+    '--part-pose', 'Where the part stands in the frame of the poses [m, unit quaternion].'
+)
+# How the motion is read and brought to the part: the fields of MotionSource.
+MOTION = (
+    click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),
+    click.option(
+        '--state-topic',
+        '--trigger',
+        'state_topic',
+        help='Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
+        'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: it '
+        'sprays whenever poses flow.',
+    ),
+    GUN_SIGNAL,
+    click.option(
+        '--tf',
+        nargs=2,
+        metavar='TARGET SOURCE',
+        callback=_listed,
+        help='Take the poses from the transforms of the bag: frame SOURCE, the TCP, in TARGET.',
+    ),
+    click.option(
+        '--urdf', type=click.Path(), help='Take the poses from joint states and this robot.'
+    ),
+    click.option(
+        '--tip',
+        '--tip-link',
+        'tip_link',
+        help='Link of the URDF that is the TCP; default: tool0, else its last link.',
+    ),
+    click.option(
+        '--base',
+        '--base-link',
+        'base_link',
+        help='Link of the URDF for the frame of the poses; default: its root.',
+    ),
+    click.option(
+        '--pose-unit',
+        type=click.Choice(['m', 'mm', 'cm']),
+        help='Unit of x, y, z in a table of poses whose headings tell none.',
+    ),
+    click.option(
+        '--rotation',
+        metavar='CONVENTION',
+        help='Three numbers of an orientation in a table: rotvec, or Euler angles as ZYX (axes of '
+        'the tool), xyz (fixed axes), kuka, abb, fanuc, rpy, staubli, kawasaki.',
+    ),
+    click.option(
+        '--angle-unit',
+        type=click.Choice(['deg', 'rad']),
+        help='Unit of the angles in a table whose headings tell none.',
+    ),
+    click.option('--frame-id', help="Name of the part's frame; default: part."),
+    PART_POSE,
+)
+
+
+def motion_options(command: Callable) -> Callable:
+    """Give a command the options ``MOTION``; it takes what was given as ``motion``."""
+
+    @wraps(command)
+    def with_motion(**given: Any) -> Any:
+        from paint_deposition.files.motion_source import MotionSource
+
+        names = MotionSource.model_fields.keys() & given.keys()
+        return command(motion={name: given.pop(name) for name in names}, **given)
+
+    return reduce(lambda taken, option: option(taken), reversed(MOTION), with_motion)
+
+
 def max_edge_length_option(default_m: float) -> Callable:
     """How fine the mesh is refined."""
     return click.option(
@@ -116,11 +214,15 @@ def max_edge_length_option(default_m: float) -> Callable:
 
 
 def read_inputs(
-    campaign: Path, model_file: Path | None, tell: Callable[[str], None]
+    campaign: Path,
+    model_file: Path | None,
+    tell: Callable[[str], None],
+    part_pose: list[float] | None = None,
 ) -> tuple[pd.Campaign, ModelFile | None]:
     """Read a campaign and the model to start from: the one given, or else the campaign's, if any.
 
-    `tell` gets each line of progress, stderr each note on an experiment.
+    `tell` gets each line of progress, stderr each note on an experiment. `part_pose` is that of
+    experiments without one of their own.
     """
     from paint_deposition.files.model_file import read_model_file
 
@@ -128,16 +230,11 @@ def read_inputs(
         if line.startswith('reading '):
             tell(line)
         else:
-            say_all('note', [line])
+            click.echo(line if line.startswith('warning: ') else f'note: {line}', err=True)
 
-    data = pd.read_campaign(campaign, show)
+    data = pd.read_campaign(campaign, show, part_pose)
     chosen = model_file or data.model_file
     return data, read_model_file(chosen) if chosen else None
-
-
-def read_given_model(model_file: Path | None) -> pd.DepositionModel:
-    """The model named with --model, else that of a 50 mm bell."""
-    return pd.read_model(model_file) if model_file else pd.DepositionModel()
 
 
 def say_all(label: str, lines: Iterable[str]) -> None:
@@ -163,12 +260,16 @@ def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
         return [output / file.name for file in pd.write(result, folder, **more)]
 
 
-def say_results(files: list[Path], as_json: bool, lines: Iterable[str]) -> None:
-    """Print the file of figures as it was written, or else what it comes to in these lines."""
+def say_results(files: list[Path], as_json: bool, lines: Iterable[str], *, model: str) -> None:
+    """Print the file of figures as it was written, or else what it comes to in these lines.
+
+    The first line says which model was used.
+    """
     if as_json:
         figures = next(file for file in files if file.suffix == '.json')
         click.echo(figures.read_text(encoding='utf-8'), nl=False)
     else:
+        click.echo(f'model: {model}')
         for line in lines:
             click.echo(line)
 

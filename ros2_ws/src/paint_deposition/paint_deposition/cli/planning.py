@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli.model_choice import campaign_model_words, chosen_model
 from paint_deposition.cli.options import (
     BODY,
     CAMPAIGN,
@@ -20,6 +21,7 @@ from paint_deposition.cli.options import (
     MODEL,
     NOT_NEGATIVE,
     NUMBER,
+    PART_POSE,
     PICTURES,
     POSITIVE,
     direction_option,
@@ -28,7 +30,6 @@ from paint_deposition.cli.options import (
     max_edge_length_option,
     model_option,
     output_option,
-    read_given_model,
     read_inputs,
     say_all,
     say_geometry,
@@ -74,6 +75,7 @@ def passes_wanted(command: Callable) -> Callable:
 @model_option("Model to start from; default: the campaign's, else a 50 mm bell.")
 @output_option('model.yaml, calibration.json and pictures')
 @seed_option('the starts of the fit')
+@PART_POSE
 @PICTURES
 @JSON
 def calibrate_command(
@@ -81,6 +83,7 @@ def calibrate_command(
     model_file: Path | None,
     output: Path,
     seed: int,
+    part_pose: list[float] | None,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -90,7 +93,7 @@ def calibrate_command(
     effects of the model to start from are fitted as well; its projection is kept.
     """
     with Progress('calibrate') as tell:
-        data, start = read_inputs(campaign, model_file, tell)
+        data, start = read_inputs(campaign, model_file, tell, part_pose)
         result = pd.calibrate(data, start.model if start else None, seed=seed, progress=tell)
         tell('writing')
         files = write_results(result, output, start=start, pictures=pictures)
@@ -98,7 +101,9 @@ def calibrate_command(
     if not as_json:
         say_all('note', data.understood)
         say_all('warning', result.warnings)
-    say_results(files, as_json, [*_calibration_lines(result), *file_lines(files)])
+    lines = [*_calibration_lines(result), *file_lines(files)]
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, lines, model=words)
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
@@ -142,14 +147,15 @@ def recommend_command(
     **wanted: Any,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    model = read_given_model(model_file)
+    chosen = chosen_model(model_file)
     travel_rad = math.radians(travel_deg)
-    answer = pd.recommend(model, travel_rad=travel_rad, **wanted)
+    answer = pd.recommend(chosen.model, travel_rad=travel_rad, **wanted)
     files = write_results(
-        answer, output, pictures=pictures, model=model,
+        answer, output, pictures=pictures, model=chosen.model,
         made_from={'model_file': str(model_file or '')},
     )  # fmt: skip
-    say_results(files, as_json, [*_recommendation_lines(answer), *file_lines(files)])
+    lines = [*_recommendation_lines(answer), *file_lines(files)]
+    say_results(files, as_json, lines, model=chosen.words)
 
 
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
@@ -191,7 +197,10 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @MESH_SCALE
 @BODY
 @max_edge_length_option(0.02)
-@click.option('--frame-id', default='part', show_default=True, help='Frame of the poses.')
+@PART_POSE
+@click.option(
+    '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
+)
 @output_option('the bag, passes.csv, passes.mod, plan.json and the film')
 @PICTURES
 @JSON
@@ -204,29 +213,36 @@ def plan_command(
     mesh_scale: float,
     body: str | None,
     max_edge_length_m: float,
-    frame_id: str,
+    part_pose: list[float] | None,
+    frame_id: str | None,
     pictures: str,
     as_json: bool,
     **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
-    model = read_given_model(model_file)
+    chosen = chosen_model(model_file)
+    frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as tell:
         tell('reading the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         result = pd.plan(
-            surface, model, frame_id=frame_id, progress=tell, travel_rad=math.radians(travel_deg),
-            **wanted,
+            surface, chosen.model, frame_id=frame_id if part_pose is None else 'part',
+            progress=tell, travel_rad=math.radians(travel_deg), **wanted,
         )  # fmt: skip
         made_from = {
             'mesh': str(mesh),
             'model': str(model_file or 'default'),
             'frame_id': frame_id,
+            'part_pose': part_pose,
         }
         tell('writing')
-        files = write_results(result, output, made_from=made_from, model=model, pictures=pictures)
+        files = write_results(
+            result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
+            pictures=pictures,
+        )  # fmt: skip
     say_all('note', surface.notes)
-    say_results(files, as_json, [*_plan_lines(result), *file_lines(files)])
+    lines = [*_plan_lines(result), *file_lines(files)]
+    say_results(files, as_json, lines, model=chosen.words)
 
 
 def _plan_lines(result: pd.Plan) -> Iterator[str]:

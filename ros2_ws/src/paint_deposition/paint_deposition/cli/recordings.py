@@ -21,12 +21,20 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
-from paint_deposition.files.motion_files import refuse_gun_signal
+from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.pose_tables.reading import (
+    PoseLayout,
+    is_pose_table,
+    read_pose_table,
+)
 from paint_deposition.files.provenance import origin
 from paint_deposition.files.rapid.motion import is_rapid, program_as_text
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
+from paint_deposition.files.recordings.joint_states import JOINT_TYPE
 from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files, recover
+from paint_deposition.files.recordings.transforms import TF_TYPES
+from paint_deposition.motion.trajectory import Trajectory
 
 
 @click.command('inspect')
@@ -58,7 +66,8 @@ def inspect_command(
     """Show what RECORDING holds, or how the gun ran over a part.
 
     Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
-    targets, moves, speeds, where the gun is switched, and what could not be followed.
+    targets, moves, speeds, where the gun is switched, and what could not be followed. Of a table
+    of poses (.csv, .tsv, .txt): what was understood.
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
@@ -77,7 +86,11 @@ def inspect_command(
         program = read_program(motion, gun_signal=gun_signal)
         click.echo(_json(asdict(program), motion) if as_json else program_as_text(program))
         return
-    refuse_gun_signal(motion, gun_signal)
+    if is_pose_table(motion):
+        MotionSource(gun_signal=gun_signal).refuse_other(motion, 'a table of poses')
+        click.echo(_told(read_pose_table(motion, PoseLayout()), as_json))
+        return
+    MotionSource(gun_signal=gun_signal).refuse_other(motion, 'a bag')
     summary = summarise(motion, max_pose_gap_s)
     click.echo(_json(asdict(summary), motion) if as_json else _table(summary))
 
@@ -134,6 +147,23 @@ def _figures(recovery: Recovery) -> dict:
     }
 
 
+def _told(poses: Trajectory, as_json: bool) -> str:
+    """What was understood of a table of poses."""
+    low, high = poses.positions_m.min(axis=0), poses.positions_m.max(axis=0)
+    figures = {
+        'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id,
+        'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
+    }  # fmt: skip
+    if as_json:
+        return json_text(figures)
+    sides = ', '.join(
+        f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
+    )
+    frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
+    return '\n'.join([line, *poses.notes])
+
+
 def _table(summary: BagSummary) -> str:
     lines = [summary.path]
     width = max((len(topic.name) for topic in summary.topics), default=0)
@@ -147,5 +177,10 @@ def _table(summary: BagSummary) -> str:
     ]
     if not summary.pose_streams:
         lines.append('no poses: there is no PoseStamped topic with messages')
+    types = {topic.type for topic in summary.topics}
+    if types & {*TF_TYPES}:
+        lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
+    if JOINT_TYPE in types:
+        lines.append('joint states: --urdf takes the motion from them')
     lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
     return '\n'.join(lines)

@@ -5,15 +5,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
     BODY,
     FILE,
-    GUN_SIGNAL,
     JSON,
     MAX_POSE_GAP,
     MESH_SCALE,
@@ -23,8 +23,8 @@ from paint_deposition.cli.options import (
     direction_option,
     file_lines,
     max_edge_length_option,
+    motion_options,
     output_option,
-    read_given_model,
     say_all,
     say_results,
     write_results,
@@ -56,12 +56,7 @@ if TYPE_CHECKING:
     '--points', 'points_file', type=FILE,
     help='Measuring points, label and x, y, z, of readings that name their point only.',
 )  # fmt: skip
-@click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.')
-@click.option(
-    '--state-topic',
-    help='Trigger of the gun, AtomizerState or Bool; default: it sprays whenever poses flow.',
-)
-@GUN_SIGNAL
+@motion_options
 @MESH_SCALE
 @BODY
 @max_edge_length_option(0.01)
@@ -81,9 +76,7 @@ def simulate_command(
     output: Path,
     readings_file: Path | None,
     points_file: Path | None,
-    pose_topic: str | None,
-    state_topic: str | None,
-    gun_signal: str | None,
+    motion: dict[str, Any],
     mesh_scale: float,
     body: str | None,
     max_edge_length_m: float,
@@ -101,25 +94,27 @@ def simulate_command(
     with Progress('simulate') as tell:
         tell('loading')
         tell('reading')
-        model = read_given_model(model_file)
-        recorded = pd.read_recording(trajectory, pose_topic, state_topic, gun_signal)
+        chosen = model_for(model_file, trajectory)
+        recorded = pd.read_recording(trajectory, **motion)
         tell('refining the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
-        film = pd.simulate(surface, recorded, model, readings=readings, progress=tell, **wanted)
+        film = pd.simulate(
+            surface, recorded, chosen.model, readings=readings, progress=tell, **wanted
+        )
         made_from = {
             'mesh_file': str(mesh),
             'trajectory': str(trajectory),
-            'model_file': str(model_file or ''),
+            'model_file': str(chosen.path or ''),
         }
         tell('writing and drawing')
         files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
-    say_all('warning', film.warnings)
-    say_results(files, as_json, [*_lines(film), *file_lines(files)])
+    say_all('warning', [*recorded.warnings, *film.warnings])
+    say_results(files, as_json, [*_lines(film), *file_lines(files)], model=chosen.words)
 
 
 def _lines(film: pd.Film) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """Campaign files: which parts were painted along which recording and measured where."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -10,7 +10,8 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.motion_source import MotionSource, Number, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.layout import Layout
@@ -24,8 +25,6 @@ from paint_deposition.readings.campaign import Campaign, Experiment
 # curved.
 MAX_EDGE_LENGTH_M = 0.02
 
-Text = Annotated[str, Field(min_length=1)]
-Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 Quantity = Literal['x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session']
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
@@ -65,14 +64,17 @@ class _File(BaseModel, extra='forbid'):
         return {key: text for key, text in told.items() if text}
 
 
-class _Entry(BaseModel, extra='forbid'):
-    """An experiment as it is written; paths are relative to the campaign's file."""
+class _Files(BaseModel):
+    """The files of an experiment; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
-    trajectory: Text = Field(description='the name of a recording')
+    trajectory: Text = Field(description='the name of a recording, RAPID module or table')
     measurements: Text = Field(description='the name of a file of gauge readings')
-    pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
-    state_topic: Text | None = Field(None, description='the name of a topic of the recording')
+
+
+class _Entry(MotionSource, _Files):
+    """An experiment as it is written."""
+
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
@@ -102,13 +104,17 @@ class _Entry(BaseModel, extra='forbid'):
 
 
 def read_campaign(
-    path: str | Path, progress: Callable[[str], None] = lambda line: None
+    path: str | Path,
+    progress: Callable[[str], None] = lambda line: None,
+    part_pose: Sequence[float] | None = None,
 ) -> Campaign:
     """Read a campaign with all that it names.
 
     Args:
         path: YAML; paths in it are relative to it.
         progress: called with a line for each experiment and each note on it.
+        part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
+            that has none of its own.
 
     Raises:
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
@@ -125,6 +131,8 @@ def read_campaign(
         if name in [e.name for e in experiments]:
             raise ReadingsError(f"{path}: two experiments are called '{name}'; rename one")
         progress(f'reading {name}')
+        if part_pose is not None and entry.part_pose is None:
+            entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
             experiments.append(_read_experiment(path.parent, name, entry, progress))
         except PaintError as error:
@@ -142,12 +150,15 @@ def _read_experiment(
     files = {kind: str(folder / getattr(entry, kind)) for kind in kinds}
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
-    trajectory = read_trajectory(files['trajectory'], entry.pose_topic, entry.state_topic)
+    urdf = entry.urdf and str(folder / entry.urdf)
+    trajectory = read_motion(files['trajectory'], entry.model_copy(update={'urdf': urdf}))
     path, counts = spray_path(trajectory, entry.max_pose_gap_s)
     require_spraying(trajectory, path)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     for note in (*surface.notes, *trajectory.notes):
         progress(f'{name}: {note}')
+    for warning in trajectory.warnings:
+        progress(f'warning: {name}: {warning}')
     if counts.rejected:
         progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
     points = None if entry.points is None else folder / entry.points

@@ -50,6 +50,7 @@ class Trajectory:
         trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
             Before the first of them the gun is off.
         notes: remarks on the recording for the user, a line each.
+        warnings: what is likely wrong with it, a line each with the remedy.
         source: the file it came from, for messages.
         settings: of the process while the gun sprayed, by name; empty where not recorded.
 
@@ -64,6 +65,7 @@ class Trajectory:
     trigger_stamps_ns: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     trigger_flow: np.ndarray = field(default_factory=lambda: np.empty(0))
     notes: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     source: str = 'trajectory'
     settings: Mapping[str, float] = field(default_factory=dict)
 

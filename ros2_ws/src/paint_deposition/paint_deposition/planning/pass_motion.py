@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
+from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 
@@ -15,23 +16,6 @@ POSE_RATE_HZ = 250.0
 LEAST_TRANSFER_SPEED_M_PER_S = 0.3
 # Turn of the tool between passes is no faster than this.
 TURN_RATE_RAD_PER_S = math.radians(90.0)
-
-
-@dataclass(frozen=True)
-class PlannedMove:
-    """A straight move to a pose of the TCP, in the part's frame.
-
-    Attributes:
-        position_m: (3,) TCP at the end of the move [m].
-        quaternion_xyzw: (4,) orientation of the tool there, scalar last.
-        speed_m_per_s: speed of the TCP on the way [m/s].
-        spraying: whether the gun is on while moving there.
-    """
-
-    position_m: np.ndarray
-    quaternion_xyzw: np.ndarray
-    speed_m_per_s: float
-    spraying: bool
 
 
 def trajectory_of(
@@ -70,7 +54,7 @@ def trajectory_of(
     )
 
 
-def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[PlannedMove]:
+def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Move]:
     """Straight moves for a robot program: lead-in, waypoints with the gun on, lead-out."""
     moves = []
     for planned in passes:
@@ -80,7 +64,7 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Pla
         positions, quaternions = _poses_at(planned, np.array(stops))
         for k, pose in enumerate(zip(positions, quaternions, strict=True)):
             speed = planned.speed_m_per_s if k else _transfer_speed(style)
-            moves.append(PlannedMove(*pose, speed, spraying=2 <= k < len(stops) - 1))
+            moves.append(Move(*pose, speed, spraying=2 <= k < len(stops) - 1))
     return moves
 
 

@@ -95,6 +95,7 @@ class Plan:
             included.
         plane: recommendation for a plane of the part's size.
         plane_on_part: its passes laid about the middle of this part.
+        model: what the gun sprays.
         cycle_time_s: from the first pose to the last.
     """
 
@@ -110,6 +111,7 @@ class Plan:
     sigma_n: float
     plane: Recommendation
     plane_on_part: Placing
+    model: DepositionModel
 
     @property
     def cycle_time_s(self) -> float:
@@ -213,7 +215,7 @@ def plan(
     )  # fmt: skip
     return Plan(
         surface, request, style, placing, passes, trajectory, film, painted,
-        statistics, sigma_n, plane, on_part,
+        statistics, sigma_n, plane, on_part, model,
     )  # fmt: skip
 
 

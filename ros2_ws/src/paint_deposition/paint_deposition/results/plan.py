@@ -10,11 +10,16 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.planned_model import DIGEST, MODEL_FILE, PLAN_FILE, model_digest
 from paint_deposition.files.rapid.writer import module_text
-from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.files.recordings.bag_files import TRIGGER
+from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.pass_motion import PlannedMove, planned_moves
+from paint_deposition.planning.pass_motion import planned_moves
 from paint_deposition.planning.plan import Plan
 from paint_deposition.results.film import writable, write_film
 
@@ -28,14 +33,17 @@ def write_plan(
     plan: Plan,
     surface: Surface,
     details: Mapping[str, Any] | None = None,
+    part: tuple[str, Rigid] | None = None,
 ) -> list[Path]:
-    """Write ``plan.json``, bag, ``passes.csv``, ``passes.mod``, and the film's files.
+    """Write ``plan.json``, bag, ``passes.csv``, ``passes.mod``, ``model.yaml`` and the film.
 
     An older plan in the folder is replaced.
 
     Args:
         folder: where to; made if it is not there.
         details: more to say in plan.json, such as the files used.
+        part: the robot's frame and the pose of the part in it; bag and table have their poses
+            in that frame then, and the module defines its work object so.
 
     Returns:
         The paths written.
@@ -47,32 +55,40 @@ def write_plan(
     moves = planned_moves(plan.passes, plan.style)
     with writable(folder):
         folder.mkdir(parents=True, exist_ok=True)
-        _write_bag(folder / 'trajectory', plan.trajectory)
-        write_table(folder / 'passes.csv', _table(moves))
-        write_text(folder / 'passes.mod', module_text(moves))
-        write_json(folder / 'plan.json', {**plan.to_dict(), **(details or {})})
+        digest = model_digest(plan.model)
+        _write_bag(folder / 'trajectory', plan, digest, part)
+        write_table(folder / 'passes.csv', _table(moves, part))
+        comment = f'Planned with the model in {MODEL_FILE}, sha256 {digest}'
+        module = module_text(moves, [comment], part[1] if part else None)
+        write_text(folder / 'passes.mod', module)
+        write_model(folder / MODEL_FILE, plan.model)
+        told = {**plan.to_dict(), DIGEST: digest, **(details or {})}
+        write_json(folder / PLAN_FILE, told)
     film = write_film(folder, surface, plan.film_um, plan.statistics, overwrite=True)
-    names = ['plan.json', 'trajectory', 'passes.csv', 'passes.mod', *(file.name for file in film)]
+    names = [PLAN_FILE, 'trajectory', 'passes.csv', 'passes.mod', MODEL_FILE]
+    names += [file.name for file in film]
     return [folder / name for name in names]
 
 
-def _table(moves: Sequence[PlannedMove]) -> Iterator[Sequence[object]]:
+def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:
     """A line a move of the TCP: where it ends, how fast, and whether the gun is on."""
     yield COLUMNS
     number, was_spraying = 0, False
     for move in moves:
         number += move.spraying and not was_spraying
         was_spraying = move.spraying
+        pose = move.position_m, move.quaternion_xyzw
+        position, quaternion = part[1].applied(*pose) if part else pose
         yield [
             max(number, 1),
-            *(f'{value:.6f}' for value in move.position_m),
-            *(f'{value:.8f}' for value in move.quaternion_xyzw),
+            *(f'{value:.6f}' for value in position),
+            *(f'{value:.8f}' for value in quaternion),
             f'{move.speed_m_per_s:.6g}',
             int(move.spraying),
         ]
 
 
-def _write_bag(target: Path, trajectory: Trajectory) -> None:
+def _write_bag(target: Path, plan: Plan, digest: str, part: tuple[str, Rigid] | None) -> None:
     if target.exists():
         strangers = [
             path for path in target.rglob('*')
@@ -82,7 +98,20 @@ def _write_bag(target: Path, trajectory: Trajectory) -> None:
             raise PaintError(f'{target} is there and no planned bag; move it away')
     # A bag's files are named for their folder, so the folder is made under its own name.
     with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
-        fresh = write_pose_bag(Path(aside) / target.name, trajectory)
+        fresh = write_pose_bag(
+            Path(aside) / target.name, _in_frame(plan.trajectory, part),
+            custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
+            part=(plan.trajectory.frame_id, part[1]) if part else None,
+        )  # fmt: skip
         if target.exists():
             shutil.rmtree(target)
         fresh.rename(target)
+    write_model(target / MODEL_FILE, plan.model)
+
+
+def _in_frame(trajectory: Trajectory, part: tuple[str, Rigid] | None) -> Trajectory:
+    """The poses as the robot tells them."""
+    if part is None:
+        return trajectory
+    frame_id, place = part
+    return moved(trajectory, place, frame_id)

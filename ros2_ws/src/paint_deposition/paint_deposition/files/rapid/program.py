@@ -12,6 +12,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.data import RapidData
 from paint_deposition.files.rapid.syntax import Instruction, Module, ModuleParser
 from paint_deposition.files.rapid.values import Reference
+from paint_deposition.motion.programmed import GunSwitch, Move
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
@@ -22,44 +23,22 @@ JOINT_MOVES = ('moveabsj', 'moveextj')
 TRIGGERS = ('triggio', 'triggequip')
 
 
-@dataclass(frozen=True)
-class GunSwitch:
-    """The gun switched during a move, so far after its start or before its end."""
-
-    distance_m: float
-    from_start: bool
-    on: bool
-
-    def __str__(self) -> str:
-        place = 'after its start' if self.from_start else 'before its end'
-        return f'{"on" if self.on else "off"} {self.distance_m:g} m {place}'
-
-
-@dataclass(frozen=True)
-class RapidMove:
+@dataclass(frozen=True, kw_only=True)
+class RapidMove(Move):
     """A move of the TCP as programmed; zones cut its corners on the robot.
 
+    Its pose is in the world, or in the work object where the module does not define that.
+
     Attributes:
-        instruction: RAPID's name in lower case. line: where it stands.
-        position_m, quaternion_xyzw: pose of the TCP at the end, in the world (or in the work
-            object, where the module does not define that).
-        via_m: (3,) point that a circular move passes through, None for others.
-        speed_m_per_s: programmed speed; zone_m: radius in which the corner is cut, 0: stop.
-        spraying: whether the gun is on as the move begins.
-        switches: of the gun during the move, in the order written.
+        instruction: RAPID's name in lower case.
+        zone_m: radius in which the corner is cut, 0: stop.
+        tool, work_object: their names.
     """
 
     instruction: str
-    line: int
-    position_m: np.ndarray
-    quaternion_xyzw: np.ndarray
-    via_m: np.ndarray | None
-    speed_m_per_s: float
     zone_m: float
     tool: str
     work_object: str
-    spraying: bool
-    switches: tuple[GunSwitch, ...] = ()
 
 
 @dataclass

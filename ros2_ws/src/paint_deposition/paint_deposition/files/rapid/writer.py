@@ -6,12 +6,13 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.pass_motion import PlannedMove
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.programmed import Move
 
 MODULE = r"""MODULE PaintPasses
   ! Poses of the TCP of tBell in wobjPart, both taught on the robot.
   ! doGun opens the gun. Millimetres, mm/s; axis configurations are free.
-{data}
+{about}{data}
   VAR triggdata gunOn;
   VAR triggdata gunOff;
 
@@ -26,16 +27,24 @@ MODULE = r"""MODULE PaintPasses
   ENDPROC
 ENDMODULE
 """
+NOWHERE = '[[0,0,0],[1,0,0,0]]'
 FRAMES = r'tBell\WObj:=wobjPart'
 ANY_AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
 
-def module_text(moves: Sequence[PlannedMove]) -> str:
+def module_text(
+    moves: Sequence[Move], comments: Sequence[str] = (), part: Rigid | None = None
+) -> str:
     """A module whose `main` runs the moves: poses in the work object, the gun by TriggL.
 
     The tool and the work object are taught on the robot and not defined here: the module's poses
     are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
     ends with the gun off. `read_program` reads it back within 0.001 mm.
+
+    Args:
+        moves: in the part's frame.
+        comments: more lines for the head of the module.
+        part: pose of the part in the robot's world; the work object is defined by it then.
 
     Raises PlanError for speeds that no robot could run.
     """
@@ -56,15 +65,24 @@ def module_text(moves: Sequence[PlannedMove]) -> str:
         zone = 'fine' if number == len(moves) else 'z10'
         speed_name = speeds[_speed(move)]
         run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
-    return MODULE.format(data='\n'.join(data), moves='\n'.join(run))
+    about = ''.join(f'  ! {comment}\n' for comment in comments)
+    if part is not None:
+        about += f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{_pose(part.values)},{NOWHERE}];\n'
+    return MODULE.format(about=about, data='\n'.join(data), moves='\n'.join(run))
 
 
-def _speed(move: PlannedMove) -> float:
+def _speed(move: Move) -> float:
     return round(float(move.speed_m_per_s), 6)
 
 
-def _target(move: PlannedMove) -> str:
-    x, y, z, w = move.quaternion_xyzw
-    position = ','.join(f'{value * 1e3 + 0.0:.3f}' for value in move.position_m)
-    orientation = ','.join(f'{value:.7f}' for value in (w, x, y, z))
-    return f'[[{position}],[{orientation}],{ANY_AXES}]'
+def _target(move: Move) -> str:
+    pose = _pose([*move.position_m, *move.quaternion_xyzw])
+    return f'{pose[:-1]},{ANY_AXES}]'
+
+
+def _pose(values: Sequence[float]) -> str:
+    """A pose as RAPID has it: millimetres, and the scalar of the quaternion first."""
+    x, y, z, w = values[3:]
+    position = ','.join(f'{value * 1e3 + 0.0:.3f}' for value in values[:3])
+    orientation = ','.join(f'{value + 0.0:.7f}' for value in (w, x, y, z))
+    return f'[[{position}],[{orientation}]]'

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import yaml
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -21,6 +22,8 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_files
 
+# The key of a bag's custom data under which a plan says which topic is its trigger.
+TRIGGER = 'trigger_topic'
 ROS2_SUFFIXES = ('.mcap', '.db3')
 
 
@@ -131,6 +134,15 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
         yield Bag(path, reader)
     finally:
         reader.close()
+
+
+def custom_data(path: Path) -> dict[str, str]:
+    """Texts by name that the writer of a rosbag2 folder put into its metadata.yaml."""
+    try:
+        told = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
+        return dict(told['rosbag2_bagfile_information'].get('custom_data') or {})
+    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError):
+        return {}  # of an older version, or no bag: whoever reads it says so
 
 
 def _refuse_what_is_no_bag(path: Path) -> None:

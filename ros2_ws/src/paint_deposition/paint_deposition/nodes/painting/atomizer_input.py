@@ -11,7 +11,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.bags import stamp_ns
+from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import relative_flow
@@ -48,7 +48,7 @@ class AtomizerInput:
         self.poses_received = 0
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
-        self._poses: list[tuple[float, ...]] = []
+        self._poses: list[tuple[np.ndarray, np.ndarray]] = []
         self.tf_queue = TfQueue()
         self.reset()
         # Best effort connects to reliable publishers, too.
@@ -81,15 +81,12 @@ class AtomizerInput:
         self.tf_queue.release(time.monotonic(), self._place, self._refuse)
         if not self._stamps:
             return
-        stamps, poses = np.array(self._stamps, dtype=np.int64), np.array(self._poses)
+        stamps = np.array(self._stamps, dtype=np.int64)
+        positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._stamps.clear()
         self._poses.clear()
         self.intervals.add(stamps)
-        self._node.add_poses(
-            PoseBatch(
-                stamps, np.ascontiguousarray(poses[:, :3]), np.ascontiguousarray(poses[:, 3:])
-            )
-        )
+        self._node.add_poses(PoseBatch(stamps, positions, quaternions))
 
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
@@ -105,12 +102,12 @@ class AtomizerInput:
     def _place(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
         stamp = stamp_ns(message.header)
+        p, q = message.pose.position, message.pose.orientation
+        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
         if self._node.frame.is_own(frame_id):
-            p, q = message.pose.position, message.pose.orientation
-            pose: tuple[float, ...] = (p.x, p.y, p.z, q.x, q.y, q.z, q.w)
             self.without_frame += not frame_id
         else:
-            pose = self._node.frame.transform_from(frame_id, stamp).applied(message.pose)
+            pose = self._node.frame.transform_from(frame_id, stamp).applied(*pose)
         self._stamps.append(stamp)
         self._poses.append(pose)
 

@@ -3,59 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from geometry_msgs.msg import Pose
 from rclpy.node import Node
 from rclpy.time import Time
 
+from paint_deposition.motion.part_frame import Rigid, is_frame
 from paint_deposition.nodes.painting.tf_queue import NoTransform
 
 GIVE_FRAMES = 'set part_pose and part_parent_frame, or frame_id'
-
-
-@dataclass(frozen=True)
-class Rigid:
-    """A rotation (3, 3) with its quaternion (x, y, z, w), and then a translation (3,) [m]."""
-
-    rotation: np.ndarray
-    quaternion_xyzw: tuple[float, float, float, float]
-    translation_m: np.ndarray
-
-    @staticmethod
-    def of(values: Sequence[float]) -> Rigid:
-        """From [x y z qx qy qz qw]; the quaternion is normalised."""
-        quaternion = np.asarray(values[3:], dtype=float)
-        x, y, z, w = quaternion / np.linalg.norm(quaternion)
-        rotation = np.array(
-            [
-                [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-            ]
-        )
-        return Rigid(rotation, (x, y, z, w), np.asarray(values[:3], dtype=float))
-
-    def inverse(self) -> Rigid:
-        """The inverse transform."""
-        x, y, z, w = self.quaternion_xyzw
-        back = self.rotation.T
-        return Rigid(back, (-x, -y, -z, w), -back @ self.translation_m)
-
-    def applied(self, pose: Pose) -> tuple[float, ...]:
-        """The pose [x y z qx qy qz qw]; the norm of its quaternion stays as it is."""
-        p, q = pose.position, pose.orientation
-        position = self.rotation @ np.array([p.x, p.y, p.z]) + self.translation_m
-        x, y, z, w = self.quaternion_xyzw
-        return (
-            *position.tolist(),
-            w * q.x + x * q.w + y * q.z - z * q.y,
-            w * q.y - x * q.z + y * q.w + z * q.x,
-            w * q.z + x * q.y - y * q.x + z * q.w,
-            w * q.w - x * q.x - y * q.y - z * q.z,
-        )
 
 
 class PartFrame:
@@ -82,7 +38,7 @@ class PartFrame:
 
     def is_own(self, frame_id: str) -> bool:
         """Whether a pose in this frame can be taken as it is."""
-        return frame_id in ('', self.frame_id) or frame_id.lstrip('/') == self.frame_id
+        return is_frame(frame_id, self.frame_id)
 
     def transform_from(self, frame_id: str, stamp_ns: int) -> Rigid:
         """The transform from another frame at that time.

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
-
 from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
+from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -12,16 +11,6 @@ from paint_deposition.nodes.runtime.parameters import (
     fixed,
     mesh_parameters,
 )
-
-
-def is_pose(value: list[float]) -> bool:
-    """Nothing, or seven finite numbers whose last four are nearly a unit quaternion."""
-    if not value:
-        return True
-    if len(value) != 7 or not all(map(math.isfinite, value)):
-        return False
-    return abs(math.hypot(*value[3:]) - 1.0) <= 0.01
-
 
 PAINTING = dict(
     **fixed(
@@ -35,8 +24,8 @@ PAINTING = dict(
     part_pose=NodeParameter(
         [],
         'Pose of the mesh in part_parent_frame, x y z qx qy qz qw; empty: not known [m, -]',
-        constraints='seven numbers, the last four a unit quaternion, or none',
-        allows=is_pose,
+        constraints=f'{POSE_WORDS}, or none',
+        allows=lambda value: not value or is_pose(value),
         element=float,
     ),
     part_parent_frame=NodeParameter(

@@ -1,0 +1,104 @@
+"""Which model a command works with, and the line that says so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import paint_deposition as pd
+from paint_deposition.cli.options import say_all
+
+if TYPE_CHECKING:
+    from paint_deposition.files.model_file import ModelFile
+
+DIGITS = 12
+
+
+@dataclass(frozen=True)
+class ChosenModel:
+    """A model and where it came from.
+
+    Attributes:
+        file: the model, None for the default.
+        path: its file, None for the default.
+        words: the line for the user.
+    """
+
+    file: ModelFile | None
+    path: Path | None
+    words: str
+
+    @property
+    def model(self) -> pd.DepositionModel:
+        """The model of the file, else that of a 50 mm bell."""
+        return self.file.model if self.file else pd.DepositionModel()
+
+
+def chosen_model(
+    given: Path | None, otherwise: str = 'default, a 50 mm bell; --model gives another'
+) -> ChosenModel:
+    """The model named with --model, else the default.
+
+    Args:
+        given: the file, or None.
+        otherwise: what to say of the default.
+    """
+    from paint_deposition.files.model_file import read_model_file
+
+    if given is None:
+        return ChosenModel(None, None, otherwise)
+    file = read_model_file(given)
+    return ChosenModel(file, given, _words(given, file))
+
+
+def model_for(given: Path | None, motion: Path) -> ChosenModel:
+    """The model named with --model, else the one that the motion was planned with, else a bell.
+
+    What is odd about it is said on stderr.
+    """
+    from paint_deposition.files.planned_model import model_digest, planned_model
+
+    planned = planned_model(motion)
+    chosen = chosen_model(given)
+    if planned is None:
+        return chosen
+    if chosen.file is not None:
+        if model_digest(chosen.model) != planned.digest:
+            say_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
+        return chosen
+    if planned.file is None:
+        warning = (
+            f'{motion} was planned with a model ({planned.digest[:12]}) that is not in '
+            f'{planned.path}; give it with --model, or the film is another one than planned'
+        )
+        say_all('warning', [warning])
+        return chosen
+    words = _words(planned.path, planned.file)
+    return ChosenModel(planned.file, planned.path, f'that of the plan, {words}')
+
+
+def campaign_model_words(
+    data: pd.Campaign, given: Path | None, start: ModelFile | None, fitted: str
+) -> str:
+    """The line for a command on a campaign.
+
+    Args:
+        data: the campaign, which may name a model. given: that of --model, or None.
+        start: the one of them that was read.
+        fitted: what happened to it, as 'fitted to the campaign, from'; or '' if it was only used.
+    """
+    path = given or data.model_file
+    if start is None or path is None:
+        return f'{fitted or "fitted to the campaign, from"} a 50 mm bell'
+    return f'{fitted} {_words(Path(path), start)}'.strip()
+
+
+def _words(path: Path, file: ModelFile) -> str:
+    """'runs/model.yaml (sha256 1a2b3c4d5e6f), effects: air_drift'."""
+    from paint_deposition.files.planned_model import model_digest
+
+    called = f" '{file.name}'" if file.name else ''
+    effects = ', '.join(effect.id for effect in file.model.effects) or 'none'
+    digest = model_digest(file.model)[:DIGITS]
+    return f'{path}{called} ({digest}), effects: {effects}'

@@ -1,0 +1,84 @@
+"""Which motion of a file is meant, and where the part stood: as campaigns and options say it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, Field
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.pose_tables.rotations import ROTATION_WORDS, is_rotation
+from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+
+Text = Annotated[str, Field(min_length=1)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+
+
+def _pose(values: list[float]) -> list[float]:
+    if not is_pose(values):
+        raise ValueError(f'{values} is no pose; give {POSE_WORDS}')
+    return values
+
+
+def _rotation(name: str) -> str:
+    if not is_rotation(name):
+        raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
+    return name
+
+
+class MotionSource(BaseModel, extra='forbid'):
+    """What to read of a motion file, and how it lies to the part; None is not given."""
+
+    pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
+    state_topic: Text | None = Field(None, description='the name of a topic of the recording')
+    gun_signal: Text | None = Field(None, description='the name of a digital output')
+    tf: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = Field(
+        None, description='[target, source], the frame of the poses and the frame of the TCP'
+    )
+    urdf: Text | None = Field(None, description="the name of the robot's URDF file")
+    tip_link: Text | None = Field(None, description='the name of the link that is the TCP')
+    base_link: Text | None = Field(None, description='the name of the link in which the poses are')
+    pose_unit: Literal['m', 'mm', 'cm'] | None = Field(
+        None, description="'m', 'mm' or 'cm', the unit of a table's positions"
+    )
+    rotation: Annotated[Text, AfterValidator(_rotation)] | None = Field(
+        None, description=ROTATION_WORDS
+    )
+    angle_unit: Literal['deg', 'rad'] | None = Field(
+        None, description="'deg' or 'rad', the unit of a table's angles"
+    )
+    frame_id: Text | None = Field(None, description="the name of the part's frame")
+    part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
+        None, description=f'the pose of the part in the frame of the poses, {POSE_WORDS}'
+    )
+
+    def refuse_other(self, path: Path, kind: str, *known: str) -> None:
+        """Refuse what a kind of file does not have.
+
+        Args:
+            path: the file. kind: what it is, for the message.
+            known: the fields that mean something for it, beside those on the part.
+
+        Raises:
+            RecordingError: another field is given.
+        """
+        for name, kinds in MOTION_KINDS.items():
+            if name not in known and getattr(self, name) is not None:
+                option = f'--{name.replace("_", "-")}'
+                raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
+
+
+# The fields that one kind of file has, and that kind.
+MOTION_KINDS = {
+    'pose_topic': 'bags',
+    'state_topic': 'bags and tables',
+    'tf': 'bags',
+    'urdf': 'bags',
+    'tip_link': 'bags',
+    'base_link': 'bags',
+    'gun_signal': 'RAPID modules',
+    'pose_unit': 'tables of poses',
+    'rotation': 'tables of poses',
+    'angle_unit': 'tables of poses',
+}

@@ -1,0 +1,79 @@
+"""The model that passes were planned with: which it was, said in every file of a plan.
+
+A plan lies in a folder with its ``model.yaml``; its bag holds a copy. Bag, RAPID module and
+``plan.json`` tell the digest of the model, so that another ``model.yaml`` is not taken for it.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.files.model_text import model_text
+from paint_deposition.files.rapid.motion import is_rapid
+from paint_deposition.files.recordings.bag_files import custom_data
+
+MODEL_FILE = 'model.yaml'
+PLAN_FILE = 'plan.json'
+# The key of the digest in a bag's custom data and in plan.json.
+DIGEST = 'model_sha256'
+IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
+
+
+@dataclass(frozen=True)
+class PlannedModel:
+    """What a motion says of the model that it was planned with.
+
+    Attributes:
+        path: where the model should be.
+        digest: of the model.
+        file: the model, None where it is not there or is another one.
+    """
+
+    path: Path
+    digest: str
+    file: ModelFile | None
+
+
+def model_digest(model: DepositionModel) -> str:
+    """SHA-256 of a model's values, wherever its file lies and however it is commented."""
+    text = model_text(model, Path('/'), '', '', {})
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def planned_model(motion: Path) -> PlannedModel | None:
+    """The model of a plan's bag, module or table, None for a motion that was not planned.
+
+    Raises:
+        ModelError: a model.yaml beside it is not valid.
+    """
+    folder = motion if motion.is_dir() else motion.parent
+    digest = _told_digest(motion, folder)
+    if not digest:
+        return None
+    path = folder / MODEL_FILE
+    file = read_model_file(path) if path.is_file() else None
+    if file is not None and model_digest(file.model) != digest:
+        file = None
+    return PlannedModel(path, digest, file)
+
+
+def _told_digest(motion: Path, folder: Path) -> str:
+    if is_rapid(motion):
+        try:
+            found = IN_RAPID.search(motion.read_text(encoding='utf-8', errors='replace'))
+        except OSError:
+            return ''
+        return found[1] if found else ''
+    if motion.suffix == '.csv':
+        try:
+            told = json.loads((folder / PLAN_FILE).read_text(encoding='utf-8'))
+        except (OSError, ValueError):
+            return ''
+        return str(told.get(DIGEST, '')) if motion.name == 'passes.csv' else ''
+    return custom_data(folder).get(DIGEST, '')

@@ -1,0 +1,1 @@
+"""Tables of poses, as robots, loggers and the project's own plans write them."""

@@ -1,0 +1,159 @@
+"""The motion of a robot's tip from its joints: JointState messages and the URDF of the robot."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import networkx as nx
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import RecordingError, did_you_mean
+from paint_deposition.files.recordings.bag_files import Bag
+from paint_deposition.files.recordings.triggers import choose_topic, listed_topics, stamp_ns
+from paint_deposition.motion.trajectory import Trajectory
+
+JOINT_TYPE = 'sensor_msgs/msg/JointState'
+USUAL_TIP = 'tool0'
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The chain of joints from a robot's base to its tip.
+
+    Attributes:
+        path: of the URDF. base, tip: links.
+        chain: joints in order, as pytransform3d describes them.
+    """
+
+    path: Path
+    base: str
+    tip: str
+    chain: list[Any]
+
+    @staticmethod
+    def read(path: Path, tip: str | None = None, base: str | None = None) -> Robot:
+        """Read a URDF.
+
+        Args:
+            path: of the file.
+            tip: link whose origin is the TCP; default: tool0, else the only last link.
+            base: link in which the poses are; default: the root.
+
+        Raises:
+            RecordingError: it is no URDF, or has no such links.
+        """
+        from pytransform3d.urdf import UrdfException, parse_urdf
+
+        try:
+            text = path.read_text(encoding='utf-8')
+            if 'xacro:' in text:
+                raise RecordingError(f'{path} is xacro; run: xacro {path} > robot.urdf')
+            _, links, joints = parse_urdf(text)
+        except OSError as error:
+            raise RecordingError(f'cannot read {path}: {error.strerror}') from None
+        except (UrdfException, ValueError, AttributeError) as error:
+            raise RecordingError(f'{path} is no URDF ({error})') from None
+        parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
+        parents.add_nodes_from(link.name for link in links)
+        tip = tip or _last_link(path, parents)
+        base = base or next(link for link in parents if not parents.out_degree(link))
+        for name in (tip, base):
+            if name not in parents:
+                known = did_you_mean(name, sorted(parents))
+                raise RecordingError(f"{path} has no link '{name}'; {known}")
+        if tip == base or not nx.has_path(parents, tip, base):
+            raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give --base")
+        way = nx.utils.pairwise(nx.shortest_path(parents, tip, base))
+        return Robot(path, base, tip, [parents.edges[pair]['joint'] for pair in way][::-1])
+
+    @property
+    def moving(self) -> list[str]:
+        """Names of the joints that move."""
+        return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
+
+    def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (N, 3) and quaternions (N, 4) of the tip in the base.
+
+        Args:
+            values: (N, J) of the moving joints [rad or m].
+        """
+        tip = np.tile(np.eye(4), (len(values), 1, 1))
+        columns = iter(values.T)
+        for joint in self.chain:
+            tip = tip @ joint.child2parent
+            if joint.joint_type != 'fixed':
+                axis = joint.joint_axis / np.linalg.norm(joint.joint_axis)
+                along = np.outer(next(columns), axis)
+                moved = np.tile(np.eye(4), (len(values), 1, 1))
+                if joint.joint_type == 'prismatic':
+                    moved[:, :3, 3] = along
+                else:
+                    moved[:, :3, :3] = Rotation.from_rotvec(along).as_matrix()
+                tip = tip @ moved
+        return tip[:, :3, 3], Rotation.from_matrix(tip[:, :3, :3]).as_quat()
+
+
+def _last_link(path: Path, parents: nx.DiGraph) -> str:
+    if USUAL_TIP in parents:
+        return USUAL_TIP
+    last = [link for link in parents if not parents.in_degree(link)]
+    if len(last) != 1:
+        raise RecordingError(f'{path} ends in {" ".join(sorted(last))}; name one with --tip')
+    return last[0]
+
+
+def read_joint_poses(
+    bag: Bag, robot: Robot, topic_name: str | None
+) -> tuple[Trajectory, np.ndarray]:
+    """The motion of a robot's tip from the joint states of a bag.
+
+    Joints that come in messages of their own are interpolated at the times of the one that comes
+    most often.
+
+    Returns:
+        The motion, and the times (N,) int64 at which its joints were logged [ns].
+
+    Raises:
+        RecordingError: there are no joint states, or not of all joints.
+    """
+    if not topic_name:
+        topics = [topic for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]
+        if len(topics) != 1:
+            listed = listed_topics(topics, 'JointState')
+            raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
+        topic_name = topics[0].name
+    topic = choose_topic(bag, topic_name, (JOINT_TYPE,), 'JointState')
+    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving}
+    seen: set[str] = set()
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        stamp = stamp_ns(message.header)
+        seen.update(message.name)
+        for name, value in zip(message.name, message.position, strict=False):
+            if name in rows and (not rows[name] or stamp > rows[name][-1][0]):
+                rows[name].append((stamp, log_time_ns, float(value)))
+    missing = [name for name in rows if len(rows[name]) < 2]
+    if missing or not rows:
+        raise RecordingError(
+            f'{topic.name} in {bag.path} tells nothing of {" ".join(missing) or "any joint"} of '
+            f'{robot.path.name}; its joints: {" ".join(sorted(seen)) or "none"}'
+        )
+    columns = {
+        name: tuple(map(np.array, zip(*found, strict=True))) for name, found in rows.items()
+    }
+    clock = max(columns, key=lambda name: len(columns[name][0]))
+    stamps, log_times, _ = columns[clock]
+    begin = max(at[0] for at, _, _ in columns.values())
+    end = min(at[-1] for at, _, _ in columns.values())
+    known = (stamps >= begin) & (stamps <= end)
+    stamps = stamps[known]
+    values = [np.interp(stamps - begin, at - begin, v) for at, _, v in columns.values()]
+    positions, quaternions = robot.poses(np.stack(values, axis=1))
+    note = (
+        f"joints: pose of '{robot.tip}' in '{robot.base}' by {robot.path.name}, from "
+        f'{" ".join(robot.moving)} on {topic.name}, {len(stamps)} poses'
+    )
+    trajectory = Trajectory(stamps, positions, quaternions, robot.base, notes=(note,))
+    return trajectory, log_times[known]

@@ -1,0 +1,204 @@
+"""When the gun was on: AtomizerState, Bool, or a number in any field of any message."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, fields, is_dataclass
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import RecordingError, did_you_mean
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic
+from paint_deposition.motion.trigger import relative_flow
+
+STATE_TYPE = 'paint_msgs/msg/AtomizerState'
+BOOL_TYPE = 'std_msgs/msg/Bool'
+# What a state tells of the process while the gun sprays.
+SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
+SYNTAX = re.compile(
+    r'(?P<topic>[\w/~]+)(?P<path>(\.\w+|\[\d+\])*)\s*((?P<side>[<>])\s*(?P<level>[-+.\deE]+))?'
+)
+STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
+MOST_FIELDS = 12
+
+
+@dataclass(frozen=True)
+class Switching:
+    """How the gun was switched.
+
+    Attributes:
+        stamps_ns: (M,) int64 times at which the flow changes; flow: (M,) from then on.
+        settings: median of each setting that the states tell.
+        by_log_time: whether the times are those at which messages were logged.
+        notes: what was understood, a line each.
+    """
+
+    stamps_ns: np.ndarray
+    flow: np.ndarray
+    settings: dict[str, float] = field(default_factory=dict)
+    by_log_time: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def stamp_ns(header: Any) -> int:
+    """A header's stamp in integer nanoseconds, which a float could not hold."""
+    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
+
+
+def choose_state_topic(bag: Bag, name: str) -> BagTopic:
+    """The named topic of a bag, AtomizerState or Bool."""
+    return choose_topic(bag, name, (STATE_TYPE, BOOL_TYPE), 'state')
+
+
+def choose_topic(bag: Bag, name: str, types: tuple[str, ...], kind: str) -> BagTopic:
+    """The named topic of a bag if it is of one of these types; the error lists those there are."""
+    listed = listed_topics(bag.topics_of(*types), kind)
+    topic = bag.find(name)
+    if topic is None:
+        raise RecordingError(f'{bag.path} has no topic {name}; {listed}')
+    if topic.type not in types:
+        raise RecordingError(
+            f'{topic.name} in {bag.path} is {topic.type}, not {" or ".join(types)}; {listed}'
+        )
+    return topic
+
+
+def listed_topics(candidates: list[BagTopic], kind: str) -> str:
+    """The topics of a kind in words."""
+    if not candidates:
+        return f'it has no {kind} topic'
+    return f'its {kind} topics: {" ".join(topic.name for topic in candidates)}'
+
+
+def unused_triggers(bag: Bag) -> tuple[str, ...]:
+    """One note that names the topics that could be the trigger; none where there are none."""
+    # States say what they are, a Bool may be anything: the first is the likeliest trigger.
+    topics = [topic for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE) if topic.message_count]
+    if not topics:
+        return ()
+    named = ' and '.join(f'{topic.name} ({topic.type})' for topic in topics)
+    return (
+        f'recording {bag.path}: {named} {"is" if len(topics) == 1 else "are"} not used, the gun '
+        f'sprays whenever poses flow; add `state_topic: {topics[0].name}` (--state-topic) if '
+        'that is the trigger',
+    )
+
+
+def read_switching(bag: Bag, name: str) -> Switching:
+    """How a topic, or a field of its messages, switched the gun.
+
+    Args:
+        bag: open.
+        name: a topic of AtomizerState or Bool; or topic, field and, where it is not 0, the level
+            beyond which the gun is on: ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``.
+
+    Raises:
+        RecordingError: there is no such topic or field, or it is no switch.
+    """
+    said = SYNTAX.fullmatch(name.strip())
+    topic = bag.find(said['topic']) if said else None
+    if said is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
+        return _states(bag, choose_state_topic(bag, name))
+    level = _level(said['level'], name)
+    steps = STEP.findall(said['path'])
+    rows = list(_values(bag, topic, steps))
+    if not rows:
+        raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
+    stamps, values, stamped = (np.array(column) for column in zip(*rows, strict=True))
+    known = np.isfinite(values)
+    order = np.argsort(stamps[known], kind='stable')
+    stamps, values = stamps[known][order], values[known][order]
+    on = values < level if said['side'] == '<' else values > level
+    side = 'below' if said['side'] == '<' else 'above'
+    low, high = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
+    note = (
+        f'trigger {topic.name}{said["path"]} is {low:.4g} to {high:.4g}: the gun is on where it '
+        f'is {side} {level:g}'
+    )
+    if not known.all():
+        note += f'; {np.count_nonzero(~known)} values that are no number are left out'
+    return Switching(stamps, on.astype(float), {}, not stamped.all(), (note,))
+
+
+def _level(text: str | None, name: str) -> float:
+    try:
+        return float(text or 0.0)
+    except ValueError:
+        raise RecordingError(f"{name}: '{text}' is no number; give a level, 12 say") from None
+
+
+def _states(bag: Bag, topic: BagTopic) -> Switching:
+    """Times and flows of all changes of AtomizerState or Bool."""
+    changes: list[tuple[int, float]] = []
+    told: dict[str, list[float]] = {}
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        if topic.type == BOOL_TYPE:
+            changes.append((log_time_ns, relative_flow(bool(message.data))))
+            continue
+        stamp = stamp_ns(message.header)
+        if stamp == 0:
+            raise RecordingError(
+                f'{topic.name} in {bag.path} has a state without a stamp; '
+                'let the publisher stamp each state'
+            )
+        changes.append((stamp, relative_flow(message.spraying, message.flow)))
+        for name in SETTINGS:
+            value = getattr(message, name, np.nan)
+            if message.spraying and np.isfinite(value):
+                told.setdefault(name, []).append(value)
+    changes.sort(key=lambda change: change[0])
+    return Switching(
+        np.array([stamp for stamp, _ in changes], dtype=np.int64),
+        np.array([flow for _, flow in changes], dtype=float),
+        {name: float(np.median(values)) for name, values in told.items()},
+        topic.type == BOOL_TYPE,
+    )
+
+
+def _values(
+    bag: Bag, topic: BagTopic, steps: list[tuple[str, str]]
+) -> Iterator[tuple[int, float, bool]]:
+    """(time, value, whether the time is the message's own stamp) of each message."""
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
+        # The messages of std_msgs have one field.
+        value = _followed(message, steps or [('data', '')])
+        if not isinstance(value, bool | int | float | np.bool_ | np.number):
+            raise RecordingError(_no_field(bag, topic, message, steps))
+        yield stamp or log_time_ns, float(value), bool(stamp)
+
+
+def _followed(value: Any, steps: list[tuple[str, str]]) -> Any:
+    """What a path of names and indices leads to, None where it ends before."""
+    try:
+        for name, index in steps:
+            value = getattr(value, name) if name else value[int(index)]
+    except (AttributeError, IndexError, TypeError):
+        return None
+    return value
+
+
+def _no_field(bag: Bag, topic: BagTopic, message: Any, steps: list[tuple[str, str]]) -> str:
+    """What is wrong with a field, and those that could be meant."""
+    path = ''.join(f'.{name}' if name else f'[{index}]' for name, index in steps)
+    found = [f'{topic.name}{switch}' for switch in _switches(message)]
+    listed = ' '.join(found[:MOST_FIELDS]) + (' ...' if len(found) > MOST_FIELDS else '')
+    if not steps:
+        return f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
+    remedy = did_you_mean(topic.name + path, found, f'there are: {listed or "none"}')
+    return f'{topic.name} in {bag.path} has no number or Bool at {path}; {remedy}'
+
+
+def _switches(value: Any, path: str = '') -> Iterator[str]:
+    """Paths to the numbers and Bools in a message."""
+    if isinstance(value, bool | int | float | np.bool_ | np.number):
+        yield path
+    elif is_dataclass(value):
+        for item in fields(value):
+            if item.name not in ('header', '__msgtype__'):
+                yield from _switches(getattr(value, item.name), f'{path}.{item.name}')
+    elif isinstance(value, list | np.ndarray):
+        for index, inner in enumerate(value[: MOST_FIELDS + 1]):
+            yield from _switches(inner, f'{path}[{index}]')

@@ -1,0 +1,140 @@
+"""Programmed moves of the TCP as a timed motion."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.motion.trajectory import Trajectory
+
+PROGRAMMED = 'this is the motion as programmed, not as recorded'
+POSE_PERIOD_S = 0.02
+# No move of a paint cell takes longer; one that does has a wrong number in it.
+LONGEST_MOVE_S = 3600.0
+# What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
+REORIENTATION_RAD_PER_S = math.radians(500.0)
+
+
+@dataclass(frozen=True)
+class GunSwitch:
+    """The gun switched during a move, so far after its start or before its end."""
+
+    distance_m: float
+    from_start: bool
+    on: bool
+
+    def __str__(self) -> str:
+        place = 'after its start' if self.from_start else 'before its end'
+        return f'{"on" if self.on else "off"} {self.distance_m:g} m {place}'
+
+
+@dataclass(frozen=True)
+class Move:
+    """A move to a pose of the TCP.
+
+    Attributes:
+        position_m: (3,) TCP at the end of the move [m].
+        quaternion_xyzw: (4,) orientation of the tool there, scalar last.
+        speed_m_per_s: speed of the TCP on the way [m/s].
+        spraying: whether the gun is on as the move begins.
+        via_m: (3,) point that a circular move passes through, None for straight ones.
+        switches: of the gun during the move, in the order written.
+        line: where it stands in its file, 0 for none.
+    """
+
+    position_m: np.ndarray
+    quaternion_xyzw: np.ndarray
+    speed_m_per_s: float
+    spraying: bool
+    via_m: np.ndarray | None = None
+    switches: tuple[GunSwitch, ...] = ()
+    line: int = 0
+
+
+def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
+    """Poses along moves, from the end of the first on, at the programmed speeds.
+
+    Args:
+        moves: in the order in which they run.
+        gun_known: whether the moves say when the gun is on; else it sprays throughout.
+
+    Raises:
+        RecordingError: there is no second move, or one without a speed.
+    """
+    if len(moves) < 2:
+        raise RecordingError('there is a single move; give a program that travels')
+    first = moves[0]
+    times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
+    changes: list[tuple[float, bool]] = []
+    for before, move in pairwise(moves):
+        if not move.speed_m_per_s > 0.0:
+            raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
+        turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
+        length_m, place_at = _track(before.position_m, move)
+        angle_rad = (turn[0].inv() * turn[1]).magnitude()
+        duration_s = max(length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S)
+        if duration_s > LONGEST_MOVE_S:
+            raise RecordingError(
+                f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
+                f'{duration_s / 3600.0:.3g} h; check its target and speed'
+            )
+        changes.append((times_s[-1], move.spraying))
+        changes += [(times_s[-1] + at * duration_s, on) for at, on in _switches(move, length_m)]
+        count = math.ceil(duration_s / POSE_PERIOD_S)
+        share = np.arange(1, count + 1) / max(count, 1)
+        positions += list(place_at(share))
+        quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
+        times_s += (times_s[-1] + share * duration_s).tolist()
+    flow = {}
+    if gun_known or any(on for _, on in changes):
+        flow = {round(time_s * 1e9): float(on) for time_s, on in changes}
+    return Trajectory(
+        np.array([round(time_s * 1e9) for time_s in times_s]),
+        np.array(positions),
+        np.array(quaternions),
+        trigger_stamps_ns=np.array(sorted(flow), dtype=np.int64),
+        trigger_flow=np.array([flow[stamp] for stamp in sorted(flow)]),
+    )
+
+
+def _switches(move: Move, length_m: float) -> list[tuple[float, bool]]:
+    """Share of the move at which the gun is switched, and whether on, in order."""
+    switches = []
+    for switch in move.switches:
+        from_start_m = switch.distance_m if switch.from_start else length_m - switch.distance_m
+        share = from_start_m / length_m if length_m > 0.0 else 0.0
+        switches.append((min(max(share, 0.0), 1.0), switch.on))
+    return sorted(switches, key=lambda switch: switch[0])
+
+
+def _track(begin_m: np.ndarray, move: Move) -> tuple[float, Callable]:
+    """Length of a move [m], and a function from shares (N,) of it to places (N, 3) [m].
+
+    A circular move is straight where begin, middle and end lie on a line.
+    """
+    to_end = move.position_m - begin_m
+    to_via = np.zeros(3) if move.via_m is None else move.via_m - begin_m
+    normal = np.cross(to_via, to_end)
+    square = normal @ normal
+    if square <= 1e-12 * (to_via @ to_via) * (to_end @ to_end):
+        return float(np.linalg.norm(to_end)), lambda share: begin_m + np.outer(share, to_end)
+    to_centre = np.cross(normal, to_via) * (to_end @ to_end)
+    to_centre = (to_centre + np.cross(to_end, normal) * (to_via @ to_via)) / (2.0 * square)
+    centre, radius = begin_m + to_centre, -to_centre
+    along = np.cross(normal, radius) / math.sqrt(square)
+    end = to_end - to_centre
+    angle_rad = math.atan2(end @ along, end @ radius) % (2.0 * math.pi)
+    return (
+        float(np.linalg.norm(radius)) * angle_rad,
+        lambda share: (
+            centre
+            + np.outer(np.cos(share * angle_rad), radius)
+            + np.outer(np.sin(share * angle_rad), along)
+        ),
+    )

@@ -1,0 +1,83 @@
+"""`paint locate` over real files, as a user runs it."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from booth import SAMPLES
+from cli.command import assert_refused, paint
+from paint_deposition.motion.part_frame import Rigid
+
+POSE = Rigid.of([2.0, 0.5, 0.7, 0.0, 0.0, 0.6, 0.8])
+POINTS = {'A': [0, 0, 0], 'B': [900, 0, 10], 'C': [850, 40, 600], 'D': [30, 0, 550]}
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Touched points in metres with a decimal comma, the same in the part's frame in mm."""
+    listed = np.array(list(POINTS.values())) * 1e-3
+    touched, _ = POSE.applied(listed, np.tile([0.0, 0, 0, 1], (len(listed), 1)))
+    rows = [
+        ';'.join([name, *(f'{value:.4f}'.replace('.', ',') for value in at)])
+        for name, at in zip(POINTS, touched, strict=True)
+    ]
+    (tmp_path / 'touched.csv').write_text('\n'.join(['Point;X [m];Y [m];Z [m]', *rows]))
+    rows = [f'{name},{x},{y},{z}' for name, (x, y, z) in POINTS.items()]
+    (tmp_path / 'points.csv').write_text('\n'.join(['point,x_mm,y_mm,z_mm', *rows]))
+    return ('--touched', tmp_path / 'touched.csv', '--points', tmp_path / 'points.csv')
+
+
+def test_touched_points_give_the_pose_in_three_forms(tables):
+    done = paint('locate', *tables)
+    assert done.returncode == 0, done.stderr
+    option, yaml, residual, *each = done.stdout.splitlines()
+    values = [float(word) for word in option.removeprefix('--part-pose ').split()]
+    assert np.allclose(values, POSE.values, atol=2e-4)
+    assert yaml == f'part_pose: [{", ".join(option.split()[1:])}]'
+    assert residual.endswith(' mm RMS')
+    assert [line.split(':')[0].strip() for line in each] == list(POINTS)
+    figures = json.loads(paint('locate', *tables, '--json').stdout)
+    assert np.allclose(figures['part_pose'], POSE.values, atol=2e-4)
+    assert figures['rms_m'] < 2e-4
+    assert set(figures['residuals_m']) == set(POINTS)
+
+
+def test_bad_points_are_refused_with_their_files(tables, tmp_path):
+    text = (tmp_path / 'points.csv').read_text()
+    (tmp_path / 'points.csv').write_text(text.replace('B,', 'A,', 1))
+    assert_refused(paint('locate', *tables), 'points.csv', "two points are called 'A'")
+    (tmp_path / 'points.csv').write_text(text.replace('B,', 'E,').replace('C,', 'F,'))
+    assert_refused(paint('locate', *tables), 'touched.csv', '2 points in common (A D)')
+    (tmp_path / 'points.csv').write_text(text.replace('point,', 'weight,'))
+    assert_refused(paint('locate', *tables), 'points.csv', 'give a column point')
+    (tmp_path / 'points.csv').write_text(text.replace('_mm', ''))
+    assert_refused(paint('locate', *tables), 'points.csv', 'reach 900 and tell no unit')
+
+
+def test_what_belongs_together_must_be_given(tables):
+    assert_refused(paint('locate', *tables[:2]), 'give --touched and --points, or --scan and')
+    assert_refused(paint('locate', *tables, '--mesh', 'm.stl'), 'or --scan and --mesh')
+    assert_refused(paint('locate', '--scan', 's.stl', '--mesh', 'm.stl'), 's.stl: no such mesh')
+
+
+@pytest.mark.slow
+def test_a_scan_in_millimetres_gives_the_pose(tmp_path):
+    """The sample door is nearly the same on both sides, so a start is given."""
+    scan = trimesh.load_mesh(SAMPLES / 'door.stl')
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = POSE.rotation, POSE.translation_m
+    scan.apply_transform(matrix)
+    scan.apply_scale(1000.0)
+    scan.export(tmp_path / 'scan.stl')
+    near = (2.03, 0.48, 0.72, 0.0, 0.02, 0.59, 0.807)
+    done = paint(
+        'locate', '--scan', tmp_path / 'scan.stl', '--scan-scale', 0.001,
+        '--mesh', SAMPLES / 'door.stl', '--start', *near, '--json',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    off = POSE.inverse() @ Rigid.of(figures['part_pose'])
+    assert np.linalg.norm(off.translation_m) < 2e-3
+    assert figures['rms_m'] < 1e-3

@@ -1,0 +1,219 @@
+"""One motion of a six-axis arm in every kind of file: one film."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+
+from cli.command import assert_refused, paint
+from files.recorded import Messages, write_bag
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.fitting.forward import Forward
+from paint_deposition.motion.programmed import PROGRAMMED, Move
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.readings.campaign import Campaign
+from robot_arm import JOINTS, sweep, tip_poses, urdf
+from scenes import stamps_ns
+
+TIMES_S = np.linspace(0.0, 3.0, 301)
+STAMPS = stamps_ns(TIMES_S)
+JOINT_VALUES = sweep(len(TIMES_S))
+POSITIONS, QUATERNIONS = tip_poses(JOINT_VALUES)
+MIDDLE = len(TIMES_S) // 2
+# The panel stands where the bell looks in the middle of its way, a standoff before it.
+TURN = Rotation.from_quat(QUATERNIONS[MIDDLE])
+PART_AT = POSITIONS[MIDDLE] + TURN.apply([0.0, 0.0, 0.25])
+PART_POSE = [*PART_AT, *TURN.as_quat()]
+OPENS, CLOSES = 60, 240
+ON = np.zeros(len(TIMES_S), dtype=bool)
+ON[OPENS:CLOSES] = True
+
+
+@pytest.fixture(scope='module')
+def panel(tmp_path_factory):
+    """A panel of 0.8 m by 0.6 m in x and y, outward to -z."""
+    corners = np.array([[-0.4, -0.3, 0], [0.4, -0.3, 0], [0.4, 0.3, 0], [-0.4, 0.3, 0]])
+    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
+    trimesh.Trimesh(corners, [[0, 2, 1], [0, 3, 2]], process=False).export(path)
+    return path
+
+
+def pose_bag(folder):
+    trigger = {
+        'trigger_stamps_ns': STAMPS[[OPENS, CLOSES]], 'trigger_flow': np.array([1.0, 0.0])
+    }  # fmt: skip
+    poses = Trajectory(STAMPS, POSITIONS, QUATERNIONS, 'base_link', **trigger)
+    return write_pose_bag(folder / 'poses', poses), ('--trigger', '/atomizer/state')
+
+
+def with_signal(messages):
+    """The gun's signal as an integer among others of the cell, once with every pose."""
+    make = messages.store.types['std_msgs/msg/Int32']
+    return [
+        ('/cell/gun', stamp, make(int(on)))
+        for stamp, on in zip(STAMPS.tolist(), ON.tolist(), strict=True)
+    ]
+
+
+def joint_bag(folder):
+    messages = Messages()
+    entries = with_signal(messages)
+    entries += [
+        ('/joint_states', stamp, messages.joints(stamp, JOINTS, row))
+        for stamp, row in zip(STAMPS.tolist(), JOINT_VALUES, strict=True)
+    ]
+    (folder / 'arm.urdf').write_text(urdf())
+    bag = write_bag(folder / 'joints', entries, 'mcap', messages)
+    return bag, ('--urdf', folder / 'arm.urdf', '--tip', 'tool0', '--trigger', '/cell/gun')
+
+
+def tf_bag(folder):
+    messages = Messages()
+    entries = with_signal(messages)
+    entries += [
+        ('/tf', stamp, messages.transforms((stamp, 'base_link', 'bell', [*place, *turn])))
+        for stamp, place, turn in zip(STAMPS.tolist(), POSITIONS, QUATERNIONS, strict=True)
+    ]
+    bag = write_bag(folder / 'tf', entries, 'sqlite3', messages)
+    return bag, ('--tf', 'base_link', 'bell', '--trigger', '/cell/gun')
+
+
+def table(folder):
+    turns = Rotation.from_quat(QUATERNIONS).as_rotvec()
+    rows = np.column_stack([1e3 * TIMES_S, 1e3 * POSITIONS, turns, ON])
+    text = '\n'.join(';'.join(f'{value:.8f}'.replace('.', ',') for value in row) for row in rows)
+    path = folder / 'robot.csv'
+    path.write_text(f't [ms];X [mm];Y [mm];Z [mm];RX [rad];RY [rad];RZ [rad];gun\n{text}\n')
+    return path, ()
+
+
+def moves():
+    """Straight moves from pose to pose at their speeds, for what is programmed."""
+    steps = np.linalg.norm(np.diff(POSITIONS, axis=0), axis=1) / np.diff(TIMES_S)
+    speeds = np.append(steps[0], steps)
+    rows = range(len(POSITIONS))
+    return [
+        Move(POSITIONS[k], QUATERNIONS[k], float(speeds[k]), bool(ON[max(k - 1, 0)])) for k in rows
+    ]
+
+
+def module(folder):
+    path = folder / 'passes.mod'
+    path.write_text(module_text(moves()))
+    return path, ()
+
+
+def passes(folder):
+    rows = [
+        [1, *move.position_m, *move.quaternion_xyzw, move.speed_m_per_s, int(move.spraying)]
+        for move in moves()
+    ]
+    heading = 'pass,x_m,y_m,z_m,qx,qy,qz,qw,speed_m_per_s,spraying'
+    text = '\n'.join(','.join(f'{value:.9g}' for value in row) for row in rows)
+    path = folder / 'passes.csv'
+    path.write_text(f'{heading}\n{text}\n')
+    return path, ()
+
+
+# The kind, and what its film may differ from that of the poses, as a share of the peak: angles
+# with six digits, RAPID with 0.001 mm and 0.001 mm/s.
+KINDS = {
+    'joints': (joint_bag, 1e-5), 'tf': (tf_bag, 1e-5), 'table': (table, 1e-5),
+    'module': (module, 1e-3), 'passes': (passes, 1e-3),
+}  # fmt: skip
+
+
+def film_of(panel, motion, options, out):
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', motion, *options,
+        '--part-pose', *PART_POSE, '--max-edge-length-m', 0.04, '-o', out,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    rows = np.genfromtxt(out / 'film.csv', delimiter=',', names=True)
+    return rows['thickness_um'], json.loads((out / 'stats.json').read_text())
+
+
+@pytest.fixture(scope='module')
+def expected(panel, tmp_path_factory):
+    """Film, figures, and what the gauge should show, of the recorded poses."""
+    folder = tmp_path_factory.mktemp('expected')
+    campaign_of('module', panel, folder)
+    motion, options = pose_bag(folder)
+    at = ('--at', folder / 'readings.csv')
+    film, figures = film_of(panel, motion, (*options, *at), folder / 'out')
+    assert film.max() > 5.0
+    rows = np.genfromtxt(folder / 'out' / 'predicted.csv', delimiter=',', names=True)
+    return film, figures, rows['predicted_um']
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', KINDS)
+def test_the_film_is_that_of_the_recorded_poses(kind, panel, expected, tmp_path):
+    write, share = KINDS[kind]
+    film, figures = film_of(panel, *write(tmp_path), tmp_path / 'out')
+    assert np.abs(film - expected[0]).max() < share * expected[0].max() + 1.1e-3  # as printed
+    time_s = expected[1]['spraying_time_s']
+    assert figures['spraying_time_s'] == pytest.approx(time_s, rel=share)
+    assert (PROGRAMMED in figures['notes']) == (kind in ('module', 'passes'))
+
+
+def campaign_of(kind, panel, folder):
+    """A campaign with readings of 10 µm on the panel, painted by that kind of motion."""
+    motion, _ = KINDS[kind][0](folder)
+    lines = [f'{x:.2f},{y},0,10' for x in np.linspace(-0.2, 0.2, 9) for y in (-0.1, 0.1)]
+    (folder / 'readings.csv').write_text('\n'.join(['x_m,y_m,z_m,thickness_um', *lines]))
+    entry = {
+        'name': 'panel', 'mesh': str(panel), 'trajectory': motion.name,
+        'measurements': 'readings.csv', 'part_pose': [float(value) for value in PART_POSE],
+    }  # fmt: skip
+    entry |= {
+        'joints': {'urdf': 'arm.urdf', 'tip_link': 'tool0', 'state_topic': '/cell/gun'},
+        'tf': {'tf': ['base_link', 'bell'], 'state_topic': '/cell/gun'},
+    }.get(kind, {})
+    (folder / 'campaign.yaml').write_text(json.dumps({'experiments': [entry]}))
+    return folder / 'campaign.yaml'
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('kind', KINDS)
+def test_campaigns_take_every_kind(kind, panel, expected, tmp_path):
+    said = []
+    (experiment,) = read_campaign(campaign_of(kind, panel, tmp_path), said.append).experiments
+    predicted = Forward(Campaign((experiment,))).predict_um(DepositionModel())
+    assert predicted.max() > 5.0
+    share = KINDS[kind][1]
+    assert np.abs(predicted - expected[2]).max() < share * predicted.max() + 1e-3
+    assert (f'panel: {PROGRAMMED}' in said) == (kind in ('module', 'passes'))
+
+
+@pytest.mark.slow
+def test_compare_says_that_a_motion_is_only_programmed(panel, expected, tmp_path):
+    (tmp_path / 'bell.yaml').write_text('effects: []\n')
+    done = paint(
+        'compare', campaign_of('module', panel, tmp_path), '--model', tmp_path / 'bell.yaml',
+        '-o', tmp_path / 'out',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f'model: {tmp_path / "bell.yaml"} (')
+    assert f'note: panel: {PROGRAMMED}' in done.stderr.splitlines()
+    rows = np.genfromtxt(tmp_path / 'out' / 'residuals.csv', delimiter=',', names=True)
+    assert np.abs(np.sort(rows['predicted_um']) - np.sort(expected[2])).max() < 0.02
+
+
+def test_a_real_module_is_taken_as_motion(shared_data):
+    """Ten moves over three metres at 0.1 m/s, without a gun."""
+    read = read_recording(shared_data / 'rapid' / 'ECL_Grey_T_ROB1.mod')
+    assert read.duration_s == pytest.approx(3.03 / 0.1, rel=0.02)
+    assert read.notes.count(PROGRAMMED) == 1
+
+
+def test_a_real_recording_with_three_pose_topics_asks_which(panel, shared_data, tmp_path):
+    bag = shared_data / 'bags' / 'evo_ROS_example.bag'
+    done = paint('simulate', '--mesh', panel, '--trajectory', bag, '-o', tmp_path / 'out')
+    assert_refused(done, 'name a pose topic', 'ORB-SLAM', 'groundtruth')

@@ -1,0 +1,159 @@
+"""Poses in the robot's frame, by the real commands: where the part stands in it."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+import yaml
+from scipy.spatial.transform import Rotation
+
+from booth import LOOKING_ALONG_Y
+from cli.command import assert_refused, paint
+from files.recorded import Messages, pose_entries, write_bag
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.trajectory import Trajectory
+from scenes import straight_pass
+
+# The part stands two metres before the robot, turned and leaning.
+PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]
+COARSE = ('--max-edge-length-m', 0.05)
+
+
+@pytest.fixture(scope='module')
+def panel(tmp_path_factory):
+    """A standing panel of 1.2 m by 0.8 m that looks to -y, as an STL."""
+    corners = np.array([[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]])
+    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
+    return path
+
+
+def level_pass(frame_id: str) -> Trajectory:
+    """One pass over the panel, seen from the panel."""
+    line = (np.arange(0.0, 3.0, 0.02), (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y)
+    return straight_pass(*line, frame_id=frame_id)
+
+
+def seen_from_the_robot(frame_id: str = 'base_link') -> Trajectory:
+    """The same pass as the robot tells it."""
+    at_part = level_pass(frame_id)
+    poses = Rigid.of(PART_POSE).applied(at_part.positions_m, at_part.quaternions_xyzw)
+    return Trajectory(at_part.stamps_ns, *poses, frame_id)
+
+
+@pytest.fixture(scope='module')
+def expected(panel, tmp_path_factory):
+    """The film of the pass in the frame of the mesh."""
+    folder = tmp_path_factory.mktemp('expected')
+    bag = write_pose_bag(folder / 'run', level_pass('part'))
+    film, stderr = simulated(panel, bag, folder / 'out')
+    assert stderr == ''
+    assert film.max() > 5.0
+    return film
+
+
+def simulated(mesh, motion, out, *more):
+    done = paint('simulate', '--mesh', mesh, '--trajectory', motion, *COARSE, *more, '-o', out)
+    assert done.returncode == 0, done.stderr
+    table = np.genfromtxt(out / 'film.csv', delimiter=',', names=True)
+    return table['thickness_um'], done.stderr
+
+
+@pytest.mark.slow
+def test_the_pose_of_the_part_brings_poses_to_it(panel, expected, tmp_path):
+    bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
+    film, said = simulated(panel, bag, tmp_path / 'out', '--part-pose', *PART_POSE)
+    assert np.allclose(film, expected, atol=2e-3)
+    assert said.startswith("note: part_pose: poses brought from 'base_link' to the part, which ")
+    assert 'stands at 2.1 -0.4 0.9 ' in said
+    quoted = ('--part-pose', ' '.join(map(str, PART_POSE)))
+    assert np.array_equal(simulated(panel, bag, tmp_path / 'out', *quoted)[0], film)
+
+
+def test_poses_of_another_frame_are_warned_of_with_both_names(panel, expected, tmp_path):
+    """Taken as they are: the mesh may be in that frame, too."""
+    bag = write_pose_bag(tmp_path / 'run', level_pass('cell'))
+    film, said = simulated(panel, bag, tmp_path / 'out')
+    assert np.array_equal(film, expected)
+    assert said.startswith('warning: ')
+    for words in ("in frame 'cell'", "'part'", '--frame-id cell', '--part-pose'):
+        assert words in said
+    film, said = simulated(panel, bag, tmp_path / 'out', '--frame-id', 'cell')
+    assert np.array_equal(film, expected)
+    assert said == ''
+
+
+def test_a_named_frame_that_nothing_leads_to_is_refused(panel, tmp_path):
+    bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
+    given = ('simulate', '--mesh', panel, '--trajectory', bag, '-o', tmp_path / 'out')
+    done = paint(*given, '--frame-id', 'door')
+    assert_refused(done, "'base_link'", "'door'", '--part-pose')
+    done = paint(*given, '--frame-id', 'base_link', '--part-pose', *PART_POSE)
+    assert_refused(done, "'base_link'", 'part_pose', 'leave one of them out')
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_pose_without_a_unit_quaternion_is_refused(panel, tmp_path):
+    given = ('simulate', '--mesh', panel, '--trajectory', 'run', '-o', tmp_path / 'out')
+    done = paint(*given, '--part-pose', 0, 0, 0, 0, 0, 1, 1)
+    assert_refused(done, '--part-pose', 'norm 1.414')
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('storage', ['mcap', 'ros1'])
+def test_a_static_transform_of_the_recording_is_used_and_said(panel, expected, storage, tmp_path):
+    """Two steps of it: the base carries a table, the table the part."""
+    messages = Messages(ros1=storage == 'ros1')
+    table = [1.0, 0.5, 0.2, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    on_table = Rigid.of(table).inverse() @ Rigid.of(PART_POSE)
+    static = messages.transforms(
+        (1, 'base_link', 'table', table), (1, '/table', 'door', on_table.values)
+    )
+    entries = pose_entries(seen_from_the_robot(), ros1=messages.ros1)
+    first_ns = entries[0][1]
+    path = tmp_path / ('run.bag' if messages.ros1 else 'run')
+    write_bag(path, [('/tf_static', first_ns, static), *entries], storage, messages)
+    film, said = simulated(panel, path, tmp_path / 'out', '--frame-id', 'door')
+    assert np.allclose(film, expected, atol=2e-3)
+    assert said.startswith("note: /tf_static: poses brought from 'base_link' to 'door', which ")
+    assert 'stands at 2.1 -0.4 0.9 ' in said
+    _, said = simulated(panel, path, tmp_path / 'out')
+    assert 'it stands still to door, table' in said
+
+
+@pytest.mark.slow
+def test_campaigns_place_each_part(panel, tmp_path):
+    """One by its own key, the other by the option for those without; both match the film."""
+    bag = write_pose_bag(tmp_path / 'run', seen_from_the_robot())
+    own = write_pose_bag(tmp_path / 'own', level_pass('part'))
+    x = np.linspace(-0.4, 0.4, 9)
+    rows = [f'{value:.3f},0,{0.05 - 0.1 * k:.3f},9' for value in x for k in (0, 1)]
+    readings = '\n'.join(['x_m,y_m,z_m,thickness_um', *rows])
+    (tmp_path / 'readings.csv').write_text(readings)
+    (tmp_path / 'model.yaml').write_text('effects: []\n')
+
+    def predicted(entry: dict, *more) -> np.ndarray:
+        entry |= {'mesh': str(panel), 'measurements': 'readings.csv'}
+        (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump({'experiments': [entry]}))
+        out, model = tmp_path / 'out', tmp_path / 'model.yaml'
+        done = paint('compare', tmp_path / 'campaign.yaml', '--model', model, *more, '-o', out)
+        assert done.returncode == 0, done.stderr
+        return np.genfromtxt(out / 'residuals.csv', delimiter=',', names=True)['predicted_um']
+
+    expected_um = predicted({'trajectory': str(own)})
+    assert expected_um.max() > 5.0
+    placed = predicted({'trajectory': str(bag), 'part_pose': PART_POSE})
+    assert np.allclose(placed, expected_um, atol=2e-3)
+    placed = predicted({'trajectory': str(bag)}, '--part-pose', *PART_POSE)
+    assert np.allclose(placed, expected_um, atol=2e-3)
+
+
+def test_a_pose_in_a_campaign_is_checked(panel, tmp_path):
+    entry = {
+        'mesh': str(panel), 'trajectory': 'run', 'measurements': 'r.csv', 'part_pose': [0, 0, 1],
+    }  # fmt: skip
+    (tmp_path / 'campaign.yaml').write_text(json.dumps({'experiments': [entry]}))
+    done = paint('compare', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
+    assert_refused(done, 'part_pose: [0.0, 0.0, 1.0] is no pose', 'seven numbers')

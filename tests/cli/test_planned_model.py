@@ -1,0 +1,156 @@
+"""A plan's own files, simulated without --model: the film is the planned one."""
+
+import json
+import shutil
+
+import numpy as np
+import pytest
+
+from booth import SAMPLES
+from cli.command import paint
+from paint_deposition.files.model_file import read_model
+from paint_deposition.files.planned_model import model_digest, planned_model
+from paint_deposition.motion.programmed import PROGRAMMED
+
+PANEL = SAMPLES / 'panel.stl'
+PART_POSE = (1.8, -0.3, 0.7, 0.0, 0.0, 0.6, 0.8)
+MODEL = """planar: {K1_cm3_per_s: 0.6, r_m: 0.12, sigma1_m: 0.06, sigma2_m: 0.08}
+effects:
+  - {id: tcp_standoff, offset_z_m: 0.01}
+"""
+
+
+@pytest.fixture(scope='module')
+def model_file(tmp_path_factory):
+    path = tmp_path_factory.mktemp('models') / 'narrow.yaml'
+    path.write_text(MODEL)
+    return path
+
+
+@pytest.fixture(scope='module')
+def plan(model_file, tmp_path_factory):
+    """A plan for a model that is not the default, in the part's frame."""
+    return planned(tmp_path_factory.mktemp('plan') / 'job', model_file)
+
+
+@pytest.fixture(scope='module')
+def placed(model_file, tmp_path_factory):
+    """The same for a part in the robot's frame."""
+    folder = tmp_path_factory.mktemp('placed') / 'job'
+    return planned(folder, model_file, '--part-pose', *PART_POSE)
+
+
+def planned(folder, model_file, *more):
+    done = paint(
+        'plan', '--mesh', PANEL, '--model', model_file, '--target-um', 20, '--index', 0.15,
+        '--max-edge-length-m', 0.05, *more, '-o', folder,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    first = done.stdout.splitlines()[0]
+    assert first.startswith(f'model: {model_file} (')
+    assert first.endswith('effects: tcp_standoff')
+    return folder
+
+
+def simulated(motion, out, *more):
+    done = paint(
+        'simulate', '--mesh', PANEL, '--trajectory', motion, '--max-edge-length-m', 0.05, *more,
+        '-o', out,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    return json.loads((out / 'stats.json').read_text()), done
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('motion', 'exact'), [('trajectory', 1e-5), ('passes.mod', 0.02), ('passes.csv', 0.02)]
+)
+def test_the_film_is_the_planned_one(motion, exact, plan, tmp_path):
+    """The bag to the last digits; module and table leave out acceleration, outside the part."""
+    expected = json.loads((plan / 'plan.json').read_text())['film']
+    film, done = simulated(plan / motion, tmp_path / 'out')
+    first = done.stdout.splitlines()[0]
+    model = (plan / motion if motion == 'trajectory' else plan) / 'model.yaml'
+    assert first.startswith(f'model: that of the plan, {model} (')
+    assert film['model_file'] == str(model)
+    for name in ('mean_um', 'coverage'):
+        assert film[name] == pytest.approx(expected[name], rel=exact)
+    if motion != 'trajectory':
+        assert f'note: {PROGRAMMED}' in done.stderr.splitlines()
+    assert 'warning' not in done.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('motion', ['trajectory', 'passes.mod', 'passes.csv'])
+def test_a_plan_in_the_robots_frame_lays_the_same_film(motion, plan, placed, tmp_path):
+    """The bag tells the pose of the part itself; the module has it in its work object."""
+    expected, _ = simulated(plan / motion, tmp_path / 'expected')
+    given = ('--part-pose', *PART_POSE)
+    film, done = simulated(placed / motion, tmp_path / 'given', *given)
+    assert film['mean_um'] == pytest.approx(expected['mean_um'], rel=1e-4)
+    assert film['min_um'] == pytest.approx(expected['min_um'], rel=1e-3)
+    assert 'warning' not in done.stderr
+    if motion == 'trajectory':
+        film, done = simulated(placed / motion, tmp_path / 'told')
+        assert film['mean_um'] == pytest.approx(expected['mean_um'], rel=1e-4)
+        assert "note: /tf_static: poses brought from 'base_link' to 'part'" in done.stderr
+
+
+@pytest.mark.slow
+def test_a_model_that_is_given_wins_and_is_named(plan, model_file, tmp_path):
+    bag = plan / 'trajectory'
+    _, done = simulated(bag, tmp_path / 'same', '--model', model_file)
+    assert done.stdout.startswith(f'model: {model_file} (')
+    assert 'another model' not in done.stderr
+    (tmp_path / 'other.yaml').write_text('name: bell 7\neffects: []\n')
+    _, done = simulated(bag, tmp_path / 'other', '--model', tmp_path / 'other.yaml')
+    assert done.stdout.startswith(f"model: {tmp_path / 'other.yaml'} 'bell 7' (")
+    assert f'note: {bag} was planned with another model' in done.stderr
+
+
+@pytest.mark.slow
+def test_a_motion_without_a_model_says_which_is_used(tmp_path):
+    _, done = simulated(SAMPLES / 'panel_577', tmp_path / 'out')
+    assert done.stdout.startswith('model: default, a 50 mm bell')
+
+
+@pytest.mark.slow
+def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
+    shutil.copy(plan / 'passes.mod', tmp_path)
+    _, done = simulated(tmp_path / 'passes.mod', tmp_path / 'out')
+    warning = next(line for line in done.stderr.splitlines() if line.startswith('warning: '))
+    assert 'was planned with a model' in warning
+    assert '--model' in warning
+    # Another model of that name is not taken for it.
+    (tmp_path / 'model.yaml').write_text('effects: []\n')
+    assert planned_model(tmp_path / 'passes.mod').file is None
+
+
+def test_the_digest_is_that_of_the_values(model_file, tmp_path):
+    expected = model_digest(read_model(model_file))
+
+    def digest(text: str) -> str:
+        (tmp_path / 'again.yaml').write_text(text)
+        return model_digest(read_model(tmp_path / 'again.yaml'))
+
+    assert digest(f'# a comment\n{MODEL}') == expected
+    assert digest(MODEL.replace('0.12', '0.120')) == expected
+    assert digest(MODEL.replace('0.12', '0.121')) != expected
+
+
+def test_recordings_and_plain_tables_are_no_plans(tmp_path):
+    (tmp_path / 'run.csv').write_text('t,x\n')
+    assert planned_model(tmp_path / 'run.csv') is None
+    assert planned_model(SAMPLES / 'panel_577') is None
+    assert planned_model(tmp_path / 'nowhere.mod') is None
+
+
+@pytest.mark.slow
+def test_the_table_is_in_the_frame_of_the_bag(placed):
+    from paint_deposition.files.recordings.bags import read_trajectory
+
+    rows = np.genfromtxt(placed / 'passes.csv', delimiter=',', names=True)
+    bag = read_trajectory(placed / 'trajectory')
+    assert bag.frame_id == 'base_link'
+    first = np.array([rows[0][name] for name in ('x_m', 'y_m', 'z_m')])
+    assert np.allclose(first, bag.positions_m[0], atol=1e-5)
