@@ -20,7 +20,7 @@ SCHEMAS = Path(paint_deposition.__file__).parent / 'schemas'
 KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
-    'inspect': 'recording', 'recover': 'recovery',
+    'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
 }  # fmt: skip
 
 
@@ -31,13 +31,16 @@ def schema(kind: str) -> dict:
 
 def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.CompletedProcess:
     """The same, its JSON valid if it printed any."""
-    # The gun beside a part is told by `inspect --mesh`; it has no schema of its own yet.
-    if '--json' in words and done.returncode == 0 and not {'inspect', '--mesh'} <= set(words):
+    if '--json' in words and done.returncode == 0:
         kind = KINDS[words[0]]
         if kind == 'comparison' and words.count('--model') > 1:
             kind = 'side_by_side'
         if kind == 'recording' and any(word.endswith(('.mod', '.prg')) for word in words):
             kind = 'program'
+        if kind == 'recording' and any(word.endswith(('.csv', '.txt', '.tsv')) for word in words):
+            kind = 'pose_table'
+        if words[0] == 'inspect' and '--mesh' in words:
+            kind = 'gun_on_part'
         jsonschema.validate(json.loads(done.stdout), schema(kind))
     return done
 

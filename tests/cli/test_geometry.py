@@ -78,7 +78,8 @@ def simulate(panel, tmp_path):
     def run(motion: Trajectory, *options, mesh=panel):
         bag = write_pose_bag(tmp_path / 'bag', motion)
         return paint(
-            'simulate', '--mesh', mesh, '--trajectory', bag, *COARSE, *(options or TRIGGER),
+            'simulate', '--mesh', mesh, '--trajectory', bag, '--frame-id', 'base_link', *COARSE,
+            *(options or TRIGGER),
             '-o', tmp_path / 'out',
         )  # fmt: skip
 
@@ -105,8 +106,9 @@ def test_a_right_geometry_is_one_line_without_a_warning(simulate):
     assert found['warnings'] == []
 
 
-def test_the_line_is_printed_first(simulate):
-    first = simulate(three_passes()).stdout.splitlines()[0]
+def test_the_line_follows_the_model(simulate):
+    model, first = simulate(three_passes()).stdout.splitlines()[:2]
+    assert model.startswith('model: ')
     assert first.startswith('3 passes, 0.40 m/s, TCP 0.2')
     assert ' degrees off its normal, ' in first
     assert first.endswith(' % of the paint over the part')
@@ -231,7 +233,7 @@ def campaign(panel, tmp_path):
         (tmp_path / 'model.yaml').write_text('planar: {K1_cm3_per_s: 1.9}\n')
         (tmp_path / 'campaign.yaml').write_text(
             f'experiments:\n  - {{name: test panel, mesh: {panel}, trajectory: run, '
-            'state_topic: /atomizer/state, measurements: panel.csv}\n'
+            'state_topic: /atomizer/state, measurements: panel.csv, frame_id: base_link}\n'
         )
         return tmp_path / 'campaign.yaml', '--model', tmp_path / 'model.yaml'
 
@@ -242,7 +244,7 @@ def campaign(panel, tmp_path):
 def test_a_campaign_says_how_each_part_was_painted(campaign, tmp_path):
     done = paint('compare', *campaign(three_passes()), '-o', tmp_path / 'out')
     assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith('test panel: 3 passes, 0.40 m/s, TCP 0.2')
+    assert '\ntest panel: 3 passes, 0.40 m/s, TCP 0.2' in done.stdout
     assert 'warning' not in done.stderr
     figures = json.loads((tmp_path / 'out/comparison.json').read_text())['geometry']['test panel']
     assert figures['sentence'] in done.stdout

@@ -66,6 +66,7 @@ def locate_command(
     """
     from paint_deposition.api.locating import locate_by_points, locate_by_scan
     from paint_deposition.files.json_files import json_text
+    from paint_deposition.files.provenance import origin
 
     if touched and points and not (scan or mesh or start):
         place = locate_by_points(touched, points, pose_unit)
@@ -77,7 +78,9 @@ def locate_command(
         raise click.UsageError('give --touched and --points, or --scan and --mesh')
     say_all('warning', place.warnings)
     if as_json:
-        click.echo(json_text(place.to_dict()))
+        files = {'touched': touched, 'points': points, 'scan': scan, 'mesh': mesh}
+        named = {what: file for what, file in files.items() if file}
+        click.echo(json_text(place.to_dict() | {'provenance': origin(files=named)}))
         return
     for line in _lines(place):
         click.echo(line)

@@ -12,12 +12,12 @@ from tqdm import tqdm
 from paint_deposition.cli.options import (
     BODY,
     FILE,
-    GUN_SIGNAL,
     JSON,
     MAX_POSE_GAP,
     MESH_SCALE,
     direction_option,
     model_option,
+    motion_options,
 )
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
 from paint_deposition.files.json_files import json_text
@@ -46,9 +46,7 @@ from paint_deposition.motion.trajectory import Trajectory
     help='Picture to draw, PNG: part, passes and tool axes from three sides.',
 )  # fmt: skip
 @model_option('Model that says where the spray goes; default: a 50 mm bell.')
-@click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.')
-@click.option('--state-topic', help='Trigger of the gun; default: it sprays whenever poses flow.')
-@GUN_SIGNAL
+@motion_options
 @MESH_SCALE
 @BODY
 @direction_option('--down', 'Gravity in the mesh frame; default: as guessed.')
@@ -59,7 +57,7 @@ def inspect_command(
     mesh: Path | None,
     trajectory: Path | None,
     max_pose_gap_s: float,
-    gun_signal: str | None,
+    motion: dict[str, Any],
     as_json: bool,
     **options: Any,
 ) -> None:
@@ -72,27 +70,31 @@ def inspect_command(
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
     """
-    motion = trajectory or recording
-    if motion is None or (trajectory and recording):
+    path = trajectory or recording
+    if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
     if mesh is not None:
         from paint_deposition.cli.geometry import show_gun_on_part
 
-        show_gun_on_part(mesh, motion, gun_signal, max_pose_gap_s, as_json, **options)
+        show_gun_on_part(mesh, path, motion, max_pose_gap_s, as_json, **options)
         return
-    if any(options[name] for name in ('output', 'model_file', 'pose_topic', 'state_topic')):
-        raise click.UsageError('--out, --model and topics go with --mesh; give the part')
-    if is_rapid(motion):
-        program = read_program(motion, gun_signal=gun_signal)
-        click.echo(_json(asdict(program), motion) if as_json else program_as_text(program))
+    gun_signal = motion.pop('gun_signal')
+    if any(options[name] for name in ('output', 'model_file')) or any(motion.values()):
+        raise click.UsageError(
+            '--out, --model and how the motion is read go with --mesh; give the part'
+        )
+    if is_rapid(path):
+        program = read_program(path, gun_signal=gun_signal)
+        click.echo(_json(asdict(program), path) if as_json else program_as_text(program))
         return
-    if is_pose_table(motion):
-        MotionSource(gun_signal=gun_signal).refuse_other(motion, 'a table of poses')
-        click.echo(_told(read_pose_table(motion, PoseLayout()), as_json))
+    if is_pose_table(path):
+        MotionSource(gun_signal=gun_signal).refuse_other(path, 'a table of poses')
+        figures, lines = _told(read_pose_table(path, PoseLayout()))
+        click.echo(_json(figures, path) if as_json else lines)
         return
-    MotionSource(gun_signal=gun_signal).refuse_other(motion, 'a bag')
-    summary = summarise(motion, max_pose_gap_s)
-    click.echo(_json(asdict(summary), motion) if as_json else _table(summary))
+    MotionSource(gun_signal=gun_signal).refuse_other(path, 'a bag')
+    summary = summarise(path, max_pose_gap_s)
+    click.echo(_json(asdict(summary), path) if as_json else _table(summary))
 
 
 @click.command('recover')
@@ -147,21 +149,19 @@ def _figures(recovery: Recovery) -> dict:
     }
 
 
-def _told(poses: Trajectory, as_json: bool) -> str:
-    """What was understood of a table of poses."""
+def _told(poses: Trajectory) -> tuple[dict, str]:
+    """What was understood of a table of poses: figures, and the same in words."""
     low, high = poses.positions_m.min(axis=0), poses.positions_m.max(axis=0)
     figures = {
         'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id,
         'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
     }  # fmt: skip
-    if as_json:
-        return json_text(figures)
     sides = ', '.join(
         f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
     )
     frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
     line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
-    return '\n'.join([line, *poses.notes])
+    return figures, '\n'.join([line, *poses.notes])
 
 
 def _table(summary: BagSummary) -> str:

@@ -27,15 +27,11 @@ NEGLIGIBLE = 1e-4
 
 
 def painted_lines(data: ReportData) -> list[str]:
-    """How each part was painted, a line each."""
+    """How the gun ran over each part and what is odd about it, a line each."""
     lines = []
-    for experiment in data.experiments:
-        spraying = experiment.path.select(experiment.path.flow > 0.0)
-        passes = len(np.unique(spraying.spray_pass[spraying.spray_pass >= 0]))
-        lines.append(
-            f'{experiment.name}: {passes} passes, {np.median(spraying.speed_m_per_s):.2f} m/s, '
-            f'gun on for {experiment.path.spraying_time_s:.1f} s.'
-        )
+    for name, geometry in data.comparisons[-1].geometry.items():
+        lines.append(f'{name}: {geometry.sentence}')
+        lines += [f'{name}: {warning}' for warning in geometry.warnings]
     return lines
 
 
