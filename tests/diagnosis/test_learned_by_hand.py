@@ -100,9 +100,9 @@ def test_the_report_tells_the_law_and_draws_it(done):
     page = report_html(data)
     assert 'no known effect explains; its law was learned' in page
     assert 'learned law over the time since the motion began' in page
-    assert 'id="figure-learned"' in page
-    figure = learned_figure(data)
-    curve = figure['data'][0]
+    assert 'id="figure-learned' in page
+    (chart,) = learned_figure(data)['charts']
+    curve = chart['data'][0]
     law = done.model.effects[0]
     within = (curve['x'] > law.low) & (curve['x'] < law.high)
     np.testing.assert_allclose(curve['y'][within], law.factor(curve['x'][within]))

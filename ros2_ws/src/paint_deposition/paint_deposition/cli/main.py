@@ -60,7 +60,7 @@ class Commands(click.Group):
 
 def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
     if wanted:
-        from paint_deposition.files.provenance import git_version
+        from paint_deposition.files.version import git_version
 
         click.echo(f'paint {__version__} {git_version()}'.rstrip())
         context.exit()

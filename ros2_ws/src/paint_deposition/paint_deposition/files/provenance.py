@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,7 @@ from paint_deposition import __version__
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.json_files import json_text, plain
+from paint_deposition.files.version import git_version
 
 BLOCK_BYTES = 1 << 20
 
@@ -81,21 +81,6 @@ def sha256(path: str | Path) -> str:
     except OSError as error:
         raise PaintError(f'{path}: {error.strerror}') from None
     return digest.hexdigest()
-
-
-def git_version() -> str:
-    """`git describe` of the sources, '' where they are installed away from their repository."""
-    command = ['git', 'describe', '--always', '--dirty', '--tags']
-    folder = Path(__file__).resolve().parent
-    if 'site-packages' in folder.parts:  # what repository there is, it is another project's
-        return ''
-    try:
-        done = subprocess.run(
-            command, cwd=folder, capture_output=True, text=True, timeout=10, check=True
-        )
-    except (OSError, subprocess.SubprocessError):
-        return ''
-    return done.stdout.strip()
 
 
 def _content(path: str, parameter: str) -> bytes:

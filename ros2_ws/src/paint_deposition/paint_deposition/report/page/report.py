@@ -12,7 +12,7 @@ import numpy as np
 from paint_deposition import __version__
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.provenance import git_version
+from paint_deposition.files.version import git_version
 from paint_deposition.film.statistics import CPK_MEANS
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
