@@ -24,6 +24,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.files.measuring_points import MeasuringPoints
+from paint_deposition.files.tables.layout import Layout
 from paint_deposition.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.film import point_rows
@@ -308,6 +310,10 @@ VISITOR = """<script>
   const titles = document.querySelectorAll('#part figcaption');
   root.dataset.titles = [...titles].map(title => title.textContent).join(', ');
 
+  document.getElementById('part-0').emit('plotly_click', {points: [{x: 0.1, y: -0.02, z: 0.3}]});
+  document.getElementById('part-0').emit('plotly_click', {points: [{x: 0.2, y: 0, z: 0.4}]});
+  root.dataset.picked = document.getElementById('picked').value;
+
   const way = document.getElementById('way');
   way.value = way.max / 2;
   way.dispatchEvent(new Event('input'));
@@ -364,6 +370,10 @@ def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_pat
     assert root['data-pressed'] == '5'
     assert root['data-titles'] == 'Residual before, What the model gained'
     assert root['data-eyes'] == '[1.9,1.9]'
+    (tmp_path / 'points.csv').write_text(root['data-picked'])
+    picked = MeasuringPoints.read(tmp_path / 'points.csv', Layout(), None)
+    assert picked.labels == ['P1', 'P2']
+    assert picked.positions_m == pytest.approx(np.array([[0.1, -0.02, 0.3], [0.2, 0.0, 0.4]]))
     assert re.fullmatch(r'[\d.]+ s, (pass \d, gun on|gun off), [\d.]+ m/s', root['data-way'])
     # What the page cuts from its mesh is what the model predicts at the readings on that line.
     cut = np.array(json.loads(root['data-section']))

@@ -187,7 +187,8 @@ def _mesh(faces: str, views: list[str], **look: Any) -> dict[str, Any]:
     if 'intensity' in look:
         hover = {'lighting': TRUE_COLOURS, 'hovertemplate': '%{intensity:.2f} µm<extra></extra>'}
     else:
-        hover = {'lighting': SHADED, 'hoverinfo': 'skip'}
+        # 'skip' would take clicks away, too.
+        hover = {'lighting': SHADED, 'hoverinfo': 'none'}
     return {'type': 'mesh3d', 'geometry': faces, 'views': views} | hover | look
 
 

@@ -5,7 +5,7 @@ const partViewer = async () => {
   const at = id => document.getElementById(id);
   const panes = at('part'), viewSwitch = at('part-views'), partSwitch = at('part-experiments');
   const passBox = at('part-passes'), sectionPlot = at('section'), lines = at('section-lines');
-  const angle = at('section-angle'), offset = at('section-offset'), way = at('way');
+  const angle = at('section-angle'), offset = at('section-offset'), way = at('way'), picked = at('picked');
   const NEAR_M = 0.015, INK = '#1f2933', MARK = '#d1701f';
   let scene = content.scenes[content.first], view = scene.views[0].key, plots = [];
 
@@ -97,6 +97,14 @@ const partViewer = async () => {
     }
   };
 
+  // A click notes the place as a measuring point, in the columns that a list of points has.
+  const note = event => {
+    const {x, y, z} = event.points[0], head = 'point,x_m,y_m,z_m';
+    const lines = picked.value.trim() ? picked.value.trim().split('\n') : [head];
+    lines.push([`P${lines.length}`, ...[x, y, z].map(value => value.toFixed(4))].join(','));
+    picked.value = lines.join('\n') + '\n';
+  };
+
   const show = async () => {
     plots.forEach(plot => Plotly.purge(plot));
     panes.replaceChildren();
@@ -115,6 +123,7 @@ const partViewer = async () => {
       (view === 'film' ? layout.coloraxis2 : layout.coloraxis).colorbar.title.text = chosen().bar;
       const data = allTraces(k).map(trace => ({...withGeometry(trace), visible: shown(trace)}));
       await draw(plot, data, layout, options);
+      plot.on('plotly_click', note);
       await rest();
     }
     turnTogether();
@@ -227,6 +236,7 @@ const partViewer = async () => {
   }
   way.addEventListener('input', () => inTurn(moveGun));
   passBox.addEventListener('change', () => inTurn(refresh));
+  at('picked-csv').addEventListener('click', () => download('points.csv', picked.value));
   at('film-csv').addEventListener('click', () => {
     const {x, y, z} = scene.geometry.vertices;
     const films = scene.panes.map(pane =>
