@@ -9,7 +9,7 @@ from trimesh.creation import box
 
 from booth import MODEL, path_of, serpentine
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.facet_error import facet_error
+from paint_deposition.film.facet_error import facet_error, facet_errors_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -141,3 +141,24 @@ def test_the_warning_names_the_place_and_a_length_that_helps():
     vertices, faces = triangulated(curve.depth, wanted_m, 0.12)
     finer = facet_error(Surface.from_triangles(vertices, faces, 0.01), PATH, BELL)
     assert finer.share < 0.5 * found.share
+
+
+@pytest.mark.parametrize('curve', [round_fold(0.15, 40.0), soft_fold(0.03, 0.6), cap(0.5)])
+def test_the_error_at_readings_is_most_of_the_true_one(curve):
+    surface = Surface.from_triangles(*triangulated(curve.depth, 0.02, 0.2, jitter=0.2), 0.01)
+    at = np.random.default_rng(0).choice(len(surface.vertices_m), 200, replace=False)
+    points = SurfacePoints(surface.vertices_m[at], surface.normals[at])
+    told_um = facet_errors_um(surface, points, PATH, BELL)
+    films = []
+    for places in (points, SurfacePoints(*curve.nearest(points.positions_m))):
+        painted = FilmIntegrator(places, BELL)
+        painted.add(PATH)
+        films.append(painted.film_um)
+    true_um = films[1] - films[0]
+    assert np.corrcoef(told_um, true_um)[0, 1] > 0.8
+    assert np.std(true_um - told_um) < 0.6 * np.std(true_um)
+
+
+def test_there_is_no_error_at_readings_on_a_plane():
+    surface = Surface.from_triangles(*triangulated(lambda x, z: 0.3 * x, 0.1), 0.02)
+    assert not facet_errors_um(surface, surface.points(), PATH, BELL).any()

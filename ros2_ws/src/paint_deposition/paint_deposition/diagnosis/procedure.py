@@ -34,7 +34,9 @@ ROUNDS = 4
 TRIALS, LEAST_LAW = 3, 0.4
 # Least log evidence of such a cause, and its share of all that there was: less may be what the
 # laws that were accepted leave over.
-STRONG, LEFT_OVER = 25.0, 0.15
+STRONG, LEFT_OVER = 16.0, 0.15
+# An effect that was accepted in such a place stays from this share of that evidence on.
+STAYS = 0.5
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
 # Share by which learned laws must lower the error on points left out.
@@ -117,30 +119,49 @@ def _by_law_alone(space: ModelSpace, cause: str) -> Effect:
 
 
 def _behind_shapeless(run: Run, space: ModelSpace, least: float) -> list[Effect]:
-    """The effect that most of what a shapeless cause explains comes from, if there is one."""
-    effects, _ = _in_place_of_shapeless(run, space, run.taken, least)
-    return [_by_law_alone(space, cause) for cause in effects[:1]]
+    """The effect that most of what a shapeless cause explains comes from, or the two together."""
+    shares = _shares_of_shapeless(run, space, run.taken, least)
+    if not shares:
+        return []
+    best = max(shares, key=lambda cause: shares[cause])
+    effect = _by_law_alone(space, best)
+    if shares[best] > SURE:
+        return [effect]
+    if shares[best] < LEAST_LAW:
+        return []
+    # Another effect may have bent the first one's share: both have to stand the test afterwards.
+    fit = run.fitted_with([*run.taken, effect])
+    beside = run.linearise(fit)
+    second = _started(beside)
+    if not second:
+        rest = _shares_of_shapeless(run, beside, run.candidates_in(fit), least)
+        sure = [cause for cause in rest if rest[cause] > SURE]
+        second = [_by_law_alone(beside, cause) for cause in sure[:1]]
+    return [effect, *second] if second else []
 
 
-def _in_place_of_shapeless(
+def _shares_of_shapeless(
     run: Run, space: ModelSpace, beside: Sequence[Effect], least: float, *wanted: str
-) -> Group:
-    """The effects that leave little of a shapeless cause's evidence after a refit with one.
+) -> dict[str, float]:
+    """The share of a shapeless cause's evidence that an effect takes after a refit with it.
 
     A shapeless cause follows the readings more closely than any law, and the more so the more
-    readings there are: its evidence says how far a law is off, not that the effect is absent. The
-    probability is the share of that evidence which the best effect takes.
+    readings there are: its evidence says how far a law is off, not that the effect is absent.
 
     Args:
         run: the readings.
         space: at the model without the effect.
         beside: effects that this model has.
-        least: log evidence of a shapeless cause that calls for this.
-        wanted: effects to try besides the ones whose laws explain most.
+        least: log evidence from which on a shapeless cause calls for this.
+        wanted: effects to try besides the ones whose laws explain most, whatever leads: much
+            evidence is linear only nearly, and a difference of little beside it says nothing.
+
+    Returns:
+        By effect, largest first; empty where no shapeless cause is in question.
     """
     weight = float(space.models[0].log_weight)
-    if not space.is_shapeless or weight < least:
-        return (), 0.0
+    if weight < least or not (wanted or space.is_shapeless):
+        return {}
     evidence = {c: space.best_law(c)[2] for c in space.causes if c not in PRIOR}
     likely = [c for c in evidence if evidence[c] >= LEAST_LAW * weight]
     likely = sorted(likely, key=lambda c: -evidence[c])[:TRIALS]
@@ -148,8 +169,7 @@ def _in_place_of_shapeless(
     for cause in dict.fromkeys([*likely, *wanted]):
         fit = run.fitted_with([*beside, _by_law_alone(space, cause)])
         shares[cause] = 1.0 - float(run.linearise(fit).models[0].log_weight) / weight
-    taking = sorted((c for c in shares if shares[c] > SURE), key=lambda c: -shares[c])
-    return tuple(taking), max(shares.values(), default=0.0)
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 def _tested(run: Run, least: float) -> dict[str, Group]:
@@ -165,8 +185,10 @@ def _tested(run: Run, least: float) -> dict[str, Group]:
             space = run.linearise(run.fitted_with(others))
             groups[name] = space.group(name)
             if groups[name][1] <= SURE:
-                group = _in_place_of_shapeless(run, space, others, least, name)
-                groups[name] = group if name in group[0] else groups[name]
+                shares = _shares_of_shapeless(run, space, others, STAYS * least, name)
+                taking = tuple(cause for cause in shares if shares[cause] > SURE)
+                if name in taking:
+                    groups[name] = taking, max(shares.values())
         if not groups or min(p for _, p in groups.values()) > SURE:
             return groups
         weakest = min(groups, key=lambda name: groups[name][1])

@@ -104,7 +104,7 @@ class Run:
             fit: of the model; default the newest.
         """
         fit = fit or self.fit
-        kept = frozenset(effect.id for effect in self._candidates_in(fit))
+        kept = frozenset(effect.id for effect in self.candidates_in(fit))
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
         null = NullModel.around(fit, free)
         found = explanations(self.study, fit, self.candidates)
@@ -121,9 +121,10 @@ class Run:
     @property
     def taken(self) -> list[Effect]:
         """The candidates that the newest model has."""
-        return self._candidates_in(self.fit)
+        return self.candidates_in(self.fit)
 
-    def _candidates_in(self, fit: Fit) -> list[Effect]:
+    def candidates_in(self, fit: Fit) -> list[Effect]:
+        """The candidates that the model of a fit has."""
         return [e for e in fit.model.effects if e.id in self.candidates]
 
     def fitted_with(
@@ -162,7 +163,7 @@ class Run:
                 for random, (_, size) in zip(randoms, chosen, strict=True)
             ]
             columns, before = np.hstack(parts), fit.objective
-            fit = self.fitted_with(self._candidates_in(fit), columns, fit.model)
+            fit = self.fitted_with(self.candidates_in(fit), columns, fit.model)
             covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
             amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
             ends = np.cumsum([part.shape[1] for part in parts])[:-1]

@@ -86,3 +86,28 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> Fa
         float(edges.lengths_m[worst]),
         float(np.degrees(edges.turns_rad[worst])),
     )
+
+
+def facet_errors_um(
+    surface: Surface, points: SurfacePoints, path: SprayPath, model: DepositionModel
+) -> np.ndarray:
+    """(P,) film on the curve that a mesh stands for less that on its facets, at points [um].
+
+    Args:
+        surface: the part. points: on it.
+        path: the motion.
+        model: its pattern and projection count, its effects do not.
+    """
+    off_m, turns = surface.curved_edges.off_at(points.positions_m)
+    if not (off_m.any() or turns.any()):
+        return np.zeros(len(points))
+    normals = points.normals + turns
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    both = SurfacePoints(
+        np.concatenate([points.positions_m, points.positions_m + off_m]),
+        np.concatenate([points.normals, normals]),
+    )
+    painted = FilmIntegrator(both, model.model_copy(update={'effects': ()}))
+    painted.add(path)
+    flat_um, curved_um = np.split(painted.raw_um, 2)
+    return curved_um - flat_um

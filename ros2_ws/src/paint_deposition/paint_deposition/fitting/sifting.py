@@ -51,6 +51,10 @@ def sifted(
     if texture != study.texture:
         study = study.textured(texture)
         fit = _fitted(study, fit.model, 1, seed, known)
+    faceted = study.with_facets(fit.model)
+    if faceted is not study:
+        study = faceted
+        fit = _fitted(study, fit.model, 1, seed, known)
     return study, fit
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.facet_error import facet_errors_um
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import Fit, fit_readings
 from paint_deposition.fitting.parameters import FreeParameters
@@ -23,6 +24,9 @@ from paint_deposition.readings.residuals import Residuals, root_mean_square
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
+# What facets cost the film is left out below this share of the noise, and told of from this. The
+# estimate is off by this share of itself, see ``film.facet_error``.
+LEAST_FACETS, WORTH_TELLING, FACETS_OFF = 0.1, 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -58,6 +62,7 @@ class Study:
         noise: of single readings.
         texture: of the film.
         slips: single readings that were left out, see ``sifted``.
+        facet_um: (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
     """
 
     campaign: Campaign
@@ -67,6 +72,7 @@ class Study:
     noise: GaugeNoise
     texture: Texture = Texture()
     slips: tuple[Slip, ...] = ()
+    facet_um: np.ndarray | None = None
     _rays: dict = field(default_factory=dict, repr=False)
 
     @staticmethod
@@ -95,7 +101,24 @@ class Study:
     def textured(self, texture: Texture) -> 'Study':
         """The same with another texture."""
         other = Study._with(self.campaign, self.forward, self.noise, texture)
-        return replace(other, slips=self.slips)
+        return replace(other, slips=self.slips, facet_um=self.facet_um)
+
+    def with_facets(self, model: DepositionModel) -> 'Study':
+        """The same with what facets cost under a model, if it is worth telling from the noise.
+
+        How much of it is true is fitted for each part: it is one of the nuisance directions. What
+        it does not follow is noise of its own.
+        """
+        facet_um = np.concatenate(
+            [
+                facet_errors_um(e.surface, e.measured_points, e.path, model)
+                for e in self.campaign.experiments
+            ]
+        )
+        if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
+            return self
+        sigma_um = np.hypot(self.sigma_um, FACETS_OFF * facet_um)
+        return replace(self, sigma_um=sigma_um, facet_um=facet_um)
 
     def without(self, slips: dict[int, Slip]) -> 'Study':
         """The same without some points, by their row."""
@@ -114,7 +137,8 @@ class Study:
         campaign = self.campaign.without(left_out)
         noise = self.noise.select(~left_out)
         study = Study._with(campaign, self.forward.at(campaign), noise, self.texture)
-        return replace(study, slips=self.slips)
+        facet_um = None if self.facet_um is None else self.facet_um[kept]
+        return replace(study, slips=self.slips, sigma_um=self.sigma_um[kept], facet_um=facet_um)
 
     @property
     def gauge_um(self) -> np.ndarray:
@@ -168,6 +192,7 @@ class Study:
         return (
             *(assumed if self.noise.source == 'assumed' else ()),
             *(() if self.texture.source == 'assumed' else (str(self.texture),)),
+            *self._facet_notes,
             *self.left_out,
         )
 
@@ -198,9 +223,37 @@ class Study:
 
     @cached_property
     def nuisance(self) -> np.ndarray:
-        """(P, n) nuisance directions over the noise: those of the random effects."""
+        """(P, n) nuisance directions over the noise: random effects, and facets of each part."""
+        facets = [direction[:, np.newaxis] for direction in self._facets.values()]
         none = np.empty((len(self), 0))
-        return np.hstack([none, *(effects.columns for effects in self.random_effects)])
+        return np.hstack([none, *facets, *(effects.columns for effects in self.random_effects)])
+
+    @property
+    def _facets(self) -> dict[str, np.ndarray]:
+        """By experiment, (P,) what its facets cost the film, over the noise."""
+        if self.facet_um is None:
+            return {}
+        owner, over_noise = self.campaign.experiment_of, self.facet_um / self.sigma_um
+        found = {
+            experiment.name: np.where(owner == number, over_noise, 0.0)
+            for number, experiment in enumerate(self.campaign.experiments)
+        }
+        return {name: direction for name, direction in found.items() if direction.any()}
+
+    @property
+    def _facet_notes(self) -> tuple[str, ...]:
+        found = []
+        for name, direction in self._facets.items():
+            off_um = np.abs(direction * self.sigma_um)
+            worst = int(off_um.argmax())
+            if off_um[worst] > WORTH_TELLING * self.gauge_um[worst]:
+                found.append(
+                    f'The mesh of {name} is coarser than its curvature allows: its facets put the '
+                    f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '
+                    f'has a noise of {self.gauge_um[worst]:.1f} µm. That was allowed for as far '
+                    'as it can be estimated; export the mesh finer.'
+                )
+        return tuple(found)
 
     def has(self, effect: type[Effect]) -> np.ndarray:
         """(P,) bool, whether the cell had what an effect needs switched on."""

@@ -17,6 +17,7 @@ and lean shows that, too.
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
@@ -24,6 +25,8 @@ GUN_M = 0.3
 # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
 LEAST_EDGE_M = 0.004
 MOST_EDGES = 5_000
+# A point within a triangle lies near the middles of its sides, and of few others.
+NEAR_EDGES = 8
 
 
 @dataclass(frozen=True)
@@ -50,6 +53,28 @@ class CurvedEdges:
     def turned(self) -> 'CurvedEdges':
         """The same of the surface's other side."""
         return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
+
+    def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far the curve is from the mesh at points on it, and by how much the normals turn.
+
+        What an edge's middle has fades toward its ends: at corners both are right.
+
+        Args:
+            positions_m: (P, 3) on the mesh [m].
+
+        Returns:
+            (P, 3) [m] and (P, 3), to be added to positions and normals.
+        """
+        if not len(self):
+            return np.zeros_like(positions_m), np.zeros_like(positions_m)
+        near = min(NEAR_EDGES, len(self))
+        away_m, edge = cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
+        fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
+        off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
+        return (
+            np.einsum('pk,pkx->px', fading, off_m[edge]),
+            np.einsum('pk,pkx->px', fading, turns[edge]),
+        )
 
     @staticmethod
     def of(vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> 'CurvedEdges':
