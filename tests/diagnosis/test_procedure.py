@@ -117,7 +117,7 @@ def test_a_strong_effect_with_another_law_is_named_though_a_shapeless_cause_fits
     assert {EFFECTS[name].family for name in group.members} == {'lateral shift'}
     assert group.probability > SURE
     assert diagnosis.history[-1].rmse_um < 0.7 * diagnosis.history[0].rmse_um
-    monkeypatch.setattr(procedure, 'STRONG', np.inf)
+    monkeypatch.setattr(procedure, 'LEAST', np.inf)
     closest = diagnose(campaign, DepositionModel(), EFFECTS)
     assert closest.verdict == 'unknown_effect'
 

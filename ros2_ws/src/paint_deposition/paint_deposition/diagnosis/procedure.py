@@ -34,7 +34,9 @@ ROUNDS = 4
 TRIALS, LEAST_LAW = 3, 0.4
 # Least log evidence of such a cause, and its share of all that there was: less may be what the
 # laws that were accepted leave over.
-STRONG, LEFT_OVER = 16.0, 0.15
+LEAST, LEFT_OVER = 12.0, 0.15
+# From this log evidence on the law of the right effect may leave some of it, where it is off.
+STRONG = 25.0
 # An effect that was accepted in such a place stays from this share of that evidence on.
 STAYS = 0.5
 # Effects that are at least this probable are listed, and this many named where none is sure.
@@ -71,7 +73,7 @@ def diagnose(
         reason = 'The readings agree with the model to within the noise of the gauge.'
         return run.diagnosis(p_value, 'none_missing', reason)
     stages: list[Stage] = []
-    least = max(STRONG, LEFT_OVER * float(space.models[0].log_weight))
+    least = max(LEAST, LEFT_OVER * float(space.models[0].log_weight))
     while len(stages) < ROUNDS:
         found = _started(space)
         effects = found or _behind_shapeless(run, space, least)
@@ -123,7 +125,7 @@ def _behind_shapeless(run: Run, space: ModelSpace, least: float) -> list[Effect]
     shares = _shares_of_shapeless(run, space, run.taken, least)
     if not shares:
         return []
-    best = max(shares, key=lambda cause: shares[cause])
+    best = next(iter(shares))
     effect = _by_law_alone(space, best)
     if shares[best] > SURE:
         return [effect]
@@ -135,8 +137,8 @@ def _behind_shapeless(run: Run, space: ModelSpace, least: float) -> list[Effect]
     second = _started(beside)
     if not second:
         rest = _shares_of_shapeless(run, beside, run.candidates_in(fit), least)
-        sure = [cause for cause in rest if rest[cause] > SURE]
-        second = [_by_law_alone(beside, cause) for cause in sure[:1]]
+        taking = [cause for cause in rest if rest[cause] > SURE]
+        second = [_by_law_alone(beside, cause) for cause in taking[:1]]
     return [effect, *second] if second else []
 
 
@@ -157,7 +159,8 @@ def _shares_of_shapeless(
             evidence is linear only nearly, and a difference of little beside it says nothing.
 
     Returns:
-        By effect, largest first; empty where no shapeless cause is in question.
+        By effect, largest first; empty where no shapeless cause is in question. Of evidence that
+        is not strong an effect takes all, so that nothing more is called for, or none.
     """
     weight = float(space.models[0].log_weight)
     if weight < least or not (wanted or space.is_shapeless):
@@ -168,7 +171,8 @@ def _shares_of_shapeless(
     shares = {}
     for cause in dict.fromkeys([*likely, *wanted]):
         fit = run.fitted_with([*beside, _by_law_alone(space, cause)])
-        shares[cause] = 1.0 - float(run.linearise(fit).models[0].log_weight) / weight
+        share = 1.0 - float(run.linearise(fit).models[0].log_weight) / weight
+        shares[cause] = share if weight >= STRONG or share == 1.0 else 0.0
     return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
