@@ -67,6 +67,19 @@ class Fit:
             nuisance=self.nuisance[:, :0],
         )
 
+    @cached_property
+    def amplitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Posterior mean (n,) and covariance (n, n) of the nuisance directions' amplitudes.
+
+        The model is linear around the fit, and its vector is not known exactly either.
+        """
+        prior, count = self.parameters.prior, self.nuisance.shape[1]
+        columns = np.hstack([self.nuisance, self.jacobian @ prior.factor])
+        raw = self.residual + self.jacobian @ (self.vector - prior.centre)
+        covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
+        mean = covariance @ (columns.T @ raw)
+        return mean[:count], covariance[:count, :count]
+
     @property
     def chi_square(self) -> float:
         """Sum of squared residuals over the standard deviation."""

@@ -104,7 +104,11 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
                 for name, value in dict(effect).items()
                 if isinstance(value, float)
             }
-            values['learned'] = tuple(_few_digits(value) for value in effect.learned)
+            values |= {
+                name: tuple(map(_few_digits, value))
+                for name, value in dict(effect).items()
+                if name in ('learned', 'sd')
+            }
         model = model.with_effect(effect.model_copy(update=values))
     return model
 
