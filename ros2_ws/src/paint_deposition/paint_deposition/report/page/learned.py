@@ -61,6 +61,8 @@ def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str
     values = np.linspace(law.low, law.high, CURVE_POINTS)
     step = (law.high - law.low) / (len(law.learned) - 1)
     around = np.linspace(law.low - step, law.high + step, CURVE_POINTS)
+    with np.errstate(invalid='ignore', divide='ignore'):  # a distance to an edge has an end
+        around = around[np.isfinite(law.axis(around))]
     hover = {'hovertemplate': '%{y:.3g} at %{x:.3g}<extra></extra>'}
     title, bold = capital(effect_name(law.id)), {'color': ACCENT, 'width': 2.5}
     traces = [scatter(_shown(law, around), _of_law(law, around), 'lines', line=bold, **hover)]
