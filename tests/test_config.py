@@ -10,10 +10,11 @@ import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import _Entry, _File, read_campaign
-from paint_deposition.files.gauge_readings import REQUIRED, read_readings
+from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.motion_source import MOTION_KINDS
 
+REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
 # What a display of RViz shows.
 SHOWN = {

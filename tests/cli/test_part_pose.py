@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-import trimesh
 import yaml
 from scipy.spatial.transform import Rotation
 
@@ -19,15 +18,6 @@ from scenes import straight_pass
 # The part stands two metres before the robot, turned and leaning.
 PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]
 COARSE = ('--max-edge-length-m', 0.05)
-
-
-@pytest.fixture(scope='module')
-def panel(tmp_path_factory):
-    """A standing panel of 1.2 m by 0.8 m that looks to -y, as an STL."""
-    corners = np.array([[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]])
-    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
-    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
-    return path
 
 
 def level_pass(frame_id: str) -> Trajectory:

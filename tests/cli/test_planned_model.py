@@ -9,7 +9,8 @@ import pytest
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.planned_model import model_digest, planned_model
+from paint_deposition.files.planned_model import planned_model
+from paint_deposition.files.provenance import model_digest, origin
 from paint_deposition.motion.programmed import PROGRAMMED
 
 PANEL = SAMPLES / 'panel.stl'
@@ -127,7 +128,9 @@ def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
 
 
 def test_the_digest_is_that_of_the_values(model_file, tmp_path):
-    expected = model_digest(read_model(model_file))
+    model = read_model(model_file)
+    expected = model_digest(model)
+    assert origin(model)['models']['model']['sha256'] == expected
 
     def digest(text: str) -> str:
         (tmp_path / 'again.yaml').write_text(text)

@@ -27,15 +27,6 @@ COARSE = ('--max-edge-length-m', 0.05)
 FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
 
 
-@pytest.fixture(scope='module')
-def panel(tmp_path_factory):
-    """A standing panel of 1.2 m by 0.8 m that looks to -y, as an STL."""
-    corners = np.array([[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]])
-    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
-    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
-    return path
-
-
 def level_pass(**changes) -> Trajectory:
     """One pass over the panel."""
     times = np.arange(0.0, 3.0, 0.02)

@@ -79,11 +79,23 @@ def test_the_curve_is_that_of_the_hidden_law_up_to_a_constant(done):
     assert np.std(ratio) < 0.3 * np.std(HIDDEN.factor(times))
 
 
+def test_the_band_holds_the_hidden_law_up_to_a_constant(done):
+    law = done.model.effect('learned:time_s')
+    times = np.linspace(law.low, law.high, 50)
+    sd = law.deviation(times)
+    away = law.factor(times) - HIDDEN.factor(times)
+    away -= np.average(away, weights=sd**-2)
+    assert np.mean(np.abs(away) < 1.96 * sd) > 0.9
+    # It is much narrower than what the law does.
+    assert 1.96 * np.median(sd) < 0.25 * np.ptp(HIDDEN.factor(times))
+
+
 def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
     write_fitted(tmp_path / 'model.yaml', done.study, done.history)
     file = read_model_file(tmp_path / 'model.yaml')
     law, read = done.model.effects[0], file.model.effects[0]
     np.testing.assert_allclose(read.learned, law.learned, rtol=1e-7)
+    np.testing.assert_allclose(read.sd, law.sd, rtol=6e-3)
     assert [step['added'] for step in file.history] == ['pattern', 'learned:time_s']
     with pytest.raises(ModelError, match='learned:time_s is in the model already'):
         refit(campaign, file.model, LEARNED['time_s'])
@@ -102,13 +114,19 @@ def test_the_report_tells_the_law_and_draws_it(done):
     assert 'learned law over the time since the motion began' in page
     assert 'id="figure-learned' in page
     (chart,) = learned_figure(data)['charts']
-    curve = chart['data'][0]
+    band, curve, *_ = chart['data']
     law = done.model.effects[0]
     within = (curve['x'] > law.low) & (curve['x'] < law.high)
     np.testing.assert_allclose(curve['y'][within], law.factor(curve['x'][within]))
     assert curve['x'][0] < law.low
+    assert 'how well the readings determine the curve' in page
     assert curve['y'][[0, -1]] == pytest.approx([1.0, 1.0], abs=1e-9)
     assert learned_figure(ReportData.of(done.comparisons[0])) is None
+    low, high = np.split(band['y'], 2)
+    times = band['x'][: len(low)]
+    assert (times[0], times[-1]) == (law.low, law.high)
+    np.testing.assert_allclose(0.5 * (low + high[::-1]), law.factor(times))
+    np.testing.assert_allclose(high[::-1] - low, 2.0 * 1.96 * law.deviation(times))
 
 
 def test_other_effects_can_be_found_beside_a_learned_law(done, campaign):

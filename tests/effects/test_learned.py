@@ -85,6 +85,19 @@ def test_the_curve_is_continuous(law):
     assert np.abs(np.diff(learned.curve(values))).max() < 1e-3
 
 
+@LAW
+def test_how_well_it_is_known_is_told_within_its_range_only(law):
+    linear = type('Linear', (law,), {'axis': staticmethod(lambda value: value)})
+    plain = linear(low=1.0, high=4.0, learned=VALUES)
+    known = plain.model_copy(update={'sd': (0.1, 0.02, 0.04, 0.2)})
+    np.testing.assert_allclose(known.deviation(np.array([1.0, 2.5, 4.0])), [0.1, 0.03, 0.2])
+    beyond = np.array([0.99, 4.01, -3.0, 90.0, np.nan])
+    assert np.isnan(known.deviation(beyond)).all()
+    assert np.isnan(plain.deviation(np.array([2.5]))).all()
+    many = np.concatenate([beyond, np.linspace(-1.0, 6.0, 30)])
+    assert np.array_equal(known.curve(many), plain.curve(many))
+
+
 def test_where_the_covariate_is_not_known_the_law_is_neutral():
     assert law_over('time_s').factor(np.array([np.nan, np.inf])).tolist() == [1.0, 1.0]
 
@@ -275,6 +288,8 @@ def test_an_unknown_covariate_is_told_the_nearest():
         ('edge_distance_m', {'low': 0.4, 'high': 0.5}, 'must be above low'),
         ('time_s', {'learned': (0.1,)}, 'two or more'),
         ('time_s', {'learned': (0.1, float('nan'))}, 'finite'),
+        ('time_s', {'learned': VALUES, 'sd': (0.1, 0.2)}, 'sd has 2 values and learned 4'),
+        ('time_s', {'sd': (0.1, -0.2)}, 'sd has -0.2; a standard deviation is 0 or more'),
         ('time_s', {'kind': 'addition'}, 'give factor'),
         ('incidence_deg', {'kind': 'addition'}, 'give factor'),
         ('height_fraction', {'kind': 'sum'}, "'factor' or 'addition'"),

@@ -152,6 +152,16 @@ def test_a_learned_law_reads_back_to_the_bit(law, tmp_path: Path):
     assert law.over in path.read_text()
 
 
+def test_how_well_a_curve_is_known_reads_back_on_one_line(tmp_path: Path):
+    path, law = tmp_path / 'model.yaml', learned(LEARNED['time_s'])
+    write_model(path, DepositionModel(effects=(law,)))
+    assert 'sd:' not in path.read_text()
+    known = law.model_copy(update={'sd': (0.02, 1.0 / 3.0, 0.05)})
+    write_model(path, DepositionModel(effects=(known,)))
+    assert read_model(path).effects == (known,)
+    assert 'sd: [0.02, 0.3333333333333333, 0.05]' in path.read_text()
+
+
 def test_two_learned_laws_stand_beside_each_other_and_what_they_leave_out_is_neutral(written):
     path = written(
         'effects: [{id: learned, covariate: time_s}, {id: learned, covariate: height_fraction}]'
@@ -172,6 +182,7 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: 3', 'covariate is 3; expected text'),
         ('covariate: time_s, high: -1', 'learned:time_s: high is -1; it must be above low, 0'),
         ('covariate: time_s, learned: [1]', 'learned has 1 values; give two or more'),
+        ('covariate: time_s, sd: [1]', 'sd has 1 values and learned 2; give one for each'),
         ('covariate: time_s, learned: a', "learned is 'a'; expected a list of numbers"),
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: time_s, heigh: 1', "unknown key 'heigh'; did you mean 'high'?"),

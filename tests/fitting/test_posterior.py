@@ -72,8 +72,10 @@ def test_knowing_the_pattern_narrows_a_fit_of_few_readings():
     weak, known = (fit_linear(jacobian, data, p) for p in (PARAMETERS, KNOWN))
     assert known.vector == pytest.approx(KNOWN.prior.centre)
     assert known.penalty == pytest.approx(0.0, abs=1e-12)
-    assert (np.diag(known.covariance) < np.diag(weak.covariance)).all()
-    assert known.covariance == pytest.approx(np.linalg.inv(known.precision))
+    covariance = scaled_covariance(known)
+    assert (np.diag(covariance) < np.diag(scaled_covariance(weak))).all()
+    precision = jacobian.T @ jacobian + KNOWN.prior.precision
+    assert covariance == pytest.approx(np.linalg.inv(precision))
 
 
 def test_no_reading_counts_twice(campaign):

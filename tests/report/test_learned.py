@@ -11,7 +11,7 @@ from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.learned import nearest_law
+from paint_deposition.report.page.learned import learned_figure, nearest_law
 from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
 from small_campaign import small_campaign
 
@@ -79,6 +79,27 @@ def study(tmp_path_factory):
 
 def shown(study: Study, *effects) -> ReportData:
     return ReportData((compare(study, DepositionModel(effects=effects)),))
+
+
+@pytest.mark.slow
+def test_a_curve_is_drawn_beside_the_nearest_law_and_with_its_band_if_it_is_known(study):
+    law = like('edge_distance_m', 0.0, 0.25, squeezed)
+    plain = learned_figure(shown(study, law))
+    (chart,) = plain['charts']
+    assert chart['title'].endswith('dashed: law of edge build')
+    curve, nearest = chart['data']
+    known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})
+    figure = learned_figure(shown(study, known))
+    (chart,) = figure['charts']
+    band = chart['data'][0]
+    assert chart['data'][1]['y'] == pytest.approx(curve['y'])
+    assert chart['data'][2]['y'] == pytest.approx(nearest['y'])
+    low, high = np.split(band['y'], 2)
+    assert high[-1] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
+    # Far from the edge it is so wide that its lower end would take all film away.
+    assert low[-1] == 0.05
+    words = [entry['words'] for entry in figure['legend']]
+    assert words == [*(entry['words'] for entry in plain['legend']), '95 % band']
 
 
 @pytest.mark.slow

@@ -89,6 +89,13 @@ def test_a_learned_law_says_where_it_is_neutral():
     assert learned_range(passes) == (
         "Learned law over the number of the pass: neutral outside the readings' range, 1 to 6."
     )
+    known = passes.model_copy(update={'learned': (0.1, 0.2, 0.3), 'sd': (0.05, 0.01, 0.02)})
+    assert learned_range(known) == (
+        learned_range(passes)
+        + ' At 95 % it is known best, to ± 0.02 at 3.5, and least, to ± 0.098 at 1.'
+    )
+    fog = LEARNED['height_fraction'](kind='addition', sd=(0.5, 1.0))
+    assert learned_range(fog).endswith('to ± 0.98 µm at 0, and least, to ± 2 µm at 1.')
     assert 'on any other part' in learned_range(LEARNED['place']())
     assert '300 mm from the axis' in learned_range(LEARNED['footprint'](reach_m=0.3))
 

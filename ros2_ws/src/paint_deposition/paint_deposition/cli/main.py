@@ -11,8 +11,8 @@ import click
 from paint_deposition import __version__
 from paint_deposition.errors import PaintError, did_you_mean
 
-# Threads that share matrices as small as ours mostly wait for each other, on a busy machine ten
-# times as long as the work takes. To be set before NumPy is loaded.
+# As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
+# be set before NumPy is loaded.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 # Command, the module with its function, COMMAND_command, and what the list of commands says.

@@ -57,7 +57,8 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
 
     What is odd about it is said on stderr.
     """
-    from paint_deposition.files.planned_model import model_digest, planned_model
+    from paint_deposition.files.planned_model import planned_model
+    from paint_deposition.files.provenance import model_digest
 
     planned = planned_model(motion)
     chosen = chosen_model(given)
@@ -96,7 +97,7 @@ def campaign_model_words(
 
 def _words(path: Path, file: ModelFile) -> str:
     """'runs/model.yaml (sha256 1a2b3c4d5e6f), effects: air_drift'."""
-    from paint_deposition.files.planned_model import model_digest
+    from paint_deposition.files.provenance import model_digest
 
     called = f" '{file.name}'" if file.name else ''
     effects = ', '.join(effect.id for effect in file.model.effects) or 'none'

@@ -183,7 +183,7 @@ class ModelSpace:
         error = np.linalg.norm(own.columns @ (own.axes[of_law:].T @ amounts[of_law:]))
         return bool(error <= max(NOTICED, LARGEST_ERROR * law))
 
-    @property
+    @cached_property
     def accepted(self) -> list[tuple[str, int, float]]:
         """Causes of the most probable model that act with some certainty.
 

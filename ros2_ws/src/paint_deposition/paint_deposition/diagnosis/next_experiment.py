@@ -18,6 +18,7 @@ from paint_deposition.diagnosis.sprays import MENU, Change, pairs
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.forward import Forward
+from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.fitting.study import Study
 from paint_deposition.readings.campaign import Campaign, Experiment
 from paint_deposition.readings.readings import PointMeans, Readings
@@ -107,6 +108,7 @@ class _Tried:
     worth: float
 
 
+@on_one_thread
 def propose_for(
     diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
 ) -> tuple[list[Place], list[Spray]]:

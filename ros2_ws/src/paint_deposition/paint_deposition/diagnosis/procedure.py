@@ -24,6 +24,7 @@ from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.readings.campaign import Campaign
 
 # Significance level of the test that something is missing.
@@ -45,6 +46,7 @@ WORTH_LISTING, NAMED = 0.05, 3
 LEAST_GAIN = 0.005
 
 
+@on_one_thread
 def diagnose(
     campaign: Campaign,
     start: DepositionModel,

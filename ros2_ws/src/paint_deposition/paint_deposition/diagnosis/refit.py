@@ -30,10 +30,12 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.residuals import root_mean_square
 
 
+@on_one_thread
 def refit(
     campaign: Campaign,
     start: DepositionModel,

@@ -166,12 +166,14 @@ class Run:
             fit = self.fitted_with(self.candidates_in(fit), columns, fit.model)
             covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
             amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
-            ends = np.cumsum([part.shape[1] for part in parts])[:-1]
+            known = fit.amplitudes[1][-len(amounts) :, -len(amounts) :]
+            stops = np.cumsum([part.shape[1] for part in parts])
             laws = tuple(
-                random.learned(size * part)
-                for random, (_, size), part in zip(
-                    randoms, chosen, np.split(amounts, ends), strict=True
+                random.learned(size * amounts[rows], size**2 * known[rows, rows])
+                for random, (_, size), part, stop in zip(
+                    randoms, chosen, parts, stops, strict=True
                 )
+                for rows in [slice(stop - part.shape[1], stop)]
             )
             if abs(before - fit.objective) < SETTLED:
                 break

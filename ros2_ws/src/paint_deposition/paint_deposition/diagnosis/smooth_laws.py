@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES, knot_weights
+from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_weights
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
 from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
@@ -102,10 +102,29 @@ class RandomLaw:
         (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)
         return replace(self, basis=basis)
 
-    def learned(self, amplitudes: np.ndarray) -> LearnedLaw:
-        """The law with these amplitudes (n,)."""
+    def learned(self, amplitudes: np.ndarray, covariance: np.ndarray | None = None) -> LearnedLaw:
+        """The law with these amplitudes (n,); a curve also tells how well they are known.
+
+        Args:
+            amplitudes: their posterior mean. covariance: (n, n), or None if it is not known.
+        """
         values = tuple(map(float, self.at_knots @ amplitudes))
-        return self.basis.law(**self.basis.settings, learned=values)
+        settings = dict(self.basis.settings)
+        if covariance is not None and issubclass(self.basis.law, LearnedCurve):
+            settings['sd'] = tuple(map(float, self.sd(covariance)))
+        return self.basis.law(**settings, learned=values)
+
+    def sd(self, covariance: np.ndarray) -> np.ndarray:
+        """(K,) standard deviations of the values, for a covariance (n, n) of the amplitudes.
+
+        For a factor, those of its deviation from the mean over all film: a factor on all film
+        alike is the pattern's.
+        """
+        root = self.at_knots
+        if self.basis.settings.get('kind') == 'factor':
+            film_um = self.basis.film_um.sum(axis=0)
+            root = root - film_um @ root / film_um.sum()
+        return np.sqrt(np.einsum('kn,nm,km->k', root, covariance, root))
 
 
 def bases_over(

@@ -16,7 +16,6 @@ from paint_deposition.files.tables.table import Table
 from paint_deposition.part.surface import Surface
 from paint_deposition.readings.readings import Readings, require_repeats_close
 
-REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0
 

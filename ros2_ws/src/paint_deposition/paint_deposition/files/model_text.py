@@ -75,7 +75,10 @@ def _with_rows(value: Any) -> Any:
 def _effect(effect: Effect, folder: Path) -> CommentedMap:
     if isinstance(effect, LearnedLaw):
         text = _fields(effect, id=LEARNED_ID, covariate=effect.covariate)
-        text['learned'] = _with_rows(list(effect.learned))
+        if not text.get('sd'):
+            text.pop('sd', None)
+        for name in {'learned', 'sd'} & text.keys():
+            text[name] = _with_rows(text[name])
         about = f'{effect.over} [{effect.unit}]'
         text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
         return text

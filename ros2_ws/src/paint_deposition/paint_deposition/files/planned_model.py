@@ -6,15 +6,13 @@ A plan lies in a folder with its ``model.yaml``; its bag holds a copy. Bag, RAPI
 
 from __future__ import annotations
 
-import hashlib
 import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.model_text import model_text
+from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.motion import is_rapid
 from paint_deposition.files.recordings.bag_files import custom_data
 
@@ -38,12 +36,6 @@ class PlannedModel:
     path: Path
     digest: str
     file: ModelFile | None
-
-
-def model_digest(model: DepositionModel) -> str:
-    """SHA-256 of a model's values, wherever its file lies and however it is commented."""
-    text = model_text(model, Path('/'), '', '', {})
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def planned_model(motion: Path) -> PlannedModel | None:

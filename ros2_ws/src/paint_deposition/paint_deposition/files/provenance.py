@@ -54,13 +54,21 @@ def origin(
     }  # fmt: skip
 
 
+def model_digest(model: DepositionModel) -> str:
+    """SHA-256 of a model's values, wherever its file lies and however it is commented."""
+    return hashlib.sha256(json_text(_values(model)).encode()).hexdigest()
+
+
 def _in_full(model: DepositionModel) -> dict[str, Any]:
-    values = {
+    return _values(model) | {'sha256': model_digest(model)}
+
+
+def _values(model: DepositionModel) -> dict[str, Any]:
+    return {
         'planar': plain(model.planar.model_dump()),
         'projection': plain(model.projection.model_dump()),
         'effects': [{'id': e.id, **plain(e.model_dump())} for e in model.effects],
     }
-    return values | {'sha256': hashlib.sha256(json_text(values).encode()).hexdigest()}
 
 
 def sha256(path: str | Path) -> str:

@@ -18,6 +18,7 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.fitting.panel_reach import shifts, short_reaches
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.posterior import posterior_of
@@ -151,6 +152,7 @@ class Calibration:
         return self.fit.chi_square / max(len(self.study) - len(self.fit.vector), 1)
 
 
+@on_one_thread
 def calibrate(
     campaign: Campaign,
     start: DepositionModel | None = None,

@@ -59,21 +59,26 @@ class Fit:
     @cached_property
     def marginal(self) -> 'Fit':
         """The same fit with residual and Jacobian whitened by the nuisance directions, too."""
+        factor = covariance_factor(self.nuisance)
         return replace(
             self,
-            residual=solve_triangular(self._factor, self.residual, lower=True),
-            jacobian=solve_triangular(self._factor, self.jacobian, lower=True),
+            residual=solve_triangular(factor, self.residual, lower=True),
+            jacobian=solve_triangular(factor, self.jacobian, lower=True),
             nuisance=self.nuisance[:, :0],
         )
 
-    @property
-    def nuisance_log_det(self) -> float:
-        """Log determinant of the covariance of noise and nuisance directions; 0 without any."""
-        return 2.0 * float(np.sum(np.log(np.diag(self._factor))))
-
     @cached_property
-    def _factor(self) -> np.ndarray:
-        return covariance_factor(self.nuisance)
+    def amplitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Posterior mean (n,) and covariance (n, n) of the nuisance directions' amplitudes.
+
+        The model is linear around the fit, and its vector is not known exactly either.
+        """
+        prior, count = self.parameters.prior, self.nuisance.shape[1]
+        columns = np.hstack([self.nuisance, self.jacobian @ prior.factor])
+        raw = self.residual + self.jacobian @ (self.vector - prior.centre)
+        covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
+        mean = covariance @ (columns.T @ raw)
+        return mean[:count], covariance[:count, :count]
 
     @property
     def chi_square(self) -> float:
@@ -89,16 +94,6 @@ class Fit:
     def objective(self) -> float:
         """What the fit minimises: chi-square, nuisance integrated out, plus the penalty."""
         return self.marginal.chi_square + self.penalty
-
-    @property
-    def precision(self) -> np.ndarray:
-        """(k, k) inverse covariance of the vector, prior included."""
-        return self.jacobian.T @ self.jacobian + self.parameters.prior.precision
-
-    @property
-    def covariance(self) -> np.ndarray:
-        """(k, k) covariance of the vector."""
-        return np.linalg.inv(self.precision)
 
 
 def fit_readings(

@@ -108,11 +108,7 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
         fit: whose first nuisance directions are those of the random effects.
         effects: of the study.
     """
-    prior = fit.parameters.prior
-    columns = np.hstack([fit.nuisance, fit.jacobian @ prior.factor])
-    raw = fit.residual + fit.jacobian @ (fit.vector - prior.centre)
-    covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
-    mean = covariance @ (columns.T @ raw)
+    mean, covariance = fit.amplitudes
     found, first = [], 0
     for kind in effects:
         count = len(kind.names)

@@ -9,6 +9,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.slips import FEWEST, Slip, slips
 from paint_deposition.fitting.smooth_misfit import Misfit, Scatter
@@ -19,6 +20,7 @@ from paint_deposition.readings.campaign import Campaign
 STARTS = 3
 
 
+@on_one_thread
 def sifted(
     campaign: Campaign,
     start: DepositionModel,

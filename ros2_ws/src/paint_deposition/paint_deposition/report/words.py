@@ -16,6 +16,7 @@ from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap
 from paint_deposition.fitting.study import Study
+from paint_deposition.report.style import TWO_SIDED_95
 from paint_deposition.results.fitted_model import PATTERN, REFIT
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
@@ -130,7 +131,7 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
 
 
 def learned_range(law: LearnedLaw) -> str:
-    """Where a learned law holds, and that it is neutral elsewhere, as a sentence."""
+    """Where a learned law holds, that it is neutral elsewhere, and how well it is known."""
     name = capital(effect_name(law.id))
     if isinstance(law, LearnedMap):
         return f'{name}: neutral outside the area of the readings, and on any other part.'
@@ -138,7 +139,24 @@ def learned_range(law: LearnedLaw) -> str:
         reach = f'{number(1e3 * law.reach_m)} mm'
         return f'{name}: neutral farther than {reach} from the axis on the model plane.'
     _, ends, unit = learned_words(law)[1]
-    return f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
+    words = f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
+    return words + _band_words(law) if isinstance(law, LearnedCurve) and law.sd else words
+
+
+def _band_words(law: LearnedCurve) -> str:
+    """Where the band of a curve is narrow, and where wide, as a sentence."""
+    values = np.linspace(law.low, law.high, 101)
+    half = TWO_SIDED_95 * law.deviation(values)
+    shown = values + (1.0 if law.covariate == 'spray_pass' else 0.0)
+
+    def known(at: np.intp) -> str:
+        wide = f'± {number(half[at], 2)} {"µm" if law.kind == "addition" else ""}'.rstrip()
+        return f'{wide} at {number(shown[at])} {unit_words(law.unit)}'.rstrip()
+
+    return (
+        f' At 95 % it is known best, to {known(half.argmin())}, and least, to '
+        f'{known(half.argmax())}.'
+    )
 
 
 def sureness(found: EffectClass) -> str:

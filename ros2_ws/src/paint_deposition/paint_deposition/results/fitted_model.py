@@ -9,6 +9,7 @@ import numpy as np
 from paint_deposition.diagnosis.verdict import Step
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.files.posterior import Posterior
@@ -104,7 +105,9 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
                 for name, value in dict(effect).items()
                 if isinstance(value, float)
             }
-            values['learned'] = tuple(_few_digits(value) for value in effect.learned)
+            values['learned'] = tuple(map(_few_digits, effect.learned))
+            if isinstance(effect, LearnedCurve):
+                values['sd'] = tuple(float(f'{value:.3g}') for value in effect.sd)
         model = model.with_effect(effect.model_copy(update=values))
     return model
 

@@ -26,6 +26,9 @@ class LearnedCurve(LearnedLaw):
 
     low: float = Field(0.0, description='least value of the covariate in the readings')
     high: float = Field(1.0, description='greatest value of the covariate in the readings')
+    sd: tuple[float, ...] = Field(
+        (), description='a list of numbers: standard deviations of h at the knots; [] if not known'
+    )
 
     @staticmethod
     def axis(value: Any) -> Any:
@@ -38,6 +41,12 @@ class LearnedCurve(LearnedLaw):
             raise ValueError(f'high is {self.high:g}; it must be above low, {self.low:g}')
         if len(self.learned) < 2:
             raise ValueError(f'learned has {len(self.learned)} values; give two or more')
+        if self.sd and len(self.sd) != len(self.learned):
+            raise ValueError(
+                f'sd has {len(self.sd)} values and learned {len(self.learned)}; give one for each'
+            )
+        if any(value < 0.0 for value in self.sd):
+            raise ValueError(f'sd has {min(self.sd):g}; a standard deviation is 0 or more')
         return self
 
     @classmethod
@@ -55,6 +64,18 @@ class LearnedCurve(LearnedLaw):
         position = knot_positions(type(self), value, self.low, self.high, count)
         # Value by value, so that it is the same to the bit for few values and for many.
         return np.interp(position, np.arange(-1, count + 1), [0.0, *self.learned, 0.0])
+
+    def deviation(self, value: np.ndarray) -> np.ndarray:
+        """Standard deviation (...) of h at values of the covariate (...) [1 or um].
+
+        Between two knots it is at most this. NaN where nothing is known: outside the range of the
+        readings, or everywhere.
+        """
+        if not self.sd:
+            return np.full(np.shape(value), np.nan)
+        count = len(self.sd)
+        position = knot_positions(type(self), value, self.low, self.high, count)
+        return np.interp(position, np.arange(count), self.sd, left=np.nan, right=np.nan)
 
     def factor(self, value: np.ndarray) -> np.ndarray:
         """What the film is multiplied by at values of the covariate."""

@@ -46,7 +46,7 @@ UNITS = {
     'm/s': 1.0, 'mm/s': 1e-3, 'mpers': 1.0, 'mmpers': 1e-3, '-': 1.0,
 }  # fmt: skip
 LENGTHS, TIMES = ('m', 'mm', 'cm'), ('s', 'sec', 'ms', 'us', 'µs', 'ns')
-ANGLES, SPEEDS = ('rad', 'deg', '°'), ('m/s', 'mm/s', 'mpers', 'mmpers')
+SPEEDS = ('m/s', 'mm/s', 'mpers', 'mmpers')
 
 
 @dataclass(frozen=True)

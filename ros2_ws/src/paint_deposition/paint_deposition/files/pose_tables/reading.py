@@ -15,6 +15,7 @@ from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.pose_tables import headings as h
 from paint_deposition.files.pose_tables.headings import Heading, Headings
 from paint_deposition.files.pose_tables.rotations import read_rotations
+from paint_deposition.files.text import decoded
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import relative_flow
@@ -53,7 +54,8 @@ class PoseTable:
             content = path.read_bytes()
         except OSError as error:
             raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-        lines = _decoded(content).splitlines()
+        text, _ = decoded(content) or (content.decode('cp1252', errors='replace'), '')
+        lines = text.splitlines()
         used = [k for k, line in enumerate(lines) if line.strip() and line.strip()[0] != '#']
         # A heading may be marked as a comment, as NumPy writes it.
         first = used[0] if used else 0
@@ -246,14 +248,6 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
     return np.array(flows), f'gun by {headings.written(used)}'
-
-
-def _decoded(content: bytes) -> str:
-    marked = content[:2] in (b'\xff\xfe', b'\xfe\xff')
-    try:
-        return content.decode('utf-16' if marked else 'utf-8-sig')
-    except UnicodeDecodeError:
-        return content.decode('cp1252', errors='replace')
 
 
 def _separator(line: str) -> str:

@@ -10,7 +10,6 @@ from paint_deposition.motion.programmed import PROGRAMMED, timed
 from paint_deposition.motion.trajectory import Trajectory
 
 SUFFIXES = ('.mod', '.prg')
-POSE_PERIOD_S = 0.02
 
 
 def is_rapid(path: Path | str) -> bool:

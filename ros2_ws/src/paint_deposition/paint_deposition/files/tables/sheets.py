@@ -8,15 +8,11 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.text import decoded
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
 
-BYTE_ORDER_MARKS = (
-    (b'\xef\xbb\xbf', 'utf-8-sig', 'UTF-8'),
-    (b'\xff\xfe', 'utf-16', 'UTF-16'),
-    (b'\xfe\xff', 'utf-16', 'UTF-16'),
-)
 SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', '|': 'bars'}
 # Columns of a printed list stand apart by blanks; headings of two words by one only.
 BLANKS = (re.compile(r'\s{2,}|\t'), re.compile(r'\s+'))
@@ -59,7 +55,10 @@ def sheets_of(path: Path) -> list[Sheet]:
         raise ReadingsError(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
     if content.startswith(WORKBOOKS):
         return _sheets_of_workbook(path, content)
-    text, encoding = _decoded(path, content)
+    found = decoded(content)
+    if found is None:
+        raise ReadingsError(f'{path}: cannot be read as text; {EXPECTED}')
+    text, encoding = found
     split = [
         Sheet.of(_separated(path, text, separator), f'{name}, {encoding}')
         for separator, name in SEPARATORS.items()
@@ -72,26 +71,6 @@ def sheets_of(path: Path) -> list[Sheet]:
         for form in [f'blanks, {encoding}']
     ]
     return split + blanks
-
-
-def _decoded(path: Path, content: bytes) -> tuple[str, str]:
-    """The text and the encoding's name: by its mark, else UTF-8, else cp1252."""
-    tried = [(codec, name) for mark, codec, name in BYTE_ORDER_MARKS if content.startswith(mark)]
-    if not tried:
-        # Without a mark, UTF-16 of Western text has a zero in every other byte.
-        zeros = [content[start::2].count(0) for start in (0, 1)]
-        if max(zeros) > len(content) // 4:
-            tried = [('utf-16-be' if zeros[0] > zeros[1] else 'utf-16-le', 'UTF-16')]
-        else:
-            tried = [('utf-8', 'UTF-8'), ('cp1252', 'cp1252')]
-    for codec, name in tried:
-        try:
-            text = content.decode(codec)
-        except UnicodeDecodeError:
-            continue
-        if '\0' not in text:
-            return text, name
-    raise ReadingsError(f'{path}: cannot be read as text; {EXPECTED}')
 
 
 def _separated(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cell]]]:

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect, Ray
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,
@@ -17,12 +19,14 @@ from paint_deposition.report.page.layout import (
     figure,
     scatter,
 )
-from paint_deposition.report.style import ACCENT, INK, MUTED
+from paint_deposition.report.style import ACCENT, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import capital, covariate_label, effect_name
 
 CURVE_POINTS = 201
 # Values tried of an amplitude and of a shape when a law of the library is fitted to a curve.
 AMPLITUDES, SHAPES = 41, 5
+# The accent, so pale that grid and curves show through.
+BAND = 'rgba(0,112,140,0.18)'
 # Share of a curve's variance that a law must explain to be called near.
 NEAR = 0.5
 
@@ -32,8 +36,10 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
     laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
     if not laws:
         return None
-    library = data.diagnosis.library if data.diagnosis else {}
-    charts = []
+    library = dict(EFFECTS) | dict(data.diagnosis.library if data.diagnosis else {})
+    charts, legend = [], [('learned', ACCENT, 'bold')]
+    if any(law.sd for law in laws):
+        legend.append(('95 % band', ACCENT, 'band'))
     for law in laws:
         ends = [
             {'type': 'line', 'yref': 'paper', 'x0': end, 'x1': end, 'y0': 0, 'y1': 1,
@@ -47,7 +53,7 @@ def learned_figure(data: ReportData) -> dict[str, Any] | None:
         )
         title, traces = _traces(law, library)
         charts.append(chart(title, traces, layout, 300))
-    return figure('learned', charts, [('learned', ACCENT, 'bold')])
+    return figure('learned', charts, legend)
 
 
 def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str, list[dict]]:
@@ -55,9 +61,13 @@ def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str
     values = np.linspace(law.low, law.high, CURVE_POINTS)
     step = (law.high - law.low) / (len(law.learned) - 1)
     around = np.linspace(law.low - step, law.high + step, CURVE_POINTS)
+    with np.errstate(invalid='ignore', divide='ignore'):  # a distance to an edge has an end
+        around = around[np.isfinite(law.axis(around))]
     hover = {'hovertemplate': '%{y:.3g} at %{x:.3g}<extra></extra>'}
     title, bold = capital(effect_name(law.id)), {'color': ACCENT, 'width': 2.5}
     traces = [scatter(_shown(law, around), _of_law(law, around), 'lines', line=bold, **hover)]
+    if law.sd:
+        traces.insert(0, _band(law, values))
     near = nearest_law(law, library, values)
     if near is not None:
         effect, curve = near
@@ -65,6 +75,19 @@ def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str
         traces.append(scatter(_shown(law, values), curve, 'lines', line=dashed, **hover))
         title += f'; dashed: law of {effect_name(effect.id)}'
     return title, traces
+
+
+def _band(law: LearnedCurve, values: np.ndarray) -> dict[str, Any]:
+    """Where the law lies at 95 %, over the range of the readings."""
+    half, curve = TWO_SIDED_95 * law.deviation(values), _of_law(law, values)
+    low, high = curve - half, curve + half
+    if law.kind == 'factor':
+        low = np.maximum(low, LEAST_FACTOR)
+    there_and_back = _shown(law, np.concatenate([values, values[::-1]]))
+    return scatter(
+        there_and_back, np.concatenate([low, high[::-1]]), 'lines', line={'width': 0},
+        fill='toself', fillcolor=BAND, hoverinfo='skip',
+    )  # fmt: skip
 
 
 def _shown(law: LearnedCurve, values: np.ndarray) -> np.ndarray:
