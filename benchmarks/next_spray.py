@@ -27,15 +27,19 @@ sys.path.insert(0, str(ROOT))
 
 # Effects that are easily taken for another one.
 TRUTHS = (
-    'air_drift', 'tcp_offset', 'tcp_tilt', 'sag', 'fog_gradient', 'flow_drift',
-    'gauge_curvature_bias', 'faraday_shielding', 'corner_slowdown', 'trigger_lag', 'edge_build',
+    'air_drift', 'gauge_curvature_bias', 'fog_gradient', 'tcp_offset', 'faraday_shielding',
+    'flow_drift', 'tcp_tilt', 'convex_attraction', 'sag', 'corner_slowdown', 'trigger_lag',
+    'edge_build',
 )  # fmt: skip
-PARCELS = 4_000_000
+PARCELS = 3_000_000
 READINGS, REPEATS = 80, 20
 # Times the usual size of an effect.
-SCALES = (2.0, 3.0, 1.5)
+SCALES = (3.0, 2.0)
 # From this probability of one effect on, it counts as named.
 SURE = 0.8
+# Predicted chances of settling and predicted separations, in bins.
+CHANCES = ((0.0, 0.3), (0.3, 0.6), (0.6, 0.8), (0.8, 1.0))
+SEPARATIONS = ((0.0, 2.0), (2.0, 3.0), (3.0, 4.0), (4.0, 6.0), (6.0, float('inf')))
 
 
 def run_one(job: tuple[int, str, float]) -> dict:
@@ -58,7 +62,7 @@ def run_one(job: tuple[int, str, float]) -> dict:
         if sprays:
             truths = choose(truth, stream(seed, 1), None, scale)
             both = sprayed_again(painted, truths, sprays[0].experiment, sprays[0].changes, seed,
-                                 parcels=PARCELS)  # fmt: skip
+                                 stand=sprays[0].to_dict()['stand'], parcels=PARCELS)  # fmt: skip
             second = pd.diagnose(read(both, Path(name) / 'both'))
             record |= {'spray': sprays[0].to_dict(), 'second': said(second)}
         return record
@@ -97,11 +101,28 @@ def table(records: list[dict]) -> str:
         ('true one not among what competed', [r in away for r in (*opened, *away)], ''),
         ('  named then all the same', [_named(r['second']) == r['truth'] for r in away], ''),
     ]  # fmt: skip
+    rows += [_binned('chance', 'chance predicted', limits, opened) for limits in CHANCES]
+    rows += [_binned('separation_sigma', 'standard deviations apart', b, opened)
+             for b in SEPARATIONS]  # fmt: skip
     lines = [
         f'{len(records)} campaigns; in {len(seen)} something was found missing, '
         f'in {len(opened) + len(away)} several explanations competed'
     ]
     return '\n'.join([*lines, *(f'{w:<47}{_share(h):<38}{t}' for w, h, t in rows)])
+
+
+def _binned(
+    key: str, words: str, limits: tuple[float, float], opened: list[dict]
+) -> tuple[str, list[bool], str]:
+    """How many were narrowed to one, of those whose spray promised so much."""
+    inside = [r for r in opened if limits[0] <= r['spray'][key] < limits[1] + 1e-9]
+    hits = [_named(r['second']) is not None for r in inside]
+    mean = sum(r['spray']['chance'] for r in inside) / max(len(inside), 1)
+    return (
+        f'narrowed, {limits[0]:g} to {limits[1]:g} {words}',
+        hits,
+        f'predicted {100 * mean:.0f} %',
+    )
 
 
 def _share(hits: list[bool]) -> str:
@@ -134,6 +155,7 @@ def _kept(record: dict) -> bool:
 
 
 @click.command()
+@click.option('--truths', default=','.join(TRUTHS), help='Hidden effects, by comma.')
 @click.option('--each', default=10, show_default=True, help='Campaigns of each hidden effect.')
 @click.option('--first-seed', default=930_000, show_default=True, help='For other campaigns.')
 @click.option('--processes', default=2, show_default=True)
@@ -141,7 +163,9 @@ def _kept(record: dict) -> bool:
     '--results', default=ROOT / 'runs' / 'bench-next.jsonl', type=click.Path(path_type=Path)
 )
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
-def main(each: int, first_seed: int, processes: int, results: Path, only_summary: bool) -> None:
+def main(
+    truths: str, each: int, first_seed: int, processes: int, results: Path, only_summary: bool
+) -> None:
     """Score the first proposed spray on parts with hidden effects."""
     results.parent.mkdir(parents=True, exist_ok=True)
     lines = results.read_text().splitlines() if results.exists() else []
@@ -149,9 +173,9 @@ def main(each: int, first_seed: int, processes: int, results: Path, only_summary
     if not only_summary:
         known = {(r['seed'], r['truth']) for r in records}
         todo = [
-            (first_seed + 100 * number + k, truth, SCALES[k % len(SCALES)])
+            (first_seed + 100 * TRUTHS.index(truth) + k, truth, SCALES[k % len(SCALES)])
             for k in range(each)
-            for number, truth in enumerate(TRUTHS)
+            for truth in truths.split(',')
         ]
         todo = [job for job in todo if job[:2] not in known]
         pool = multiprocessing.get_context('spawn').Pool(processes)

@@ -42,7 +42,7 @@ class Change:
     @property
     def keys(self) -> tuple[str, ...]:
         """Of the single changes."""
-        return tuple(change.key for change in self.both) or (self.key,)
+        return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
 
 
 def together(first: Change, second: Change) -> Change:
@@ -185,6 +185,7 @@ def _without(setting: str) -> Callable[[Experiment], Experiment]:
     return lambda experiment: replace(experiment, switched_off=experiment.switched_off | {setting})
 
 
+AS_BEFORE = Change('', '', 0.0, lambda experiment: experiment, '')
 MENU = (
     Change(
         'roll_180',

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.diagnosis.explanations import UNKNOWN
-from paint_deposition.diagnosis.next_experiment import Spray
+from paint_deposition.diagnosis.proposals import Spray
 from paint_deposition.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
@@ -76,12 +76,15 @@ def competing(spray: Spray) -> str:
 
 
 def apart_words(spray: Spray) -> str:
-    """How far apart the explanations are now, and with a spray."""
+    """How far apart the explanations are now, and with a spray; the chance that one is left."""
     several = 'the two least apart of ' if len(spray.separates) > 2 else ''
-    return (
+    words = (
         f'{several}{competing(spray)} then differ by {spray.separation:.1f} standard deviations, '
         f'now by {spray.now:.1f}'
     )
+    if spray.chance == spray.chance:
+        words += f'; the chance that one is left alone is {percent(spray.chance)}'
+    return '; '.join(filter(None, [words, spray.film_words]))
 
 
 def is_learned(effect_id: str) -> bool:
