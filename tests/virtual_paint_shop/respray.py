@@ -101,10 +101,11 @@ def _longer_open(plan: Plan, part) -> Plan:
 
 
 def _turned(plan: Plan, part) -> Plan:
+    """As many passes the other way, spread over the part's other side, and the gun with them."""
     direction = 'vertical' if plan.direction == 'horizontal' else 'horizontal'
-    across = part.height_m if direction == 'horizontal' else part.width_m
-    passes = int(np.clip(np.rint(across / plan.index_m) + 1, 3, 6))
-    return replace(plan, direction=direction, passes=passes)
+    wider = part.width_m / part.height_m
+    index = plan.index_m * (wider if direction == 'vertical' else 1.0 / wider)
+    return replace(plan, direction=direction, index_m=index, roll_rad=plan.roll_rad - 0.5 * np.pi)
 
 
 def _moved_off(distance_m: float):

@@ -173,7 +173,7 @@ def _tried(
     spray = Spray(
         _in_words(study, experiment, change, stand), rivals.names, apart[0].imitation.separation,
         now, len(film_um), experiment.name, change.keys if stand is None else (KEY, *change.keys),
-        _chance(apart), stand.peak_um if stand else float(film_um.max()),
+        _chance(rivals, apart), stand.peak_um if stand else float(film_um.max()),
         float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip
     cost = change.cost + COST_OF_STANDING * (stand is not None)
@@ -194,11 +194,13 @@ def _in_words(study: Study, experiment: Experiment, change: Change, stand: Stand
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
 
 
-def _chance(apart: Sequence[_Pair]) -> float:
-    """Probability that the true one is left alone, on average over which it is."""
-    left = dict.fromkeys((pair.shown for pair in apart), 1.0)
+def _chance(rivals: Rivals, apart: Sequence[_Pair]) -> float:
+    """Probability that the true effect is left alone, on average over which it is."""
+    left = {k: 1.0 for k, rival in enumerate(rivals.found) if rival.effect is not None}
     for pair in apart:
-        left[pair.shown] *= float(chance_of_settling(np.array(pair.imitation.separation)))
+        if pair.shown in left:
+            separation = np.array(pair.imitation.separation)
+            left[pair.shown] *= float(chance_of_settling(separation))
     return float(np.mean(list(left.values())))
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.diagnosis.explanations import UNKNOWN
+from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.diagnosis.proposals import Spray
 from paint_deposition.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
@@ -70,9 +70,8 @@ def effect_name(effect_id: str) -> str:
 
 def competing(spray: Spray) -> str:
     """The explanations that a spray is to tell apart."""
-    names = [name for name in spray.separates if name != UNKNOWN]
-    found = [effect_name(name) for name in names]
-    return joined(found + ['a cause outside the library'] * (len(names) < len(spray.separates)))
+    shapeless = {UNKNOWN: 'a cause outside the library', FOOTPRINT: 'another shape of the pattern'}
+    return joined([shapeless.get(name) or effect_name(name) for name in spray.separates])
 
 
 def apart_words(spray: Spray) -> str:
