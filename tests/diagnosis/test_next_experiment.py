@@ -5,8 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paint_deposition.diagnosis.explanations import FOOTPRINT, FOOTPRINT_SHARE, LENGTHS
 from paint_deposition.diagnosis.next_experiment import EDGE_MARGIN_M, SPACING_M, propose
 from paint_deposition.diagnosis.rivals import Rivals, rivals_of
+from paint_deposition.diagnosis.smooth_laws import footprint_along, footprint_kinds
 from paint_deposition.diagnosis.sprays import MENU, together
 from paint_deposition.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.effects.base import PathContext
@@ -15,6 +17,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
+from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.projection import Projection
@@ -60,6 +63,26 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drift_or_tool):
     assert best_of(sprays, 'upside_down').separation > 0.8 * rolled.separation
     # The order of the passes tells nothing of it: it is not among the best.
     assert all(spray.changes != ('reverse_order',) for spray in sprays)
+
+
+@pytest.mark.slow
+def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit):
+    found = rivals(study, fit, 'tcp_offset', 'footprint')
+    predicted = found.here[1]
+    # Its amplitudes are not free: what they need of their prior is separation, too.
+    assert predicted.precision == pytest.approx(1.0 / 9.0)
+    basis = footprint_along(study.rays(fit.model), fit.model.planar)
+    random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], footprint_kinds()[-1])
+    law = random.learned(1e-3 * predicted.amounts)
+    film_um = [
+        Forward(study.campaign, (law,)).predict_um(
+            fit.model.model_copy(update={'effects': effects})
+        )
+        for effects in ((), (law,))
+    ]
+    change = 1e3 * (film_um[1] - film_um[0]) / study.sigma_um
+    assert np.linalg.norm(predicted.change) > 1.0
+    assert np.linalg.norm(predicted.change - change) < 0.05 * np.linalg.norm(change)
 
 
 @pytest.mark.slow

@@ -190,7 +190,9 @@ def _most_um(study: Study) -> float:
 def _in_words(study: Study, experiment: Experiment, change: Change, stand: Stand | None) -> str:
     what = f'the same passes {change.words}'
     if stand is not None:
-        what = f'{stand.words}; {change.words}'.removesuffix('; ')
+        # Its words tell the distance already.
+        otherwise = '' if change.kind == 'standoff' else change.words
+        what = f'{stand.words}; {otherwise}'.removesuffix('; ')
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
 
 
