@@ -51,7 +51,7 @@ def settle(folder: Path, paint: Paint, say: Callable[[str], None]) -> Path:
     print(f'{sprays[0]["what"]}; the level of the part and the zero of the gauge are drawn anew')
     truths = choose(HIDDEN, stream(SEED, 1), None, SCALE)
     both = sprayed_again(painted, truths, sprays[0]['experiment'], sprays[0]['changes'], SEED,
-                         parcels=PARCELS)  # fmt: skip
+                         stand=sprays[0]['stand'], parcels=PARCELS)  # fmt: skip
 
     say('Diagnosing both doors together')
     last = folder / 'two_doors_diagnosis'

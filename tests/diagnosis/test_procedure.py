@@ -9,8 +9,8 @@ import pytest
 from paint_deposition.comparison.comparison import compare
 from paint_deposition.diagnosis import procedure
 from paint_deposition.diagnosis.model_space import SURE
-from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.procedure import diagnose
+from paint_deposition.diagnosis.proposals import Place, Spray
 from paint_deposition.diagnosis.refit import refit
 from paint_deposition.diagnosis.verdict import percent
 from paint_deposition.effects.catalogue import EFFECTS

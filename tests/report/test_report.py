@@ -15,8 +15,8 @@ from PIL import Image
 
 from booth import SAMPLES
 from paint_deposition.comparison.comparison import compare
-from paint_deposition.diagnosis.next_experiment import Place, Spray
 from paint_deposition.diagnosis.procedure import ALPHA
+from paint_deposition.diagnosis.proposals import Place, Spray
 from paint_deposition.diagnosis.refit import refit
 from paint_deposition.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.effects.catalogue import EFFECTS

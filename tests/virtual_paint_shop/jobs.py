@@ -14,6 +14,8 @@ from .flight import Slices
 
 STEP_M = 0.003
 SLICE_M = 0.012
+# A gun that stands: closed before and behind, samples, and no end of a pass anywhere near.
+CLOSED_S, STEP_S, FAR_M = 0.6, 0.01, 100.0
 _AFTER_TRIGGER_S = np.array([0.01, 0.02, 0.04, 0.06, 0.09, 0.13, 0.18, 0.25, 0.35, 0.5])
 
 
@@ -130,6 +132,21 @@ def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
         stretches.append((tcp, axis, number))
         ends.append((inside[0], inside[-1]))
     return _in_time(stretches, ends, plan)
+
+
+def hold(part: Part, plan: Plan, place_m: np.ndarray, standoff_m: float, open_s: float) -> Motion:
+    """The gun stands square before a place of the part, and is open for so long."""
+    x, _, z = place_m
+    normal = part.normal(np.array(x), np.array(z))
+    across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
+    turn = orthonormal(np.stack([across, -normal, -normal], axis=-1))
+    time = np.arange(0.0, open_s + 2.0 * CLOSED_S, STEP_S)
+    tcp = part.point(np.array(x), np.array(z)) + standoff_m * normal
+    return Motion(
+        time, np.tile(tcp, (time.size, 1)), np.tile(turn, (time.size, 1, 1)),
+        np.zeros(time.size, int), np.full(time.size, FAR_M),
+        np.array([CLOSED_S, CLOSED_S + open_s]), np.array([True, False]),
+    )  # fmt: skip
 
 
 def slices(motion: Motion, flow_cm3_per_s, slice_m: float = SLICE_M) -> Slices:

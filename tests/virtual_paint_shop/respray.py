@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from .bench import Bench
 from .draw import stream, timed
 from .gauge import GaugeNoise, Readings, Spots, tabulate
-from .jobs import Job, Plan, record
+from .jobs import Job, Plan, hold, record
 from .parcels import Pattern
 from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment
 from .truths import Scene, Truth
@@ -41,13 +41,16 @@ def respray(
     changes: Sequence[str],
     seed: int,
     *,
+    stand: Mapping[str, float] | None = None,
     noise: GaugeNoise = USUAL_NOISE,
     parcels: int = PARCELS,
 ) -> Experiment:
     """Paint another part like that of an experiment, with changes, and measure the same points.
 
-    The hidden effects and the bell are the same; teaching, the part's level, the gauge's zero and
-    its noise are drawn anew. Raises ValueError for a change that the shop cannot do.
+    stand: where the gun stands still instead of running its passes (x_m, y_m, z_m), how far off
+    (standoff_m) and how long it is open (dwell_s). The hidden effects and the bell are the same;
+    teaching, the part's level, the gauge's zero and its noise are drawn anew. Raises ValueError
+    for a change that the shop cannot do.
     """
     rng = stream(seed, 60)
     part, plan = experiment.part, experiment.plan
@@ -55,7 +58,12 @@ def respray(
         if change not in PLANS:
             raise ValueError(f'no change {change!r}; there are: {", ".join(PLANS)}')
         plan = PLANS[change](plan, part)
-    plan, motion = timed(part, plan, rng)
+    if stand is None:
+        plan, motion = timed(part, plan, rng)
+    else:
+        place = np.array([stand[f'{axis}_m'] for axis in 'xyz'])
+        motion = hold(part, plan, place, stand['standoff_m'], stand['dwell_s'])
+        truths = [_less_fog(t, experiment, stand['dwell_s']) for t in truths]
     job = Job(f'{experiment.name}_next', part, plan, motion)
     arriving = plan.flow
     if 'voltage' in plan.switched_off:
@@ -93,10 +101,11 @@ def _longer_open(plan: Plan, part) -> Plan:
 
 
 def _turned(plan: Plan, part) -> Plan:
+    """As many passes the other way, spread over the part's other side, and the gun with them."""
     direction = 'vertical' if plan.direction == 'horizontal' else 'horizontal'
-    across = part.height_m if direction == 'horizontal' else part.width_m
-    passes = int(np.clip(np.rint(across / plan.index_m) + 1, 3, 6))
-    return replace(plan, direction=direction, passes=passes)
+    wider = part.width_m / part.height_m
+    index = plan.index_m * (wider if direction == 'vertical' else 1.0 / wider)
+    return replace(plan, direction=direction, index_m=index, roll_rad=plan.roll_rad - 0.5 * np.pi)
 
 
 def _moved_off(distance_m: float):
@@ -135,7 +144,17 @@ PLANS = {
     'upside_down': lambda plan, part: replace(plan, upside_down=not plan.upside_down),
     'voltage_off': _off('voltage'),
     'draught_off': _off('draught'),
+    'standing': lambda plan, part: plan,  # see `stand`
 }
+
+
+def _less_fog(truth: Truth, experiment: Experiment, open_s: float) -> Truth:
+    """Fog comes from what is sprayed: a spot makes less of it than a whole part."""
+    if truth.id not in ('fog_gradient', 'overspray_fog'):
+        return truth
+    stamps, on = experiment.log.trigger_stamps_ns, experiment.log.trigger_on
+    whole_s = 1e-9 * float(np.sum(np.diff(stamps)[on[:-1]]))
+    return replace(truth, amplitude=truth.amplitude * open_s / whole_s)
 
 
 def _upside_down(truth: Truth) -> Truth:

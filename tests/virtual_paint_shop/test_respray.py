@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 import yaml
 
+from .conner import film_um
 from .files import write
 from .gauge import GaugeNoise
-from .jobs import drive
+from .jobs import drive, hold
 from .respray import PLANS, respray, sprayed_again
 from .shop import generate
 from .truths import library
@@ -23,10 +24,47 @@ def painted():
     return generate(5, readings=40, repeats=10, heldout=1, **FEW)
 
 
-def film(painted, changes=(), truths=()):
+def film(painted, changes=(), truths=(), stand=None):
     """Films at the same points; the level of the part is that of its seed."""
     (experiment,) = painted.experiments
-    return respray(painted.pattern, list(truths), experiment, changes, 9, **FEW).readings.film_um
+    more = {'stand': stand, **FEW}
+    return respray(painted.pattern, list(truths), experiment, changes, 9, **more).readings.film_um
+
+
+@pytest.fixture(scope='module')
+def stand(painted):
+    x, y, z = painted.experiments[0].readings.positions_m[0]
+    return {'x_m': x, 'y_m': y, 'z_m': z, 'standoff_m': 0.25, 'dwell_s': 1.5}
+
+
+@pytest.mark.slow
+def test_a_standing_gun_leaves_the_footprint_of_eqs_1_and_2(painted, stand):
+    spot = film(painted, ['standing'], stand=stand)
+    (experiment,) = painted.experiments
+    readings = experiment.readings
+    _, first = np.unique(readings.point, return_index=True)
+    place = readings.positions_m[0]
+    motion = hold(experiment.part, experiment.plan, place, 0.25, 1.5)
+    at, normals = (values[np.sort(first)] for values in (readings.positions_m, readings.normals))
+    expected = film_um(painted.pattern, motion, at, normals)
+    of_its_level = expected.sum() / spot[: len(expected)].sum()
+    assert of_its_level == pytest.approx(1.0, abs=0.1)
+    assert of_its_level * spot[: len(expected)] == pytest.approx(
+        expected, abs=0.03 * expected.max()
+    )
+    longer = film(painted, stand=stand | {'dwell_s': 3.0})
+    assert longer == pytest.approx(2.0 * spot, abs=0.03 * expected.max())
+
+
+@pytest.mark.slow
+def test_what_needs_motion_is_gone_where_the_gun_stands(painted, stand):
+    for one in ('gun_wake', 'corner_slowdown', 'pose_lag'):
+        hidden = library()[one].draw(np.random.default_rng(1), scale=2.0)
+        spot = film(painted, truths=[hidden], stand=stand)
+        assert spot == pytest.approx(film(painted, stand=stand), rel=0.02, abs=0.02), one
+    fog = library()['overspray_fog'](3.0)
+    added = film(painted, truths=[fog], stand=stand) - film(painted, stand=stand)
+    assert 0.0 < added.max() < 0.5
 
 
 @pytest.mark.slow

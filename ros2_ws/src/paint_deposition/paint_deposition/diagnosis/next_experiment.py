@@ -1,20 +1,21 @@
 """What to measure and what to spray next, to tell apart the explanations that compete.
 
 Their separation, see ``separation``, is computed for the readings at hand and for these together
-with those of a further experiment. The experiment that best separates each explanation
-from its nearest rival comes first; its cost decides between experiments that are about as good.
+with those of a further experiment. The experiment after which most probably one explanation is
+left comes first; its cost decides between experiments that are about as good.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
-from typing import Any
 
 import numpy as np
 
+from paint_deposition.diagnosis.proposals import Place, Spray, chance_of_settling
 from paint_deposition.diagnosis.rivals import Rivals, rivals_of
 from paint_deposition.diagnosis.separation import Imitation, Predicted, imitate
-from paint_deposition.diagnosis.sprays import MENU, Change, pairs
+from paint_deposition.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
+from paint_deposition.diagnosis.standing import KEY, Stand, spots, suits
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.fitting.forward import Forward
@@ -30,63 +31,14 @@ EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-# Sprays that are named, parts on which they are tried, and single changes of which two at once
-# are tried.
-PROPOSED_SPRAYS, TRIED_PARTS, COMBINED = 15, 2, 4
-# Explanations further apart than this are told apart for certain; beyond it only the cost counts.
-CERTAIN = 10.0
-# Share of the separation that one unit of cost is worth.
-WORTH_OF_COST = 0.05
-
-
-@dataclass(frozen=True)
-class Place:
-    """A point to measure: position (3,) [m], the film predicted there [um], and why."""
-
-    position_m: np.ndarray
-    experiment: str
-    why: str
-    film_um: float = float('nan')
-
-    def to_dict(self) -> dict[str, Any]:
-        """An entry of ``next.measure`` in ``diagnosis.json``."""
-        position = dict(zip(('x_m', 'y_m', 'z_m'), self.position_m.tolist(), strict=True))
-        film = {'film_um': self.film_um} if np.isfinite(self.film_um) else {}
-        return {'experiment': self.experiment, **position, **film, 'why': self.why}
-
-
-@dataclass(frozen=True)
-class Spray:
-    """A proposed experiment.
-
-    Attributes:
-        what: in words; names the part where there are several.
-        separates: the explanations that it is to tell apart, effect ids or 'unknown'.
-        separation: standard deviations between the two that are least apart with it.
-        now: the same without it.
-        readings: number of points to be measured on the new part.
-        experiment: the part that is painted anew. changes: what is done otherwise, by key.
-    """
-
-    what: str
-    separates: tuple[str, ...]
-    separation: float
-    now: float
-    readings: int = 0
-    experiment: str = ''
-    changes: tuple[str, ...] = ()
-
-    def to_dict(self) -> dict[str, Any]:
-        """An entry of ``next.spray`` in ``diagnosis.json``."""
-        return {
-            'what': self.what,
-            'separates': list(self.separates),
-            'separation_sigma': self.separation,
-            'separation_now_sigma': self.now,
-            'readings': self.readings,
-            'experiment': self.experiment,
-            'changes': list(self.changes),
-        }
+# Sprays that are named, parts on which they are tried, single changes of which two at once are
+# tried, and spots before which the gun stands still.
+PROPOSED_SPRAYS, TRIED_PARTS, COMBINED, SPOTS = 15, 2, 4, 5
+# What may be changed of a gun that stands still.
+OF_STANDING = ('roll', 'standoff', 'part', 'voltage', 'draught')
+# Chance of settling that one unit of cost is worth, as a share; that of spraying on one spot, and
+# what a film that may sag costs more.
+WORTH_OF_COST, COST_OF_STANDING, COST_OF_SAG = 0.05, 1.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -106,6 +58,7 @@ class _Tried:
     change: Change
     spray: Spray
     worth: float
+    spot: int | None = None
 
 
 @on_one_thread
@@ -146,18 +99,29 @@ def _now(rivals: Rivals) -> _Pair:
 
 def _sprays(rivals: Rivals) -> list[Spray]:
     now = _now(rivals).imitation.separation
-    tried = [
-        _tried(rivals, experiment, change, now)
-        for experiment in _telling(rivals)
-        for change in MENU
-    ]
-    made = sorted(filter(None, tried), key=lambda one: -one.worth)
+    parts = _telling(rivals)
+    made = _best([_tried(rivals, part, change, now) for part in parts for change in MENU])
     if made:
         best = made[0].experiment
         leading = [one.change for one in made if one.experiment is best][:COMBINED]
-        both = [_tried(rivals, best, change, now) for change in pairs(leading)]
-        made = sorted([*made, *filter(None, both)], key=lambda one: -one.worth)
-    return [one.spray for one in made[:PROPOSED_SPRAYS]]
+        made += _best([_tried(rivals, best, change, now) for change in pairs(leading)])
+    families = {rival.effect.family for rival in rivals.found if rival.effect is not None}
+    if suits(rivals.fit.model, families):
+        still = _best([
+            _tried(rivals, part, AS_BEFORE, now, spot)
+            for part in parts for spot in spots(part, SPOTS)
+        ])  # fmt: skip
+        made += still
+        if still:
+            best, spot = still[0].experiment, still[0].spot
+            changes = [change for change in MENU if change.kind in OF_STANDING]
+            made += _best([_tried(rivals, best, change, now, spot) for change in changes])
+    return [one.spray for one in _best(made)[:PROPOSED_SPRAYS]]
+
+
+def _best(tried: Sequence[_Tried | None]) -> list[_Tried]:
+    """Those that can be done, best first."""
+    return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
 
 def _telling(rivals: Rivals) -> list[Experiment]:
@@ -168,12 +132,28 @@ def _telling(rivals: Rivals) -> list[Experiment]:
     return [campaign.experiments[k] for k in np.argsort(-by_part)[:TRIED_PARTS]]
 
 
-def _tried(rivals: Rivals, experiment: Experiment, change: Change, now: float) -> _Tried | None:
-    """How well the readings would separate with this spray, None where it cannot be done."""
+def _tried(
+    rivals: Rivals, experiment: Experiment, change: Change, now: float, spot: int | None = None
+) -> _Tried | None:
+    """How well the readings would separate with this spray, None where it cannot be done.
+
+    Args:
+        rivals: what competes.
+        experiment: the part that is painted anew.
+        change: what is done otherwise.
+        now: separation without the spray.
+        spot: measured point before which the gun stands still; None: it runs the passes.
+    """
     study = rivals.study
     new = change.made(experiment)
     if new is None:
         return None
+    stand = None
+    if spot is not None:
+        stand = Stand.before(new, spot, rivals.fit.model, _most_um(study))
+        if stand is None:
+            return None
+        new = stand.sprayed(new)
     new = replace(new, name=f'{experiment.name}, next')
     forward = Forward(Campaign((new,)), study.forward.effects)
     film_um = forward.predict_um(rivals.fit.model)
@@ -190,23 +170,40 @@ def _tried(rivals: Rivals, experiment: Experiment, change: Change, now: float) -
     there = rivals.there(Campaign((new,)), forward, sigma_um)
     predicted = [here.with_more(more) for here, more in zip(rivals.here, there, strict=True)]
     apart = compared(free, predicted)
-    what = f'the same passes {change.words}'
-    if len(study.campaign.experiments) > 1:
-        what += f', on {experiment.name}'
-    least = apart[0].imitation.separation
     spray = Spray(
-        what, rivals.names, least, now, len(film_um), experiment.name, change.keys
+        _in_words(study, experiment, change, stand), rivals.names, apart[0].imitation.separation,
+        now, len(film_um), experiment.name, change.keys if stand is None else (KEY, *change.keys),
+        _chance(rivals, apart), stand.peak_um if stand else float(film_um.max()),
+        float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip
-    return _Tried(experiment, change, spray, _worth(apart, change))
+    cost = change.cost + COST_OF_STANDING * (stand is not None)
+    cost += COST_OF_SAG * bool(spray.film_words)
+    return _Tried(experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
 
 
-def _worth(apart: Sequence[_Pair], change: Change) -> float:
-    """Separation of an explanation from its nearest rival, on average, less what it costs."""
-    nearest: dict[int, float] = {}
+def _most_um(study: Study) -> float:
+    """The thickest film that may be sprayed on a spot: that wanted, else that measured."""
+    wanted = study.campaign.target_um
+    return float(study.measured_um.max()) if wanted is None else wanted
+
+
+def _in_words(study: Study, experiment: Experiment, change: Change, stand: Stand | None) -> str:
+    what = f'the same passes {change.words}'
+    if stand is not None:
+        # Its words tell the distance already.
+        otherwise = '' if change.kind == 'standoff' else change.words
+        what = f'{stand.words}; {otherwise}'.removesuffix('; ')
+    return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
+
+
+def _chance(rivals: Rivals, apart: Sequence[_Pair]) -> float:
+    """Probability that the true effect is left alone, on average over which it is."""
+    left = {k: 1.0 for k, rival in enumerate(rivals.found) if rival.effect is not None}
     for pair in apart:
-        for one in (pair.shown, pair.imitator):
-            nearest[one] = min(nearest.get(one, CERTAIN), pair.imitation.separation)
-    return float(np.mean(list(nearest.values()))) * (1.0 - WORTH_OF_COST * change.cost)
+        if pair.shown in left:
+            separation = np.array(pair.imitation.separation)
+            left[pair.shown] *= float(chance_of_settling(separation))
+    return float(np.mean(list(left.values())))
 
 
 def _with_readings(

@@ -9,11 +9,15 @@ from scipy.linalg import cholesky, solve_triangular
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import (
     FIELD_SHARE,
+    FOOTPRINT,
+    FOOTPRINT_SHARE,
     LAW_LENGTH,
+    LENGTHS,
     UNKNOWN,
 )
 from paint_deposition.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.diagnosis.separation import Predicted
+from paint_deposition.diagnosis.smooth_laws import footprint_along, footprint_kinds
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -25,7 +29,7 @@ from paint_deposition.readings.covariates import Covariate, Rays
 
 # Effects that compete at the most.
 MOST_RIVALS = 6
-# Size of a shapeless cause's amplitudes, in its typical ones.
+# Standard deviation of a shapeless cause's amplitudes, in its typical ones.
 LARGE = 3.0
 # Smooth functions are spanned by their values at knots over this many standard deviations of the
 # covariate to either side.
@@ -39,7 +43,7 @@ class Rival:
     """One explanation that competes.
 
     Attributes:
-        name: effect id, or ``UNKNOWN``.
+        name: effect id, ``UNKNOWN`` or ``FOOTPRINT``.
         effect: as fitted, or neutral in the shape that fits best; None for a shapeless cause.
         along: covariates over which the law may be off, or of which the shapeless cause is a
             function.
@@ -76,6 +80,7 @@ class Rivals:
             fit: where to linearise.
             names: for each the effect, or the covariate of a shapeless cause.
         """
+        rays = study.rays(fit.model)
         values = study.covariates(fit.model)
         scales = {c.name: (float(c.values.mean()), float(c.values.std())) for c in values
                   if c.varies}  # fmt: skip
@@ -85,7 +90,7 @@ class Rivals:
         for name, effect in names.items():
             options = _options(name, effect, fit.model, scales)
             fits = [
-                empty.predicted(option, study.forward, study.sigma_um, values)
+                empty.predicted(option, study.forward, study.sigma_um, rays)
                 .fitted(null.columns, null.raw)
                 .at_least_typical()
                 for option in options
@@ -122,13 +127,9 @@ class Rivals:
         self, campaign: Campaign, forward: Forward, sigma_um: np.ndarray
     ) -> tuple[Predicted, ...]:
         """What each explanation, as found, predicts for other readings."""
-        values = [_covariates(experiment, self.fit) for experiment in campaign.experiments]
-        joined = [
-            Covariate(same[0].name, np.concatenate([part.values for part in same]))
-            for same in zip(*values, strict=True)
-        ]
+        rays = [_thinned(experiment, self.fit) for experiment in campaign.experiments]
         return tuple(
-            replace(self.predicted(rival, forward, sigma_um, joined), amounts=here.amounts)
+            replace(self.predicted(rival, forward, sigma_um, rays), amounts=here.amounts)
             for rival, here in zip(self.found, self.here, strict=True)
         )
 
@@ -137,9 +138,18 @@ class Rivals:
         rival: Rival,
         forward: Forward,
         sigma_um: np.ndarray,
-        values: Sequence[Covariate],
+        rays: Sequence[Rays],
     ) -> Predicted:
         """What an explanation predicts, its amounts being 0."""
+        if rival.name == FOOTPRINT:
+            (*_, every) = footprint_kinds()
+            basis = footprint_along(rays, self.fit.model.planar)
+            random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], every)
+            return _shapeless(random.change_um / sigma_um[:, np.newaxis])
+        values = (
+            Covariate(same[0].name, np.concatenate([part.values for part in same]))
+            for same in zip(*(part.covariates for part in rays), strict=True)
+        )
         along = {c.name: self._functions(c) for c in values if c.name in rival.along}
         functions = [along[name] / np.sqrt(len(along)) for name in rival.along if name in along]
         count = len(sigma_um)
@@ -149,9 +159,7 @@ class Rivals:
             none = np.zeros(len(law.low))
             return Predicted(law.columns, smooth, none, law.low, law.high)
         film = forward.predict_um(self.fit.model)
-        columns = (FIELD_SHARE * film / sigma_um)[:, np.newaxis] * smooth
-        most = np.full(columns.shape[1], LARGE)
-        return Predicted(columns, np.empty((count, 0)), 0.0 * most, -most, most)
+        return _shapeless((FIELD_SHARE * film / sigma_um)[:, np.newaxis] * smooth)
 
     def _functions(self, covariate: Covariate) -> np.ndarray:
         """(P, n) smooth random functions of a covariate, of unit variance within its range."""
@@ -166,14 +174,16 @@ def rivals_of(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> Riva
     """What competes for a diagnosis: None if nothing does.
 
     These are the members of the first group that has several; else, where nothing is accepted,
-    the leading effects and the shapeless cause, if that is what the verdict names.
+    the leading effects and the shapeless cause, if that is what the verdict names. A pattern that
+    is no two Gaussians may always stand in their place.
     """
     names = _competing(diagnosis, library)
-    wanted: dict[str, type[Effect] | str] = {n: library[n] for n in names}
-    if diagnosis.unknown is not None and wanted:
-        wanted[UNKNOWN] = diagnosis.unknown.covariate
-    if len(wanted) < 2:
+    if not names:
         return None
+    wanted: dict[str, type[Effect] | str] = {n: library[n] for n in names}
+    if diagnosis.unknown is not None and diagnosis.unknown.kind != FOOTPRINT:
+        wanted[UNKNOWN] = diagnosis.unknown.covariate
+    wanted[FOOTPRINT] = FOOTPRINT
     rivals = Rivals.of(diagnosis.study, diagnosis.history[-1].fit, wanted)
     return rivals if len(rivals.names) > 1 else None
 
@@ -198,6 +208,8 @@ def _options(
     scales: Mapping[str, tuple[float, float]],
 ) -> list[Rival]:
     """The shapes in which a cause explains."""
+    if name == FOOTPRINT:
+        return [Rival(name, None, ())]
     if isinstance(effect, str):
         return [Rival(name, None, (effect,))] if effect in scales else []
     own = tuple(c for c in effect.covariates if c in scales)
@@ -210,12 +222,19 @@ def _left(null: NullModel, predicted: Predicted) -> float:
     return float(np.sum(null.whiten((null.raw - predicted.change)[:, np.newaxis]) ** 2))
 
 
-def _covariates(experiment: Experiment, fit: Fit) -> list[Covariate]:
+def _shapeless(columns: np.ndarray) -> Predicted:
+    """What a shapeless cause predicts with directions (P, n) over the noise."""
+    most = np.full(columns.shape[1], np.inf)
+    return Predicted(
+        columns, np.empty((len(columns), 0)), 0.0 * columns[0], -most, most, LARGE**-2.0
+    )  # fmt: skip
+
+
+def _thinned(experiment: Experiment, fit: Fit) -> Rays:
     path = experiment.path
     thin = path.select(slice(None, None, THINNED))
     thin = thin.with_(dwell_s=THINNED * thin.dwell_s)
-    thinned = replace(experiment, path=thin)
-    return Rays.of(thinned, fit.model).covariates
+    return Rays.of(replace(experiment, path=thin), fit.model)
 
 
 def _bell(at: np.ndarray, knots: np.ndarray) -> np.ndarray:

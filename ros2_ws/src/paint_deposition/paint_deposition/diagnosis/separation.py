@@ -34,6 +34,8 @@ class Predicted:
             of unit variance.
         amounts: (m,) amplitudes as the readings at hand suggest them.
         low, high: (m,) bounds of the amplitudes.
+        precision: of the amplitudes before the readings: those of a law are free within their
+            bounds, those of a shapeless cause are not.
     """
 
     law: np.ndarray
@@ -41,6 +43,7 @@ class Predicted:
     amounts: np.ndarray
     low: np.ndarray
     high: np.ndarray
+    precision: float = ALMOST_FREE
 
     @property
     def change(self) -> np.ndarray:
@@ -57,7 +60,7 @@ class Predicted:
         k, design = free.shape[1], np.hstack([free, self.law])
         precision = design.T @ design
         precision[np.diag_indices(len(precision))] += np.where(
-            np.arange(len(precision)) < k, 1.0, ALMOST_FREE
+            np.arange(len(precision)) < k, 1.0, self.precision
         )
         lower = cholesky(precision, lower=True)
         target = solve_triangular(lower, design.T @ readings, lower=True)
@@ -134,7 +137,7 @@ def imitate(free: np.ndarray, shown: Predicted, imitator: Predicted) -> Imitatio
         ends = np.cumsum([block.shape[1] for block in blocks])
         precision = directions.T @ directions
         loose = np.arange(len(precision)) >= ends[2]
-        precision[np.diag_indices(len(precision))] += np.where(loose, ALMOST_FREE, 1.0)
+        precision[np.diag_indices(len(precision))] += np.where(loose, imitator.precision, 1.0)
         factor = cho_factor(precision)
         mean = cho_solve(factor, directions.T @ change)
         parts = np.split(mean, ends[:-1])
@@ -145,7 +148,8 @@ def imitate(free: np.ndarray, shown: Predicted, imitator: Predicted) -> Imitatio
             break
         stiffness = stiffness * np.maximum(excess, 1.0)
     left = change - directions @ mean
-    drawn = [parts[0], parts[1] / stiffness[0], parts[2] / stiffness[1]]
+    of_imitator = np.sqrt(imitator.precision) * parts[3]
+    drawn = [parts[0], parts[1] / stiffness[0], parts[2] / stiffness[1], of_imitator]
     square = float(left @ left) + sum(float(part @ part) for part in drawn)
     covariance = cho_solve(factor, np.eye(len(precision)))
     return Imitation(imitator.amounts, inside, stiffness, mean, covariance, float(np.sqrt(square)))

@@ -4,7 +4,7 @@ A law is a random function with a length of correlation, given by its values at 
 a covariate, a map over a part, or a deviation of the footprint.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -18,6 +18,7 @@ from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
 from paint_deposition.fitting.smooth_fields import covariance_root, smooth, with_edges
 from paint_deposition.fitting.study import Study
+from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.readings.covariates import Rays
 
 # Knots of a curve; time is resolved more finely, as pumps pulsate.
@@ -223,14 +224,21 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
 
 
 def footprint_basis(study: Study, model: DepositionModel) -> Basis:
+    """Deviations of the pattern from eq. (1) at the points of a study."""
+    return footprint_along(study.rays(model), model.planar)
+
+
+def footprint_along(parts: Sequence[Rays], planar: PlanarPattern) -> Basis:
     """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
 
     Each harmonic of the angle is a random function of the radius by itself.
+
+    Args:
+        parts: rays of each part. planar: the pattern that they come from.
     """
-    planar = model.planar
     reach = planar.r_m + WIDTHS * max(planar.sigma1_m, planar.sigma2_m)
     films = []
-    for rays in study.rays(model):
+    for rays in parts:
         near = hat_weights(np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1), RADII)
         near *= rays.share[:, :, np.newaxis]
         films.append(
@@ -239,7 +247,7 @@ def footprint_basis(study: Study, model: DepositionModel) -> Basis:
     film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
     radius, wave = np.indices((RADII, WAVES))
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
-    change = film_um.transpose(1, 2, 0).reshape(len(study), -1)
+    change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
 
 

@@ -42,7 +42,7 @@ class Change:
     @property
     def keys(self) -> tuple[str, ...]:
         """Of the single changes."""
-        return tuple(change.key for change in self.both) or (self.key,)
+        return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
 
 
 def together(first: Change, second: Change) -> Change:
@@ -145,7 +145,7 @@ def _open_longer(path: SprayPath) -> SprayPath:
 
 
 def _passes_turned(experiment: Experiment) -> Experiment | None:
-    """The same passes turned by 90 deg and fitted to the part's other side, axes square to it."""
+    """The same passes turned by 90 deg and fitted to the part's other side, at the same speed."""
     surface, path = experiment.surface, experiment.path
     outward = surface.outward
     across = across_axis(outward, surface.down)
@@ -170,7 +170,9 @@ def _passes_turned(experiment: Experiment) -> Experiment | None:
     changed = path.with_(
         position_m=position, rotation=quarter @ path.rotation, velocity_m_per_s=velocity
     )
-    return replace(experiment, path=changed)
+    # Passes that are longer or shorter now take as much more or less time.
+    run = np.abs(path.velocity_m_per_s @ frame)[spraying].sum(axis=0)[:2]
+    return replace(experiment, path=_speed(1.0 / share[np.argmax(run)])(changed))
 
 
 def _upside_down(experiment: Experiment) -> Experiment:
@@ -185,6 +187,7 @@ def _without(setting: str) -> Callable[[Experiment], Experiment]:
     return lambda experiment: replace(experiment, switched_off=experiment.switched_off | {setting})
 
 
+AS_BEFORE = Change('', '', 0.0, lambda experiment: experiment, '')
 MENU = (
     Change(
         'roll_180',
@@ -215,7 +218,7 @@ MENU = (
         _on_path(_open_longer),
         'trigger',
     ),
-    Change('turned', 'turned by 90 deg', 2.0, _passes_turned, 'passes'),
+    Change('turned', 'turned by 90 deg together with the gun', 2.0, _passes_turned, 'passes'),
     Change(
         'upside_down',
         'with the part hung upside down and the passes turned with it',

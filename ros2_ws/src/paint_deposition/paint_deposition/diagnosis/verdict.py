@@ -22,7 +22,7 @@ from paint_deposition.fitting.study import Study
 from paint_deposition.readings.residuals import root_mean_square
 
 if TYPE_CHECKING:
-    from paint_deposition.diagnosis.next_experiment import Place, Spray
+    from paint_deposition.diagnosis.proposals import Place, Spray
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.comparison.comparison import Comparison, SideBySide
 from paint_deposition.comparison.profiles import Profile, profiles_of
-from paint_deposition.diagnosis.next_experiment import Place, Spray
+from paint_deposition.diagnosis.proposals import Place, Spray
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.diagnosis.explanations import UNKNOWN
-from paint_deposition.diagnosis.next_experiment import Spray
+from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.diagnosis.proposals import Spray
 from paint_deposition.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
@@ -70,18 +70,20 @@ def effect_name(effect_id: str) -> str:
 
 def competing(spray: Spray) -> str:
     """The explanations that a spray is to tell apart."""
-    names = [name for name in spray.separates if name != UNKNOWN]
-    found = [effect_name(name) for name in names]
-    return joined(found + ['a cause outside the library'] * (len(names) < len(spray.separates)))
+    shapeless = {UNKNOWN: 'a cause outside the library', FOOTPRINT: 'another shape of the pattern'}
+    return joined([shapeless.get(name) or effect_name(name) for name in spray.separates])
 
 
 def apart_words(spray: Spray) -> str:
-    """How far apart the explanations are now, and with a spray."""
+    """How far apart the explanations are now, and with a spray; the chance that one is left."""
     several = 'the two least apart of ' if len(spray.separates) > 2 else ''
-    return (
+    words = (
         f'{several}{competing(spray)} then differ by {spray.separation:.1f} standard deviations, '
         f'now by {spray.now:.1f}'
     )
+    if spray.chance == spray.chance:
+        words += f'; the chance that one is left alone is {percent(spray.chance)}'
+    return '; '.join(filter(None, [words, spray.film_words]))
 
 
 def is_learned(effect_id: str) -> bool:

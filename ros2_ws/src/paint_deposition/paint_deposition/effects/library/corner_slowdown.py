@@ -7,13 +7,16 @@ import numpy as np
 from paint_deposition.effects.base import Effect, PathContext, parameter
 from paint_deposition.motion.path import SprayPath
 
+# A gun that is slower than this stands, and its log trembles [m/s].
+STANDING_M_PER_S = 0.003
+
 
 class CornerSlowdown(Effect):
     """Commanded poses were recorded: the real gun brakes toward each turn of the path.
 
     Acts on the motion: dwell times 1 + a exp(-s / l), s the distance along the path to the
     nearest turn, begin or end. Positive a: more paint near the turns. It is absent where the
-    recorded poses are the real ones.
+    recorded poses are the real ones, and where the gun stands still.
     """
 
     id = 'corner_slowdown'
@@ -40,4 +43,5 @@ class CornerSlowdown(Effect):
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         to_nearest_m = np.minimum(path.from_turn_m, path.to_turn_m)
         slower = 1.0 + self.gain * np.exp(-to_nearest_m / self.length_m)
-        return path.with_(dwell_s=path.dwell_s * slower)
+        moving = path.speed_m_per_s > STANDING_M_PER_S
+        return path.with_(dwell_s=path.dwell_s * np.where(moving, slower, 1.0))
