@@ -31,6 +31,13 @@ def main() -> None:
         keep(Image.open(folder / 'index/uniformity.png'), 'uniformity.png')
         paint('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
+        paint('plan', '--mesh', SAMPLES / 'door.stl', '--model',
+              folder / 'diagnosis/model_before.yaml', '--target-um', 20,
+              '-o', folder / 'plan')  # fmt: skip
+        paint('improve', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+              folder / 'plan/trajectory', '--model', folder / 'diagnosis/model.yaml',
+              '--target-um', 20, '-o', folder / 'better')  # fmt: skip
+        keep(Image.open(folder / 'better/improvement.png'), 'improve.png')
         first_page(folder / 'diagnosis/report.html', folder / 'report.png')
         if (folder / 'report.png').exists():
             keep(Image.open(folder / 'report.png'), 'report.png')

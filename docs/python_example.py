@@ -29,6 +29,11 @@ pd.plot(index, ax=plt.figure().gca())
 plan = pd.plan(door, calibration.model, target_um=20.0)
 print(plan)
 
+# %% A more even film along the same path
+better = pd.improve(door, plan.trajectory, calibration.model, speed_max_m_per_s=0.6)
+print(better)
+print(*(change.sentence for change in better.changes), sep='\n')
+
 # %% Compare a model with gauge readings
 campaign = pd.read_campaign(samples / 'measured_door/campaign.yaml')
 comparison = pd.compare(campaign)

@@ -20,7 +20,7 @@ SCHEMAS = Path(paint_deposition.__file__).parent / 'schemas'
 KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
-    'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
+    'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
 }  # fmt: skip
 
 

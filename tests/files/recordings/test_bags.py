@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,11 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.message_definitions import Definition, standard
+from paint_deposition.files.recordings.message_definitions import (
+    STATE_TYPE,
+    Definition,
+    standard,
+)
 from paint_deposition.motion.trajectory import Trajectory
 
 
@@ -224,15 +229,18 @@ def test_an_existing_folder_is_not_overwritten(tmp_path):
         write_pose_bag(tmp_path / 'pass', straight_pass(5))
 
 
-def test_a_bool_trigger_cannot_hold_half_a_flow(tmp_path):
+def test_flows_of_their_own_are_written_as_states_and_read_back(tmp_path):
     written = straight_pass(5)
-    half = Trajectory(
-        written.stamps_ns, written.positions_m, written.quaternions_xyzw, 'door',
-        written.trigger_stamps_ns, np.array([0.5, 0.0]),
+    half = replace(
+        written, stamps_ns=written.stamps_ns + 10**9,
+        trigger_stamps_ns=written.trigger_stamps_ns + 10**9, trigger_flow=np.array([0.5, 0.0]),
     )  # fmt: skip
-    with pytest.raises(RecordingError, match=r'flow 0\.5'):
-        write_pose_bag(tmp_path / 'pass', half)
-    assert not (tmp_path / 'pass').exists()
+    bag = write_pose_bag(tmp_path / 'half', half)
+    read = read_trajectory(bag, state_topic='/atomizer/state')
+    np.testing.assert_array_equal(read.trigger_flow, half.trigger_flow)
+    np.testing.assert_array_equal(read.trigger_stamps_ns, half.trigger_stamps_ns)
+    with open_bag(bag) as opened:
+        assert opened.find('/atomizer/state').type == STATE_TYPE
 
 
 def test_raw_messages_of_a_ros1_bag_are_cdr(shared_data):

@@ -1,6 +1,7 @@
 """The public names: what a script or a notebook needs."""
 
 from paint_deposition.api.geometry import GunOnPart, look_at
+from paint_deposition.api.improvement import improve
 from paint_deposition.api.inference import calibrate, compare, compare_models, diagnose, refit
 from paint_deposition.api.pictures import plot
 from paint_deposition.api.planning import plan, recommend
@@ -19,6 +20,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.readings.campaign import Campaign
@@ -32,6 +34,7 @@ __all__ = [
     'Diagnosis',
     'Film',
     'GunOnPart',
+    'Improvement',
     'PaintError',
     'Plan',
     'Readings',
@@ -43,6 +46,7 @@ __all__ = [
     'compare',
     'compare_models',
     'diagnose',
+    'improve',
     'look_at',
     'plan',
     'plot',

@@ -8,6 +8,7 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.optimised_plan import optimised
 from paint_deposition.planning.plan import Plan, PlanRequest
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.recommendation import Recommendation
@@ -33,6 +34,7 @@ def plan(
     model: DepositionModel | None = None,
     *,
     frame_id: str = 'part',
+    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> Plan:
@@ -42,6 +44,8 @@ def plan(
         surface: the part.
         model: what the gun sprays; default: a 50 mm bell.
         frame_id: of the planned poses.
+        optimise: choose number and place of the passes and the speeds along them for an even film
+            and little paint; else even passes at one speed.
         progress: called with what is being done and the share of it that is done, 0 to 1.
         wanted: the fields of ``planning.plan.PlanRequest``; ``speed_m_per_s`` or ``target_um`` at
             least.
@@ -49,4 +53,5 @@ def plan(
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    return planned(surface, model or DepositionModel(), PlanRequest(**wanted), frame_id, progress)
+    plain = planned(surface, model or DepositionModel(), PlanRequest(**wanted), frame_id, progress)
+    return optimised(plain, progress) if optimise else plain

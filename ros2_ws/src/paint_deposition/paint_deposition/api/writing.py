@@ -18,20 +18,26 @@ from paint_deposition.files.provenance import origin
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.study import Study
 from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.planning.trade_off import Point
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.pictures.calibration import write_calibration_pictures
 from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.report.pictures.improvement import write_improvement_picture
 from paint_deposition.report.pictures.profiles import write_comparison_picture
+from paint_deposition.report.pictures.trade_off import write_trade_off
 from paint_deposition.report.pictures.uniformity import write_uniformity
 from paint_deposition.results.calibration import write_calibration
 from paint_deposition.results.film import write_film
 from paint_deposition.results.fitted_model import write_fitted
+from paint_deposition.results.improvement import write_improvement
 from paint_deposition.results.plan import write_plan
 from paint_deposition.results.residual_mesh import file_name, write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
+from paint_deposition.results.trade_off import write_trade_off_table
 
 PNG = 'png'
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
@@ -47,11 +53,13 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         folder: where to; made if it is not there.
         start: of a calibration or a diagnosis, the ``ModelFile`` that it started from: its name,
             history and uncertainties are carried on.
-        made_from: of a film, a plan or a recommendation, more to say in its figures, such as the
-            files used.
+        made_from: of a film, a plan, an improvement or a recommendation, more to say in its
+            figures, such as the files used.
         model: of a recommendation, what it was computed with.
-        part_pose, frame_id: of a plan, where the part stands in the robot's frame, [x y z qx qy qz
-            qw], and the name of that frame; its files have their poses in that frame then.
+        part_pose, frame_id: of a plan or an improvement, where the part stands in the robot's
+            frame, [x y z qx qy qz qw], and the name of that frame; its files have their poses in
+            that frame then.
+        trade_off: of these, ``Point``s of other weights of the paint, for a table and a picture.
 
     Returns:
         The paths written.
@@ -145,6 +153,7 @@ def _(
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = PNG,
+    trade_off: Sequence[Point] = (),
 ) -> list[Path]:
     about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
     about |= _provenance(result.model, _files(about))
@@ -154,7 +163,38 @@ def _(
         Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,
     )  # fmt: skip
-    return [*files, picture]
+    plain = result.plain or result
+    return [*files, picture, *_write_trade_off(Path(folder), plain.point, trade_off, pictures)]
+
+
+@write.register
+def _(
+    result: Improvement,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    frame_id: str = ROBOT_FRAME,
+    pictures: str = PNG,
+    trade_off: Sequence[Point] = (),
+) -> list[Path]:
+    about = {'notes': (*result.surface.notes, *result.given.notes)} | dict(made_from or {})
+    about |= _provenance(result.model, _files(about))
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    files = write_improvement(folder, result, about, part)
+    files.append(write_improvement_picture(Path(folder) / f'improvement.{pictures}', result))
+    return files + _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
+
+
+def _write_trade_off(
+    folder: Path, given: Point, points: Sequence[Point], pictures: str
+) -> list[Path]:
+    """Table and picture, where other weights were tried."""
+    if not points:
+        return []
+    return [
+        write_trade_off_table(folder / 'pareto.csv', points),
+        write_trade_off(folder / f'pareto.{pictures}', given, points),
+    ]
 
 
 def _provenance(

@@ -22,6 +22,7 @@ COMMANDS = {
     'calibrate': ('planning', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
+    'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),

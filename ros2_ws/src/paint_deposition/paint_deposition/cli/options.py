@@ -47,6 +47,11 @@ PICTURES = click.option(
     '--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png', show_default=True,
     help='Format of the pictures.',
 )  # fmt: skip
+PARETO = click.option(
+    '--pareto', is_flag=True,
+    help='Also weigh paint from nothing to heavily: pareto.csv and a picture of evenness over '
+    'paint.',
+)  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
 

@@ -21,6 +21,7 @@ from paint_deposition.cli.options import (
     MODEL,
     NOT_NEGATIVE,
     NUMBER,
+    PARETO,
     PART_POSE,
     PICTURES,
     POSITIVE,
@@ -38,6 +39,7 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
+from paint_deposition.planning.trade_off import PAINT_WEIGHTS, Point
 
 if TYPE_CHECKING:
     import numpy as np
@@ -192,6 +194,29 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 )  # fmt: skip
 @click.option('--acceleration', 'acceleration_m_per_s2', default=2.0, show_default=True,
               type=POSITIVE, help='Of the robot [m/s2].')  # fmt: skip
+@click.option(
+    '--optimise', is_flag=True,
+    help='Choose number and place of the passes and the speeds along them for an even film and '
+    'little paint; default: even passes at one speed.',
+)  # fmt: skip
+@click.option(
+    '--paint-weight', type=NOT_NEGATIVE, default=5e-3, show_default=True,
+    help='With --optimise: what paint is worth, in units of sigma_n squared, for as much as the '
+    'film on the part holds.',
+)  # fmt: skip
+@click.option(
+    '--time-weight', type=NOT_NEGATIVE, default=5e-3, show_default=True,
+    help='With --optimise: the same for the time of the plan without it.',
+)  # fmt: skip
+@click.option(
+    '--speed-min', 'speed_min_m_per_s', type=POSITIVE, default=0.1, show_default=True,
+    help='With --optimise: least speed while spraying [m/s].',
+)  # fmt: skip
+@click.option(
+    '--speed-max', 'speed_max_m_per_s', type=POSITIVE, default=1.0, show_default=True,
+    help='With --optimise: greatest speed while spraying [m/s].',
+)  # fmt: skip
+@PARETO
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
 @direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @MESH_SCALE
@@ -215,11 +240,14 @@ def plan_command(
     max_edge_length_m: float,
     part_pose: list[float] | None,
     frame_id: str | None,
+    pareto: bool,
     pictures: str,
     as_json: bool,
     **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
+    if pareto and not wanted['optimise']:
+        raise click.UsageError('--pareto weighs paint in an optimised plan; add --optimise')
     chosen = chosen_model(model_file)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as tell:
@@ -235,10 +263,19 @@ def plan_command(
             'frame_id': frame_id,
             'part_pose': part_pose,
         }
+        others: list[Point] = []
+        if pareto:
+            others = [
+                pd.plan(
+                    surface, chosen.model, progress=tell, travel_rad=math.radians(travel_deg),
+                    **wanted | {'paint_weight': weight},
+                ).point
+                for weight in PAINT_WEIGHTS
+            ]  # fmt: skip
         tell('writing')
         files = write_results(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
-            pictures=pictures,
+            pictures=pictures, trade_off=others,
         )  # fmt: skip
     say_all('note', surface.notes)
     lines = [*_plan_lines(result), *file_lines(files)]
@@ -257,3 +294,10 @@ def _plan_lines(result: pd.Plan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
+    if result.plain:
+        plain, paint = result.plain, result.plain.statistics
+        yield (
+            f'without --optimise: {plain.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
+            f'of {film.emitted_volume_cm3:.1f} cm3, capture fraction '
+            f'{100 * paint.capture_fraction:.0f} %'
+        )

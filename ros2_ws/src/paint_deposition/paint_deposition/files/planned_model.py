@@ -18,6 +18,7 @@ from paint_deposition.files.recordings.bag_files import custom_data
 
 MODEL_FILE = 'model.yaml'
 PLAN_FILE = 'plan.json'
+IMPROVEMENT_FILE = 'improvement.json'
 # The key of the digest in a bag's custom data and in plan.json.
 DIGEST = 'model_sha256'
 IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
@@ -63,9 +64,15 @@ def _told_digest(motion: Path, folder: Path) -> str:
             return ''
         return found[1] if found else ''
     if motion.suffix == '.csv':
-        try:
-            told = json.loads((folder / PLAN_FILE).read_text(encoding='utf-8'))
-        except (OSError, ValueError):
-            return ''
-        return str(told.get(DIGEST, '')) if motion.name == 'passes.csv' else ''
+        return _figures_digest(folder) if motion.name == 'passes.csv' else ''
     return custom_data(folder).get(DIGEST, '')
+
+
+def _figures_digest(folder: Path) -> str:
+    for name in (PLAN_FILE, IMPROVEMENT_FILE):
+        try:
+            told = json.loads((folder / name).read_text(encoding='utf-8'))
+        except (OSError, ValueError):
+            continue
+        return str(told.get(DIGEST, ''))
+    return ''

@@ -134,7 +134,10 @@ class FilmIntegrator:
 
     def add(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along the path; ``progress`` is called with the sub-steps done so far."""
-        path = self._sprayed(path)
+        self.add_sprayed(self.sprayed(path)[0], progress)
+
+    def add_sprayed(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
+        """Paint along a path, or a part of one, that the effects on it have been applied to."""
         self.emitted_cm3 += self.model.planar.K1_cm3_per_s * path.spraying_time_s
         for start in range(0, len(path), BATCH):
             self.paint(self._steps(path.select(slice(start, start + BATCH))))
@@ -143,7 +146,7 @@ class FilmIntegrator:
 
     def steps(self, path: SprayPath) -> Steps:
         """A path prepared for this model's effects and projection, to be painted repeatedly."""
-        return self._steps(self._sprayed(path))
+        return self._steps(self.sprayed(path)[0])
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""
@@ -162,10 +165,12 @@ class FilmIntegrator:
         self._run(True, steps, term_constants(self.model), none, none, terms)
         return self._in_order(terms)
 
-    def _sprayed(self, path: SprayPath) -> SprayPath:
+    def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
+        """What is really sprayed of a path, effects on it applied, and the rows that it is."""
         for effect in self._effects:
             path = effect.on_path(path, self._context)
-        return path.select(path.flow * path.dwell_s != 0.0)
+        rows = np.flatnonzero(path.flow * path.dwell_s)
+        return path.select(rows), rows
 
     def _steps(self, path: SprayPath) -> Steps:
         visible, sight = self._lines_of_sight(emission_points_m(self.model, path))

@@ -46,6 +46,7 @@ class Move:
         via_m: (3,) point that a circular move passes through, None for straight ones.
         switches: of the gun during the move, in the order written.
         line: where it stands in its file, 0 for none.
+        flow: of the gun while it is on, relative to the calibrated one.
     """
 
     position_m: np.ndarray
@@ -55,6 +56,7 @@ class Move:
     via_m: np.ndarray | None = None
     switches: tuple[GunSwitch, ...] = ()
     line: int = 0
+    flow: float = 1.0
 
 
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
@@ -71,7 +73,7 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
         raise RecordingError('there is a single move; give a program that travels')
     first = moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
-    changes: list[tuple[float, bool]] = []
+    changes: list[tuple[float, float]] = []
     for before, move in pairwise(moves):
         if not move.speed_m_per_s > 0.0:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
@@ -84,16 +86,18 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
             )
-        changes.append((times_s[-1], move.spraying))
-        changes += [(times_s[-1] + at * duration_s, on) for at, on in _switches(move, length_m)]
+        changes.append((times_s[-1], move.spraying * move.flow))
+        changes += [
+            (times_s[-1] + at * duration_s, on * move.flow) for at, on in _switches(move, length_m)
+        ]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
         positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
         times_s += (times_s[-1] + share * duration_s).tolist()
     flow = {}
-    if gun_known or any(on for _, on in changes):
-        flow = {round(time_s * 1e9): float(on) for time_s, on in changes}
+    if gun_known or any(flow for _, flow in changes):
+        flow = {round(time_s * 1e9): float(now) for time_s, now in changes}
     return Trajectory(
         np.array([round(time_s * 1e9) for time_s in times_s]),
         np.array(positions),

@@ -34,6 +34,11 @@ class LineFilms:
         finest_m: scale on which the film changes across a pass [m].
         beyond_m: lines are laid this far past the part's edges [m].
         progress: called with the share done.
+
+    Attributes:
+        lines_m: (L,) the lines, and low_m and high_m their ends [m].
+        rows: (V,) vertices of the part at which films are kept.
+        films_um: (L, V) film of each pass. sprayed_m: (L,) its travel with the gun open.
     """
 
     def __init__(
@@ -46,10 +51,11 @@ class LineFilms:
         beyond_m: float,
         progress: Callable[[float], None] = lambda share: None,
     ) -> None:
-        chosen = _spread(surface.vertex_areas_m2[surface_map.painted])
+        chosen = spread(surface.vertex_areas_m2[surface_map.painted])
         rows = np.flatnonzero(surface_map.painted)[chosen]
         points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
         low, high = surface_map.extent_m[1]
+        self.rows, self.surface_map, self.beyond_m = rows, surface_map, beyond_m
         self.low_m, self.high_m = low - beyond_m, high + beyond_m
         step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
         self.lines_m = np.linspace(
@@ -60,6 +66,7 @@ class LineFilms:
         # Slower poses would be gaps, at which the gun is off.
         rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
         self.films_um = np.empty((len(self.lines_m), len(rows)))
+        self.sprayed_m = np.empty(len(self.lines_m))
         for k, across in enumerate(self.lines_m):
             planned = plan_pass(surface_map, float(across), style)
             motion = trajectory_of((planned,), style, rate_hz=rate)
@@ -67,6 +74,7 @@ class LineFilms:
             integrator.reset()
             integrator.add(path)
             self.films_um[k] = integrator.raw_um
+            self.sprayed_m[k] = planned.sprayed_m
             progress((k + 1) / len(self.lines_m))
         # Cubic splines through the lines' films are linear in them: one matrix for all points.
         self._basis = CubicSpline(self.lines_m, np.eye(len(self.lines_m)))
@@ -81,7 +89,7 @@ class LineFilms:
         return film.std(axis=-1) / film.mean(axis=-1)
 
 
-def _spread(area_m2: np.ndarray) -> np.ndarray:
+def spread(area_m2: np.ndarray) -> np.ndarray:
     """Rows that stand for equal shares of the area, MOST_POINTS at most."""
     reached = np.cumsum(area_m2)
     count = min(MOST_POINTS, 4 * len(area_m2))

@@ -14,16 +14,18 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.pass_films import LineFilms
-from paint_deposition.planning.pass_motion import trajectory_of
+from paint_deposition.planning.pass_motion import planned_moves, trajectory_of
 from paint_deposition.planning.pass_placement import Placing, centred, place_passes
 from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_passes
 from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.trade_off import Point
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
@@ -53,6 +55,10 @@ class PlanRequest:
             orientation either way.
         travel_rad: direction of the first pass in the tool's x-y frame.
         outward: (3,) from the part to the gun; default: the mean normal.
+        paint_weight, time_weight: what an optimised plan gives, in units of sigma_n squared, for
+            the paint sprayed over that wanted on the part, and for the cycle time over that of the
+            plain plan.
+        speed_min_m_per_s, speed_max_m_per_s: of an optimised plan while spraying.
     """
 
     direction: str = 'horizontal'
@@ -69,6 +75,10 @@ class PlanRequest:
     one_way: bool = False
     travel_rad: float = 0.0
     outward: tuple[float, float, float] | None = None
+    paint_weight: float = 5e-3
+    time_weight: float = 5e-3
+    speed_min_m_per_s: float = 0.1
+    speed_max_m_per_s: float = 1.0
 
     def for_plane(self, width_m: float, length_m: float) -> Request:
         """The same for a plane of the part's size.
@@ -96,6 +106,9 @@ class Plan:
         plane: recommendation for a plane of the part's size.
         plane_on_part: its passes laid about the middle of this part.
         model: what the gun sprays.
+        line_films: films of single passes, for other placings.
+        moves: of a robot program along the passes.
+        plain: of an optimised plan, the one that it began with; else None.
         cycle_time_s: from the first pose to the last.
     """
 
@@ -112,6 +125,15 @@ class Plan:
     plane: Recommendation
     plane_on_part: Placing
     model: DepositionModel
+    line_films: LineFilms
+    moves: tuple[Move, ...]
+    plain: 'Plan | None' = None
+
+    @property
+    def mean_um(self) -> float:
+        """Mean film on the painted side, bare metal included [um]."""
+        area = self.surface.vertex_areas_m2[self.painted]
+        return evenness(self.film_um[self.painted], area)[0]
 
     @property
     def cycle_time_s(self) -> float:
@@ -126,15 +148,38 @@ class Plan:
     @property
     def sentence(self) -> str:
         """The plan in a sentence."""
+        speeds = f'{self.style.speed_m_per_s:.3g} m/s'
+        if self.plain:
+            sprayed = [move.speed_m_per_s for move in self.moves if move.spraying]
+            speeds = f'{min(sprayed):.3g} to {max(sprayed):.3g} m/s'
         return (
             f'{self.placing.passes} {self.request.direction} passes at '
-            f'{self.placing.index_m * 1e3:.0f} mm, {self.style.speed_m_per_s:.3g} m/s: mean film '
+            f'{self.placing.index_m * 1e3:.0f} mm, {speeds}: mean film '
             f'{self.statistics.mean_um:.1f} µm, sigma_n {self.sigma_n * 100:.1f} %, '
             f'{self.cycle_time_s:.1f} s'
         )
 
     def __repr__(self) -> str:
         return f'Plan({self.sentence})'
+
+    @property
+    def point(self) -> Point:
+        """The plan in a trade-off."""
+        return Point(
+            self.request.paint_weight, self.sigma_n, self.mean_um,
+            self.statistics.emitted_volume_cm3, self.cycle_time_s, self.placing.passes,
+        )  # fmt: skip
+
+    def brief(self) -> dict[str, Any]:
+        """The figures by which plans are compared."""
+        return {
+            'passes': self.placing.passes,
+            'sigma_n': self.sigma_n,
+            'mean_um': self.mean_um,
+            'paint_cm3': self.statistics.emitted_volume_cm3,
+            'capture_fraction': self.statistics.capture_fraction,
+            'cycle_time_s': self.cycle_time_s,
+        }
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
@@ -154,6 +199,7 @@ class Plan:
             'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
+            'plain': self.plain and self.plain.brief(),
             'plane': {
                 'index_m': self.plane.index_m,
                 'passes': self.plane_on_part.passes,
@@ -201,10 +247,10 @@ def plan(
     for round_ in range(TARGET_ROUNDS):
         passes = plan_passes(surface_map, lines, style)
         trajectory = trajectory_of(passes, style, frame_id)
-        film, emitted = _simulated(
+        film, emitted = simulated(
             surface, model, trajectory, lambda share: progress('film', share)
         )
-        mean, sigma_n = _evenness(film[painted], area)
+        mean, sigma_n = evenness(film[painted], area)
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
@@ -215,7 +261,7 @@ def plan(
     )  # fmt: skip
     return Plan(
         surface, request, style, placing, passes, trajectory, film, painted,
-        statistics, sigma_n, plane, on_part, model,
+        statistics, sigma_n, plane, on_part, model, films, tuple(planned_moves(passes, style)),
     )  # fmt: skip
 
 
@@ -246,19 +292,21 @@ def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, fl
     return request.index_min_m or low, request.index_max_m or high
 
 
-def _simulated(
+def simulated(
     surface: Surface,
     model: DepositionModel,
     trajectory: Trajectory,
     progress: Callable[[float], None],
 ) -> tuple[np.ndarray, float]:
+    """(V,) film of a motion [um], and what it sprays [cm3]."""
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.emitted_cm3
 
 
-def _evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
+def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
+    """Mean film [um] and sigma_n, weighted by area."""
     weight = area_m2 / area_m2.sum()
     mean = float(weight @ film_um)
     return mean, math.sqrt(float(weight @ (film_um - mean) ** 2)) / mean

@@ -104,7 +104,7 @@ class SurfaceMap:
         self.axes = axes
         self.radius_m = radius_m
         facing = surface.normals @ axes.outward
-        self.painted = (facing > STEEPEST_COSINE) & _in_front(surface, axes)
+        self.painted = painted_side(surface, axes)
         if not self.painted.any():
             raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
         self.surface_m = axes.coordinates_m(surface.vertices_m[self.painted])
@@ -187,6 +187,11 @@ class SurfaceMap:
         # Well inside the fitted plane stands; at the edge it goes over to the blend.
         share = np.clip(2.0 * near - 1.0, 0.0, 1.0)
         return share * held + (1.0 - share) * blended
+
+
+def painted_side(surface: Surface, axes: PassAxes) -> np.ndarray:
+    """(V,) bool, vertices that face the gun with nothing of the part before them."""
+    return (surface.normals @ axes.outward > STEEPEST_COSINE) & _in_front(surface, axes)
 
 
 def _in_front(surface: Surface, axes: PassAxes) -> np.ndarray:

@@ -196,9 +196,9 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     speeds = table.numbers([speed])[:, 0] * h.UNITS[speed_unit]
     spraying = np.ones(len(speeds)) if flows is None else flows
     moves = [
-        Move(position, quaternion, speed, bool(on), line=line)
-        for position, quaternion, speed, on, line in zip(
-            positions, quaternions, speeds.tolist(), spraying, table.lines, strict=True
+        Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0)
+        for position, quaternion, speed, flow, line in zip(
+            positions, quaternions, speeds.tolist(), spraying.tolist(), table.lines, strict=True
         )
     ]
     programmed = timed(moves, flows is not None)

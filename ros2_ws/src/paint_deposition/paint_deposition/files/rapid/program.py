@@ -21,6 +21,8 @@ MOVES = {
 }  # fmt: skip
 JOINT_MOVES = ('moveabsj', 'moveextj')
 TRIGGERS = ('triggio', 'triggequip')
+# The analogue output for the flow relative to the calibrated one, as written by `writer`.
+FLOW_SIGNAL = 'aoflow'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,6 +86,8 @@ class _Run:
         self._gun_on = False
         self._brush: float | None = None
         self._triggers: dict[str, GunSwitch] = {}
+        self._flow = 1.0
+        self._flow_triggers: dict[str, float] = {}
         self._position_m: np.ndarray | None = None
         self._calls: list[str] = []
 
@@ -146,6 +150,10 @@ class _Run:
             self._triggers[_name(i.values[0])] = self._switch(i)
         elif self._is_gun(i):
             self._gun_on = self._level(i)
+        elif _name(i.options.get('aop') or '') == FLOW_SIGNAL and i.name in TRIGGERS:
+            self._flow_triggers[_name(i.values[0])] = self._number(i, len(i.values) - 1)
+        elif i.name == 'setao' and i.values and _name(i.values[0]) == FLOW_SIGNAL:
+            self._flow = self._number(i, 1)
 
     def _is_gun(self, i: Instruction) -> bool:
         return _signal_of(i) == self._program.gun_signal != ''
@@ -180,6 +188,8 @@ class _Run:
         poses = [self._in_world(value, work_object) for value in values[:count]]
         position_m, rotation = poses[-1]
         spraying, switches = self._gun(i, values[count + 1 : -2])
+        for name in map(_name, i.options.values()):
+            self._flow = self._flow_triggers.get(name, self._flow)
         self._program.moves.append(
             RapidMove(
                 instruction=i.name,
@@ -193,6 +203,7 @@ class _Run:
                 work_object=work_object,
                 spraying=spraying,
                 switches=switches,
+                flow=self._flow,
             )
         )
         self._position_m = position_m

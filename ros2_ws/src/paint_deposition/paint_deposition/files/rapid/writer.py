@@ -14,13 +14,13 @@ MODULE = r"""MODULE PaintPasses
   ! doGun opens the gun. Millimetres, mm/s; axis configurations are free.
 {about}{data}
   VAR triggdata gunOn;
-  VAR triggdata gunOff;
+  VAR triggdata gunOff;{flow_data}
 
   PROC main()
     ConfJ\Off;
     ConfL\Off;
     TriggIO gunOn,0\Start\DOp:=doGun,1;
-    TriggIO gunOff,0\Start\DOp:=doGun,0;
+    TriggIO gunOff,0\Start\DOp:=doGun,0;{flow_events}
     SetDO doGun,0;
 {moves}
     SetDO doGun,0;
@@ -39,7 +39,9 @@ def module_text(
 
     The tool and the work object are taught on the robot and not defined here: the module's poses
     are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
-    ends with the gun off. `read_program` reads it back within 0.001 mm.
+    ends with the gun off. Where passes have flows of their own, the analogue output aoFlow is set
+    to them, relative to the calibrated flow, as the gun opens. `read_program` reads it back within
+    0.001 mm.
 
     Args:
         moves: in the part's frame.
@@ -57,22 +59,38 @@ def module_text(
         f'  CONST speeddata {name}:=[{speed * 1e3:.3f},500,5000,1000];'
         for speed, name in speeds.items()
     ]
+    levels = sorted({_flow(move) for move in moves if move.spraying})
+    flows = {v: f'flow{k}' for k, v in enumerate(levels, start=1)} if levels != [1.0] else {}
     run = [f'    MoveJ p1,{speeds[_speed(moves[0])]},fine,{FRAMES};']
     for number, (before, move) in enumerate(pairwise(moves), start=2):
         instruction, trigger = 'MoveL', ''
         if move.spraying != before.spraying:
-            instruction, trigger = 'TriggL', 'gunOn,' if move.spraying else 'gunOff,'
+            flow = f'\\T2:={flows[_flow(move)]}' if flows and move.spraying else ''
+            instruction, trigger = 'TriggL', f'gunOn{flow},' if move.spraying else 'gunOff,'
         zone = 'fine' if number == len(moves) else 'z10'
         speed_name = speeds[_speed(move)]
         run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
     about = ''.join(f'  ! {comment}\n' for comment in comments)
     if part is not None:
         about += f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{_pose(part.values)},{NOWHERE}];\n'
-    return MODULE.format(about=about, data='\n'.join(data), moves='\n'.join(run))
+    return MODULE.format(
+        about=about,
+        data='\n'.join(data),
+        moves='\n'.join(run),
+        flow_data=''.join(f'\n  VAR triggdata {name};' for name in flows.values()),
+        flow_events=''.join(
+            f'\n    TriggEquip {name},0\\Start,0\\AOp:=aoFlow,{flow:.4f};'
+            for flow, name in flows.items()
+        ),
+    )
 
 
 def _speed(move: Move) -> float:
     return round(float(move.speed_m_per_s), 6)
+
+
+def _flow(move: Move) -> float:
+    return round(float(move.flow), 4)
 
 
 def _target(move: Move) -> str:

@@ -7,7 +7,8 @@ import numpy as np
 
 from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
 from paint_deposition.files.recordings.bags import POSE_TYPE, read_trajectory
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, STATE_TYPE
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.path_builder import gap_ns
 
 

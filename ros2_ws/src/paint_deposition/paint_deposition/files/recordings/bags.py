@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags.typesys import get_typestore
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
@@ -15,10 +14,10 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
 from paint_deposition.files.recordings.joint_states import JOINT_TYPE, Robot, read_joint_poses
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.transforms import TF_TYPES, read_tf_poses
 from paint_deposition.files.recordings.triggers import (
     BOOL_TYPE,
-    STATE_TYPE,
     choose_topic,
     listed_topics,
     read_switching,
@@ -159,36 +158,33 @@ def write_pose_bag(
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
 ) -> Path:
-    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and Bool for its trigger.
+    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and its trigger.
 
-    The trigger's messages come before the poses that they hold for. A Bool is on or off: a
-    trajectory with another flow than 0 or 1 is refused.
+    The trigger's messages come before the poses that they hold for. They are Bool, or
+    AtomizerState where there is another flow than 0 or 1.
 
     Args:
         folder: to make.
         custom_data: text by name for the metadata.
         part: name and pose of the part's frame in that of the poses, for /tf_static.
     """
-    levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    if levels:
-        raise RecordingError(
-            f'{folder}: a Bool trigger cannot hold flow {min(levels):g}; use 0 and 1'
-        )
     poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
     if len(broken):
         raise RecordingError(
             f'pose {broken[0]} of {len(trajectory)} is not finite; nothing written'
         )
-    types = get_typestore(definitions.STANDARD_STORE)
+    types = definitions.own_types()
+    levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
+    state_type = STATE_TYPE if levels else BOOL_TYPE
     triggers = zip(trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow, strict=True)
     # Behind the time, what comes first of those at one time.
-    entries: list[tuple[int, int, Any]] = [(time_ns, 0, flow > 0.0) for time_ns, flow in triggers]
+    entries: list[tuple[int, int, Any]] = [(time_ns, 0, flow) for time_ns, flow in triggers]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
         _add_topic(run, pose_topic, POSE_TYPE)
         if len(trajectory.trigger_stamps_ns):
-            _add_topic(run, state_topic, BOOL_TYPE)
+            _add_topic(run, state_topic, state_type)
         if part:
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
             begin_ns = min(time_ns for time_ns, *_ in entries)
@@ -200,7 +196,8 @@ def write_pose_bag(
                 pose = _pose(types, time_ns, trajectory.frame_id, poses[content].tolist())
                 cdr = types.serialize_cdr(pose, POSE_TYPE)
             else:
-                cdr = types.serialize_cdr(types.types[BOOL_TYPE](content), BOOL_TYPE)
+                state = _state(types, state_type, time_ns, trajectory.frame_id, float(content))
+                cdr = types.serialize_cdr(state, state_type)
             run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
     return run.folder
 
@@ -208,6 +205,14 @@ def write_pose_bag(
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
     qos = [offered_qos(1 if latched else WRITTEN_DEPTH, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
+
+
+def _state(types: Typestore, kind: str, time_ns: int, frame_id: str, flow: float) -> object:
+    """The gun with a flow relative to the calibrated one; what else it does is not known."""
+    if kind == BOOL_TYPE:
+        return types.types[BOOL_TYPE](flow > 0.0)
+    header = _header(types, time_ns, frame_id)
+    return types.types[STATE_TYPE](header, flow > 0.0, flow, *[float('nan')] * 3)
 
 
 def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:

@@ -8,12 +8,23 @@ from typing import Any
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 
 SEPARATOR = '=' * 80
 # The layout of messages that this package serialises itself, without a ROS installation.
 STANDARD_STORE = Stores.ROS2_KILTED
+# The state of the atomizer, as `paint_msgs` defines it.
+STATE_TYPE = 'paint_msgs/msg/AtomizerState'
+STATE_TEXT = """\
+std_msgs/Header header
+bool spraying
+float64 flow
+float64 shaping_air_l_per_min
+float64 bell_speed_rpm
+float64 voltage_kv
+"""
 
 
 @dataclass(frozen=True)
@@ -56,9 +67,17 @@ def installed(message_type: str) -> Definition:
 
 
 @functools.cache
-def standard(message_type: str) -> Definition:
-    """Definition of a message of the ROS 2 common interfaces, known without any installation."""
+def own_types() -> Typestore:
+    """Messages that can be written without any installation: the common ones, and the state."""
     store = get_typestore(STANDARD_STORE)
+    store.register(get_types_from_msg(STATE_TEXT, STATE_TYPE))
+    return store
+
+
+@functools.cache
+def standard(message_type: str) -> Definition:
+    """Definition of a message that can be written without any installation."""
+    store = own_types()
     text, _ = store.generate_msgdef(message_type, ros_version=2)
     return Definition(text, store.hash_rihs01(message_type))
 

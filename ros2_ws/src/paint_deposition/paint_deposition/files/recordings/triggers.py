@@ -11,9 +11,9 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.motion.trigger import relative_flow
 
-STATE_TYPE = 'paint_msgs/msg/AtomizerState'
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # What a state tells of the process while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')

@@ -16,7 +16,8 @@ from rosgraph_msgs.msg import Clock
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
 from paint_deposition.files.recordings.bags import choose_pose_topic, read_trajectory
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, STATE_TYPE, choose_state_topic
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
 from paint_deposition.nodes.replay.flow_control import FlowControl
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages

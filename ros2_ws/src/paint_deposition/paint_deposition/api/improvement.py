@@ -1,0 +1,158 @@
+"""A programme's speeds, flows and triggers chosen anew for a more even film."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.api.geometry import look_at
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.posterior import Posterior
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
+from paint_deposition.fitting.draws import drawn
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.improvement.dwell_films import FilmAtPoints
+from paint_deposition.planning.improvement.improve import timed_for_evenness
+from paint_deposition.planning.improvement.improvement import (
+    DEFAULT_TOLERANCE,
+    Improvement,
+    LaidFilm,
+)
+from paint_deposition.planning.improvement.limits import split_options
+from paint_deposition.planning.improvement.moves import moves_of
+from paint_deposition.planning.improvement.programme import Programme
+from paint_deposition.planning.pass_films import spread
+from paint_deposition.planning.surface_map import painted_side, pass_axes
+from paint_deposition.results.passes import BAG, PROGRAM, Passes, write_passes
+
+Progress = Callable[[str, float], None]
+# The film counts where the programme lays more than this share of its greatest film.
+JUDGED_ABOVE = 0.1
+# A gun whose mean direction is shorter paints more sides than one.
+ONE_SIDE = 0.9
+DRAWS, CHECKS = 8, 24
+QUANTILES = (0.05, 0.95)
+
+
+def improve(
+    surface: Surface,
+    trajectory: Trajectory,
+    model: DepositionModel | None = None,
+    *,
+    posterior: Posterior | None = None,
+    rivals: Sequence[DepositionModel] = (),
+    judged: np.ndarray | None = None,
+    seed: int = 0,
+    progress: Progress = lambda what, share: None,
+    **wanted: Any,
+) -> Improvement:
+    """Keep the path of a programme and change its speeds, flows and triggers.
+
+    Films before and after are those of the motions as files tell them: the new one is written as
+    a bag and as a RAPID module, and both are read back.
+
+    Args:
+        surface: the part; it is turned round, with a note, if the gun looks at its back.
+        trajectory: the programme, in the frame of the mesh.
+        model: what the gun sprays; default: a 50 mm bell.
+        posterior: what is known of the model; the film is made even over draws from it.
+        rivals: other models that explain the readings as well; each counts as much as the model.
+        judged: (V,) bool, vertices whose film counts; default: the side that the gun faces, where
+            the programme lays more than a tenth of its greatest film.
+        seed: of the draws.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+        wanted: the fields of ``planning.improvement.limits.Limits`` and ``Wish``.
+
+    Raises:
+        RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
+    """
+    model = model or DepositionModel()
+    limits, wish = split_options(wanted)
+    seen = look_at(surface, trajectory, model)
+    surface, given = seen.surface, Programme.of(trajectory)
+    progress('the film as it is', 0.0)
+    film_um, emitted = _film(surface, model, trajectory)
+    if film_um.max() < NO_PAINT_UM:
+        raise RecordingError(f'{trajectory.source}: no paint lands on the part')
+    if judged is None:
+        judged = _judged(surface, film_um, seen.path.rotation[seen.path.flow > 0.0][:, :, 2])
+    models = [model, *rivals]
+    if posterior is not None:
+        models += drawn(model, posterior, DRAWS, seed)
+    retiming = timed_for_evenness(surface, judged, given, models, limits, wish, progress)
+    moves = moves_of(retiming.programme, limits)
+    progress('the film of the written files', 0.0)
+    passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
+    improved, program = _read_back(passes)
+    new_um, new_emitted = _film(surface, model, improved)
+    program_um, _ = _film(surface, model, program)
+    tolerance = wish.tolerance or DEFAULT_TOLERANCE
+    band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
+    path, improved_path = seen.path, spray_path(improved)[0]
+    before = LaidFilm.of(film_um, surface, judged, band, emitted, path, trajectory.duration_s)
+    after = LaidFilm.of(
+        new_um, surface, judged, band, new_emitted, improved_path, improved.duration_s
+    )
+    return Improvement(
+        surface, judged, model, limits, wish, trajectory, improved, moves, retiming, before, after,
+        float(np.abs(program_um - new_um).max() / new_um.max()),
+        _interval(surface, judged, model, posterior, (given, Programme.of(improved)), seed),
+    )  # fmt: skip
+
+
+def _film(
+    surface: Surface, model: DepositionModel, trajectory: Trajectory
+) -> tuple[np.ndarray, float]:
+    """(V,) film of a motion [um], and what it sprays [cm3]."""
+    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator.add(path)
+    return integrator.film_um, integrator.emitted_cm3
+
+
+def _judged(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) -> np.ndarray:
+    reached = film_um > JUDGED_ABOVE * film_um.max()
+    towards = -tool_z.mean(axis=0)
+    if np.linalg.norm(towards) < ONE_SIDE:
+        return reached
+    return reached & painted_side(surface, pass_axes(surface, outward=towards))
+
+
+def _read_back(passes: Passes) -> tuple[Trajectory, Trajectory]:
+    """The motions of the bag and of the robot program, once written."""
+    with tempfile.TemporaryDirectory(prefix='paint-') as aside:
+        write_passes(Path(aside), passes)
+        frame = passes.trajectory.frame_id or 'part'
+        return (
+            read_recording(Path(aside) / BAG, frame_id=frame),
+            read_recording(Path(aside) / PROGRAM, frame_id=frame),
+        )
+
+
+def _interval(
+    surface: Surface,
+    judged: np.ndarray,
+    model: DepositionModel,
+    posterior: Posterior | None,
+    programmes: tuple[Programme, Programme],
+    seed: int,
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    """Quantiles of sigma_n before and after over draws that the search has not seen."""
+    if posterior is None:
+        return None
+    rows = np.flatnonzero(judged)[spread(surface.vertex_areas_m2[judged])]
+    found = []
+    for drawn_model in drawn(model, posterior, CHECKS, seed + 1):
+        films = FilmAtPoints(surface, rows, drawn_model)
+        laid = [films.film_um(programme) for programme in programmes]
+        found.append([film.std() / film.mean() for film in laid])
+    low, high = np.quantile(np.array(found), QUANTILES, axis=0)
+    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))

@@ -1,0 +1,208 @@
+"""Slowness along the openings of the gun: nodes on the path, and a programme timed by them."""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import csr_matrix
+
+from paint_deposition.planning.improvement.limits import Limits
+from paint_deposition.planning.improvement.programme import STANDING_M, Opening, Programme
+
+# Half the length over which bends of the path and its programmed speed are told [m].
+BEND_M = 0.02
+# Where the gun is closed, a place much slower than its opening sets how fast that can be. Speeds
+# are told over so much travel to both sides: poses of recordings jitter [m].
+MUCH_SLOWER, ABOUT_AS_SLOW = 0.8, 1.05
+STEADY_M = 0.01
+
+
+@dataclass(frozen=True)
+class Nodes:
+    """Places along the openings; slowness [s/m] is linear between them.
+
+    Attributes:
+        travel_m: (n,) length of the path up to each node, opening after opening.
+        opening: (n,) number of its opening.
+        openings: the openings that they belong to.
+    """
+
+    travel_m: np.ndarray
+    opening: np.ndarray
+    openings: tuple[Opening, ...]
+
+    @staticmethod
+    def of(openings: tuple[Opening, ...], spacing_m: float) -> 'Nodes':
+        """Even nodes, about so far apart, both ends of each opening included."""
+        places = [
+            np.linspace(o.on_m, o.off_m, max(2, math.ceil((o.off_m - o.on_m) / spacing_m) + 1))
+            for o in openings
+        ]
+        numbers = [np.full(len(place), k) for k, place in enumerate(places)]
+        return Nodes(np.concatenate(places), np.concatenate(numbers), openings)
+
+    def __len__(self) -> int:
+        return len(self.travel_m)
+
+    @property
+    def paired(self) -> np.ndarray:
+        """(k,) nodes that are followed by one of the same opening."""
+        return np.flatnonzero(self.opening[1:] == self.opening[:-1])
+
+    @property
+    def weights_m(self) -> np.ndarray:
+        """(n,) length that each node stands for: slowness times this sums to the time."""
+        steps = np.diff(self.travel_m)[self.paired]
+        weights = np.zeros(len(self))
+        np.add.at(weights, self.paired, 0.5 * steps)
+        np.add.at(weights, self.paired + 1, 0.5 * steps)
+        return weights
+
+    def rows(self, opening: int) -> slice:
+        """The nodes of an opening."""
+        first, last = np.searchsorted(self.opening, [opening, opening + 1])
+        return slice(int(first), int(last))
+
+    def hats(self, travel_m: np.ndarray, opening: np.ndarray) -> csr_matrix:
+        """(M, n) weights of the nodes at places (M,) within or beyond openings (M,)."""
+        count = len(travel_m)
+        left, share = np.zeros(count, np.int64), np.zeros(count)
+        for number in range(len(self.openings)):
+            here = opening == number
+            rows = self.rows(number)
+            places = self.travel_m[rows]
+            inside = np.clip(travel_m[here], places[0], places[-1])
+            cell = np.clip(np.searchsorted(places, inside, side='right') - 1, 0, len(places) - 2)
+            left[here] = rows.start + cell
+            share[here] = (inside - places[cell]) / (places[cell + 1] - places[cell])
+        index = np.arange(count)
+        return csr_matrix(
+            (
+                np.concatenate([1.0 - share, share]),
+                (np.concatenate([index, index]), np.concatenate([left, left + 1])),
+            ),
+            shape=(count, len(self)),
+        )
+
+    def elapsed_s(self, number: int, slowness: np.ndarray, travel_m: np.ndarray) -> np.ndarray:
+        """Time from the begin of an opening to places (M,) in it, for slowness (n,) [s/m]."""
+        rows = self.rows(number)
+        places, values = self.travel_m[rows], slowness[rows]
+        steps = np.diff(places)
+        sums = np.concatenate([[0.0], np.cumsum(0.5 * steps * (values[1:] + values[:-1]))])
+        cell = np.clip(np.searchsorted(places, travel_m, side='right') - 1, 0, len(steps) - 1)
+        on = travel_m - places[cell]
+        rise = np.diff(values)[cell] / steps[cell]
+        return sums[cell] + values[cell] * on + 0.5 * rise * on**2
+
+
+def timed_anew(
+    programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Limits
+) -> Programme:
+    """The programme at slowness (n,) [s/m] where the gun is open.
+
+    Elsewhere it keeps its speed, but for what it takes to reach the speed at which the gun opens
+    and to leave that at which it closes.
+    """
+    ends = np.array([[o.on_m, o.off_m] for o in programme.openings])
+    whole = programme.with_poses_at(ends.ravel())
+    begin, end = whole.travel_m[:-1], whole.travel_m[1:]
+    middle, length = 0.5 * (begin + end), end - begin
+    moving = length > STANDING_M
+    square = np.where(moving, length / whole.duration_s, 0.0) ** 2
+    duration = whole.duration_s.copy()
+    for number, (on, off) in enumerate(ends):
+        rows = nodes.rows(number)
+        for at, place, side in ((on, rows.start, -1.0), (off, rows.stop - 1, 1.0)):
+            away = side * (middle - at)
+            reach = 2.0 * limits.acceleration_m_per_s2 * away
+            own = slowness[place] ** -2
+            beside = (away > 0.0) & _before_next(middle, ends, number, side)
+            programmed = square[beside][np.abs(away[beside]).argmin()] if beside.any() else own
+            # The programme's own way to a slower opening serves for any that is no faster.
+            least = np.maximum(own - reach[beside], 0.0) if own > programmed else 0.0
+            square[beside] = np.clip(square[beside], least, own + reach[beside])
+    outside = moving & (square > 0.0)
+    duration[outside] = length[outside] / np.sqrt(square[outside])
+    for number, (on, off) in enumerate(ends):
+        inside = (middle > on) & (middle < off)
+        duration[inside] = nodes.elapsed_s(number, slowness, end[inside]) - nodes.elapsed_s(
+            number, slowness, begin[inside]
+        )
+    return replace(whole, duration_s=duration).without_standstill()
+
+
+def _before_next(middle_m: np.ndarray, ends_m: np.ndarray, number: int, side: float) -> np.ndarray:
+    """Where the path is between an opening and the next one on a side of it."""
+    if side < 0.0:
+        return middle_m > (ends_m[number - 1, 1] if number else -np.inf)
+    return middle_m < (ends_m[number + 1, 0] if number + 1 < len(ends_m) else np.inf)
+
+
+@dataclass(frozen=True)
+class SpeedBounds:
+    """(n,) greatest speed at each node [m/s], and (n,) which limit sets it."""
+
+    greatest_m_per_s: np.ndarray
+    named: np.ndarray
+
+
+ROBOT, BEND, LEAD = 'speed', 'bend', 'lead'
+
+
+def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBounds:
+    """How fast the gun may go at the nodes.
+
+    In a bend no faster than the acceleration allows, unless it was programmed so; where it opens
+    and closes, no faster than can be reached from its way there and slowed down on its way on.
+    """
+    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
+    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
+
+    def at(place_m: np.ndarray) -> np.ndarray:
+        return np.stack(
+            [np.interp(place_m, travel, programme.positions_m[:, k]) for k in range(3)], axis=1
+        )
+
+    places = nodes.travel_m
+    low, high = np.maximum(places - BEND_M, 0.0), np.minimum(places + BEND_M, travel[-1])
+    seconds = np.interp(high, travel, clock) - np.interp(low, travel, clock)
+    programmed = (high - low) / np.maximum(seconds, 1e-9)
+    inner = np.clip(places, BEND_M, travel[-1] - BEND_M)
+    bend = at(inner + BEND_M) - 2.0 * at(inner) + at(inner - BEND_M)
+    curvature = np.linalg.norm(bend, axis=1) / BEND_M**2
+    allowed = np.sqrt(limits.acceleration_m_per_s2 / np.maximum(curvature, 1e-9))
+    greatest = np.full(len(nodes), limits.speed_max_m_per_s)
+    named = np.full(len(nodes), ROBOT, dtype=object)
+    bent = np.maximum(allowed, programmed) < greatest
+    greatest[bent], named[bent] = np.maximum(allowed, programmed)[bent], BEND
+    ends = np.array([[o.on_m, o.off_m] for o in nodes.openings])
+    for number, (on, off) in enumerate(ends):
+        rows = nodes.rows(number)
+        before = ends[number - 1, 1] if number else 0.0
+        after = ends[number + 1, 0] if number + 1 < len(ends) else travel[-1]
+        for end, far, node in ((on, before, rows.start), (off, after, rows.stop - 1)):
+            fastest = _fastest_m_per_s(programme, end, far, limits)
+            if fastest < greatest[node]:
+                greatest[node], named[node] = fastest, LEAD
+    return SpeedBounds(greatest, named)
+
+
+def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: Limits) -> float:
+    """How fast the gun can be at an end of its opening, by the closed path up to ``far``."""
+    count = math.ceil(abs(far_m - end_m) / STEADY_M)
+    if count < 2:
+        return math.inf
+    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
+    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
+    places = np.linspace(end_m, far_m, count + 1)
+    low = np.maximum(places - STEADY_M, travel[0])
+    high = np.minimum(places + STEADY_M, travel[-1])
+    seconds = np.interp(high, travel, clock) - np.interp(low, travel, clock)
+    speed = (high - low) / np.maximum(seconds, 1e-9)
+    if speed.min() > MUCH_SLOWER * speed[0]:
+        return math.inf
+    # What the programme does there itself is possible, whatever acceleration is said to be.
+    slow = np.abs(places - end_m)[speed <= ABOUT_AS_SLOW * speed.min()].min()
+    reach = 2.0 * limits.acceleration_m_per_s2 * float(slow)
+    return max(math.sqrt(float(speed.min()) ** 2 + reach), float(speed[0]))

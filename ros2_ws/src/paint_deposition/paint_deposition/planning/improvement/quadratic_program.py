@@ -1,0 +1,284 @@
+"""The best density of paint along the path: a quadratic program, solved by Clarabel.
+
+The film is linear in the density of paint y = flow times slowness [s/m]. The acceleration along
+the path, v dv/ds = - y' f^2 / y^3, is not; |y'| <= a y^3 / f^2 is taken with its tangent at the
+last solution. The right-hand side is convex, so the tangent lies below it: whatever keeps to the
+tangent keeps to the limit.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import clarabel
+import numpy as np
+from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, vstack
+
+from paint_deposition.errors import PlanError
+from paint_deposition.planning.improvement.limits import Limits, Wish
+from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes, SpeedBounds
+
+# The density moves by less than this share at the end; so often at most.
+SETTLED, ROUNDS = 3e-3, 8
+# The film's bounds count this much more than evenness: they are kept where they can be.
+BOUND_WEIGHT = 100.0
+# Least squares alone lay too little, by sigma_n^2: this weight holds the mean at the target.
+LEVEL_WEIGHT = 30.0
+# Smoothness is told by changes of slowness over this length [m].
+SLOPE_M = 0.1
+# A constraint that costs more than this, in units of sigma_n squared, holds the film back.
+PULLS = 1e-6
+WORDS = {
+    ROBOT: 'the greatest speed',
+    BEND: 'the speed in bends',
+    LEAD: 'the way to and from the opening of the gun',
+    'slowest': 'the least speed',
+    'acceleration': 'the acceleration',
+    'jerk': 'the jerk',
+    'flow': 'the range of the flow',
+}
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Constraints matrix @ x <= limit of one name."""
+
+    name: str
+    matrix: csr_matrix
+    limit: np.ndarray
+
+
+@dataclass(frozen=True)
+class Density:
+    """A solution.
+
+    Attributes:
+        density: (n,) of the paint [s/m]. flow: (m,) of each opening.
+        pulling: names of the limits that hold it back.
+    """
+
+    density: np.ndarray
+    flow: np.ndarray
+    pulling: tuple[str, ...] = ()
+
+    def slowness(self, nodes: Nodes) -> np.ndarray:
+        """(n,) seconds per metre."""
+        return self.density / self.flow[nodes.opening]
+
+
+@dataclass(frozen=True)
+class Problem:
+    """What is to be minimised over densities and flows.
+
+    Attributes:
+        films: per draw of the model, (n, V) film for a density of 1 s/m at each node [um].
+        target_um: film wanted.
+        nodes, bounds: of the path.
+        limits, wish: of the user.
+        given_s: paint of the programme [s at the calibrated flow].
+        open_ends: (n,) bool, nodes at which the gun may as well be closed.
+        without: names of limits that are left out.
+    """
+
+    films: Sequence[np.ndarray]
+    target_um: float
+    nodes: Nodes
+    bounds: SpeedBounds
+    limits: Limits
+    wish: Wish
+    given_s: float
+    open_ends: np.ndarray
+    without: frozenset[str] = field(default_factory=frozenset)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns: densities, and a flow for each opening."""
+        return len(self.nodes) + len(self.nodes.openings)
+
+    @property
+    def followed_pairs(self) -> np.ndarray:
+        """(k,) nodes from which the gun sprays on to the next one for certain."""
+        pairs = self.nodes.paired
+        return pairs[~self.open_ends[pairs] & ~self.open_ends[pairs + 1]]
+
+    def errors(self, density: np.ndarray) -> list[np.ndarray]:
+        """Per draw (V,) film / target - 1."""
+        return [density @ films / self.target_um - 1.0 for films in self.films]
+
+
+def solved(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
+    """Minimise, from a start that sets where tangents are taken first, in so many rounds at most.
+
+    Raises:
+        PlanError: the limits contradict each other; names one that does.
+    """
+    now = start
+    for _ in range(rounds):
+        found = _step(problem, now)
+        change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
+        now = found
+        if change < SETTLED:
+            break
+    return now
+
+
+def _step(problem: Problem, now: Density) -> Density:
+    constraints = _constraints(problem, now)
+    matrix, linear = _objective(problem, now)
+    answer = _minimised(matrix, linear, constraints)
+    if answer is None:
+        raise PlanError(f'no motion along this path keeps {_culprit(matrix, linear, constraints)}')
+    values, multipliers = answer
+    count = len(problem.nodes)
+    # A multiplier times a density is what its limit costs, in the units of the objective.
+    costs = multipliers * float(values[:count].mean())
+    names = np.repeat([rows.name for rows in constraints], [len(r.limit) for r in constraints])
+    pulling = list(dict.fromkeys(names[costs > PULLS].tolist()))
+    flow = values[count:]
+    if not problem.limits.flow_is_free:
+        flow = np.array([opening.flow for opening in problem.nodes.openings])
+        pulling = [name for name in pulling if name != 'flow']
+    return Density(np.maximum(values[:count], 0.0), flow, tuple(pulling))
+
+
+def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
+    """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
+    nodes, wish, count = problem.nodes, problem.wish, len(problem.nodes)
+    matrix = np.zeros((problem.size, problem.size))
+    linear = np.zeros(problem.size)
+    share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
+    for films, error in zip(problem.films, problem.errors(now.density), strict=True):
+        scaled = films / problem.target_um
+        matrix[:count, :count] += share * scaled @ scaled.T
+        linear[:count] -= share * scaled.sum(axis=1)
+        level = scaled.mean(axis=1)
+        matrix[:count, :count] += 2.0 * LEVEL_WEIGHT / len(problem.films) * np.outer(level, level)
+        linear[:count] -= 2.0 * LEVEL_WEIGHT / len(problem.films) * level
+        for beyond, edge, weight in _hinges(problem, error):
+            some = scaled[:, beyond]
+            matrix[:count, :count] += share * weight * some @ some.T
+            linear[:count] -= share * weight * (1.0 + edge) * some.sum(axis=1)
+    weights = nodes.weights_m
+    linear[:count] += wish.paint_weight * weights / problem.given_s
+    flow = now.flow[nodes.opening]
+    linear[:count] += wish.time_weight * weights / (flow * problem.given_s)
+    seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
+    linear[count:] -= wish.time_weight * seconds / (now.flow * problem.given_s)
+    pairs = nodes.paired
+    mean = float(weights @ now.density / weights.sum())
+    slope = _differences(pairs, problem.size).toarray() / mean
+    slope *= (SLOPE_M / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
+    matrix += 2.0 * wish.smoothness / len(pairs) * slope.T @ slope
+    # Keeps the problem definite where no film tells, and flows where they are.
+    matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
+    matrix[np.arange(count, problem.size), np.arange(count, problem.size)] += 1e-4
+    linear[count:] -= 1e-4 * now.flow
+    return matrix, linear
+
+
+def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float, float]]:
+    """Points beyond an edge of the film / target - 1, that edge, and what they count more."""
+    wish, limits = problem.wish, problem.limits
+    found = []
+    if wish.tolerance is not None:
+        found += [
+            (error > wish.tolerance, wish.tolerance, wish.beyond_tolerance),
+            (error < -wish.tolerance, -wish.tolerance, wish.beyond_tolerance),
+        ]
+    if limits.film_min_um is not None:
+        edge = limits.film_min_um / problem.target_um - 1.0
+        found.append((error < edge, edge, BOUND_WEIGHT))
+    if limits.film_max_um is not None:
+        edge = limits.film_max_um / problem.target_um - 1.0
+        found.append((error > edge, edge, BOUND_WEIGHT))
+    return [hinge for hinge in found if hinge[0].any()]
+
+
+def _constraints(problem: Problem, now: Density) -> list[Rows]:
+    nodes, limits, count, size = problem.nodes, problem.limits, len(problem.nodes), problem.size
+    every = np.arange(count)
+    of_opening = count + nodes.opening
+    greatest = problem.bounds.greatest_m_per_s
+    least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
+    rows = []
+    for name in (ROBOT, BEND, LEAD):  # y >= f / v
+        some = every[(problem.bounds.named == name) & ~problem.open_ends]
+        rows.append(_linear(name, size, [(some, -1.0), (of_opening[some], 1.0 / greatest[some])]))
+    rows.append(_linear('slowest', size, [(every, 1.0), (of_opening, -1.0 / least)]))
+    rows.append(_linear('positive', size, [(every[problem.open_ends], -1.0)]))
+    pairs = problem.followed_pairs
+    step = nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]
+    flow = now.flow[nodes.opening[pairs]]
+    for node in (pairs, pairs + 1):
+        # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
+        ratio = now.density[node] / flow
+        reach = limits.acceleration_m_per_s2 * step
+        rows += [
+            _linear('acceleration', size, [
+                (pairs + 1, sign), (pairs, -sign), (node, -3.0 * reach * ratio**2),
+                (of_opening[pairs], 2.0 * reach * ratio**3),
+            ])
+            for sign in (1.0, -1.0)
+        ]  # fmt: skip
+    inner = pairs[:-1][np.diff(pairs) == 1] + 1
+    step = 0.5 * (nodes.travel_m[inner + 1] - nodes.travel_m[inner - 1])
+    ratio = now.density[inner] / now.flow[nodes.opening[inner]]
+    reach = limits.jerk_m_per_s3 * step**2
+    # y^4 / f^3, for the change of slowness by the jerk alone.
+    rows += [
+        _linear('jerk', size, [
+            (inner + 1, sign), (inner, -2.0 * sign), (inner - 1, sign),
+            (inner, -4.0 * reach * ratio**3), (of_opening[inner], 3.0 * reach * ratio**4),
+        ])
+        for sign in (1.0, -1.0)
+    ]  # fmt: skip
+    flows = count + np.arange(len(nodes.openings))
+    given = np.array([opening.flow for opening in nodes.openings])
+    rows.append(_linear('flow', size, [(flows, 1.0)], limits.flow_max * given))
+    rows.append(_linear('flow', size, [(flows, -1.0)], -limits.flow_min * given))
+    return [row for row in rows if len(row.limit) and row.name not in problem.without]
+
+
+def _linear(
+    name: str,
+    size: int,
+    terms: Sequence[tuple[np.ndarray, float | np.ndarray]],
+    limit: np.ndarray | None = None,
+) -> Rows:
+    """Sums of coefficients times entries, one row for each, at most the limit, 0 by default."""
+    count = len(terms[0][0])
+    index = np.tile(np.arange(count), len(terms))
+    column = np.concatenate([entries for entries, _ in terms])
+    value = np.concatenate([np.broadcast_to(v, count) for _, v in terms])
+    matrix = coo_matrix((value, (index, column)), shape=(count, size)).tocsr()
+    return Rows(name, matrix, np.zeros(count) if limit is None else limit)
+
+
+def _differences(pairs: np.ndarray, size: int) -> csr_matrix:
+    return _linear('', size, [(pairs + 1, 1.0), (pairs, -1.0)]).matrix
+
+
+def _minimised(
+    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Rows]
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """The solution and the multipliers of all constraints, or None where none keeps them."""
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    limit = np.concatenate([rows.limit for rows in constraints])
+    solver = clarabel.DefaultSolver(
+        csc_matrix(np.triu(matrix)), linear,
+        csc_matrix(vstack([rows.matrix for rows in constraints])), limit,
+        [clarabel.NonnegativeConeT(len(limit))], settings,
+    )  # fmt: skip
+    answer = solver.solve()
+    good = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
+    if answer.status not in good:
+        return None
+    return np.array(answer.x), np.array(answer.z)
+
+
+def _culprit(matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Rows]) -> str:
+    for name in dict.fromkeys(rows.name for rows in constraints):
+        others = [rows for rows in constraints if rows.name != name]
+        if name in WORDS and _minimised(matrix, linear, others) is not None:
+            return f'{WORDS[name]} with the other limits; allow more'
+    return 'the limits; allow more'

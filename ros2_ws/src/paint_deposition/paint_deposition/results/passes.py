@@ -1,0 +1,112 @@
+"""Passes on disk: a bag, a table and a robot program that lay the same film, and the model."""
+
+import shutil
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import write_text
+from paint_deposition.files.gauge_readings import write_table
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.planned_model import DIGEST, MODEL_FILE
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.bag_files import TRIGGER
+from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.trajectory import Trajectory
+
+BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
+COLUMNS = (
+    'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Passes:
+    """What is written.
+
+    Attributes:
+        trajectory: the timed motion, in the part's frame. moves: the same for a robot program.
+        model: that they were made with.
+        made: how, for the head of the program, as 'Planned'.
+        part: the robot's frame and the pose of the part in it; bag and table have their poses in
+            that frame then, and the program defines its work object so. None: the part's frame.
+    """
+
+    trajectory: Trajectory
+    moves: Sequence[Move]
+    model: DepositionModel
+    made: str
+    part: tuple[str, Rigid] | None = None
+
+
+def write_passes(folder: Path, passes: Passes) -> list[str]:
+    """Write bag, ``passes.csv``, ``passes.mod`` and ``model.yaml`` to a folder; their names.
+
+    Raises:
+        PaintError: the folder holds another folder of the bag's name.
+        OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    digest, part = model_digest(passes.model), passes.part
+    _write_bag(folder / BAG, passes, digest)
+    write_table(folder / TABLE, _table(passes.moves, part))
+    comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
+    module = module_text(passes.moves, [comment], part[1] if part else None)
+    write_text(folder / PROGRAM, module)
+    write_model(folder / MODEL_FILE, passes.model)
+    return [BAG, TABLE, PROGRAM, MODEL_FILE]
+
+
+def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:
+    """A line a move of the TCP: where it ends, how fast, whether the gun is on, and its flow."""
+    yield COLUMNS
+    number, was_spraying = 0, False
+    for move in moves:
+        number += move.spraying and not was_spraying
+        was_spraying = move.spraying
+        pose = move.position_m, move.quaternion_xyzw
+        position, quaternion = part[1].applied(*pose) if part else pose
+        yield [
+            max(number, 1),
+            *(f'{value:.6f}' for value in position),
+            *(f'{value:.8f}' for value in quaternion),
+            f'{move.speed_m_per_s:.6g}',
+            int(move.spraying),
+            f'{move.flow:.6g}' if move.spraying else 0,
+        ]
+
+
+def _write_bag(target: Path, passes: Passes, digest: str) -> None:
+    if target.exists():
+        strangers = [
+            path for path in target.rglob('*')
+            if path.suffix not in ('.mcap', '.yaml') or path.is_dir()
+        ]  # fmt: skip
+        if not target.is_dir() or strangers:
+            raise PaintError(f'{target} is there and no planned bag; move it away')
+    trajectory, part = passes.trajectory, passes.part
+    # A bag's files are named for their folder, so the folder is made under its own name.
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
+        fresh = write_pose_bag(
+            Path(aside) / target.name, _in_frame(trajectory, part),
+            custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
+            part=(trajectory.frame_id, part[1]) if part else None,
+        )  # fmt: skip
+        if target.exists():
+            shutil.rmtree(target)
+        fresh.rename(target)
+    write_model(target / MODEL_FILE, passes.model)
+
+
+def _in_frame(trajectory: Trajectory, part: tuple[str, Rigid] | None) -> Trajectory:
+    """The poses as the robot tells them."""
+    if part is None:
+        return trajectory
+    frame_id, place = part
+    return moved(trajectory, place, frame_id)
