@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop lint format lock clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -38,6 +38,9 @@ lint: build  ## check style, types and the order of the rooms
 
 bench-next: build  ## count how often the first proposed spray settles a diagnosis
 	@$(IN_ENVIRONMENT) python benchmarks/next_spray.py $(ARGS)
+
+bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
+	@$(IN_ENVIRONMENT) python benchmarks/loop.py $(ARGS)
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .

@@ -178,19 +178,17 @@ def table(records: list[dict]) -> str:
         films = [*r['turns'], r['oracle']]
         cells = [f'{100 * f["sigma_n"]:.1f} / {100 * f["within"]:.0f}' for f in films]
         accepted = ', '.join(r['said'][0]['accepted']) or r['said'][0]['verdict']
-        lines.append(
-            f'{r["hidden"]:<46}' + ''.join(f'{c:>14}' for c in cells) + f'  {accepted}'
-        )
+        lines.append(f'{r["hidden"]:<46}' + ''.join(f'{c:>14}' for c in cells) + f'  {accepted}')
         gains.append([films[0]['sigma_n'] - f['sigma_n'] for f in films[1:]])
     gained = np.sum(gains, axis=0)
     shares = 100.0 * gained[:-1] / gained[-1]
     worse = np.mean([turn < -0.002 for turn, *_ in gains])
-    return '\n'.join([
-        *lines,
-        f'share of the oracle\'s gain: {shares[0]:.0f} % after one turn, {shares[1]:.0f} % after '
-        f'two; aim >= 80 %',
-        f'worse than before after one turn: {100 * worse:.0f} % of {len(records)} parts; aim 0',
-    ])
+    lines += [
+        f"share of the oracle's gain: {shares[0]:.0f} % after one turn, {shares[1]:.0f} % after two; "
+        'aim >= 80 %',
+        f'worse than before after one turn: {100 * worse:.0f} % of {len(records)} parts; aim none',
+    ]
+    return '\n'.join(lines)
 
 
 @click.command()
