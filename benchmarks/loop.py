@@ -184,8 +184,8 @@ def table(records: list[dict]) -> str:
     shares = 100.0 * gained[:-1] / gained[-1]
     worse = np.mean([turn < -0.002 for turn, *_ in gains])
     lines += [
-        f"share of the oracle's gain: {shares[0]:.0f} % after one turn, {shares[1]:.0f} % after two; "
-        'aim >= 80 %',
+        f"share of the oracle's gain: {shares[0]:.0f} % after one turn, {shares[1]:.0f} % after "
+        'two; aim >= 80 %',
         f'worse than before after one turn: {100 * worse:.0f} % of {len(records)} parts; aim none',
     ]
     return '\n'.join(lines)
