@@ -13,7 +13,7 @@ import os
 import sys
 import tempfile
 import warnings
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import click
@@ -29,7 +29,7 @@ sys.path.insert(0, str(ROOT))
 from tests.virtual_paint_shop.draw import draw_jobs, stream  # noqa: E402
 from tests.virtual_paint_shop.files import write  # noqa: E402
 from tests.virtual_paint_shop.gauge import GaugeNoise, scatter  # noqa: E402
-from tests.virtual_paint_shop.programme import Painted, motion_of  # noqa: E402
+from tests.virtual_paint_shop.programme import Evenness, Painted, driven  # noqa: E402
 from tests.virtual_paint_shop.shop import Campaign, generate  # noqa: E402
 from tests.virtual_paint_shop.truths import choose  # noqa: E402
 
@@ -49,7 +49,6 @@ SCALE = 2.5
 OFFSET_M = 0.05
 NOISE = GaugeNoise(floor_um=0.5, relative=0.005, texture=0.008)
 PANEL_READINGS, READINGS, ORACLE_READINGS, JUDGED = 60, 60, 300, 600
-TOLERANCE = 0.05
 TURNS = 2
 
 
@@ -78,7 +77,7 @@ class World:
     def painted(self, name: str, trajectory: Trajectory, turn: int) -> Painted:
         """A door painted by a programme."""
         return Painted(
-            name, self.part, self.pattern, self.truths, motion(trajectory),
+            name, self.part, self.pattern, self.truths, driven(trajectory),
             1000 * self.seed + turn, self.parcels,
         )  # fmt: skip
 
@@ -86,18 +85,6 @@ class World:
         """The panel and doors as a user would read them from their files."""
         both = replace(self.panel, experiments=(*self.panel.experiments, *doors))
         return read_campaign(write(both, self.folder / name, sigma_column=True))
-
-
-def motion(trajectory: Trajectory):
-    """A trajectory as the shop drives it."""
-    start = trajectory.stamps_ns[0]
-    return motion_of(
-        (trajectory.stamps_ns - start) * 1e-9,
-        trajectory.positions_m,
-        trajectory.quaternions_xyzw,
-        (trajectory.trigger_stamps_ns - start) * 1e-9,
-        trajectory.trigger_flow > 0.0,
-    )
 
 
 def run_one(job: tuple[int, str, int]) -> dict:
@@ -163,10 +150,7 @@ def _on(surface, painted, part, x_m, z_m):
 
 
 def _figures(film_um: np.ndarray) -> dict:
-    """Evenness of a true film, and the share within the tolerance of its mean."""
-    mean = film_um.mean()
-    within = np.mean(np.abs(film_um - mean) <= TOLERANCE * mean)
-    return {'mean_um': mean, 'sigma_n': film_um.std() / mean, 'within': within}
+    return asdict(Evenness.of(film_um))
 
 
 def table(records: list[dict]) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -43,6 +45,33 @@ def motion_of(
         to_end = np.min(np.abs(way[:, None] - ends[None, :]), axis=1)
     turn = Rotation.from_quat(quaternions_xyzw).as_matrix()
     return Motion(time_s, tcp_m, turn, numbers, to_end, trigger_s, trigger_on)
+
+
+def driven(trajectory) -> Motion:
+    """The motion of poses and triggers as a bag has them: stamps, positions, quaternions, flow."""
+    start = trajectory.stamps_ns[0]
+    return motion_of(
+        (trajectory.stamps_ns - start) * 1e-9,
+        trajectory.positions_m,
+        trajectory.quaternions_xyzw,
+        (trajectory.trigger_stamps_ns - start) * 1e-9,
+        trajectory.trigger_flow > 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class Evenness:
+    """Of a true film: its mean, standard deviation over it, and share within a tolerance of it."""
+
+    mean_um: float
+    sigma_n: float
+    within: float
+
+    @staticmethod
+    def of(film_um: np.ndarray, tolerance: float = 0.05) -> Evenness:
+        mean = film_um.mean()
+        within = np.mean(np.abs(film_um - mean) <= tolerance * mean)
+        return Evenness(float(mean), float(film_um.std() / mean), float(within))
 
 
 class Painted:
