@@ -105,6 +105,7 @@ def improve(
         surface, judged, model, limits, wish, trajectory, improved, moves, retiming, before, after,
         float(np.abs(program_um - new_um).max() / new_um.max()),
         _interval(surface, judged, model, posterior, (given, Programme.of(improved)), seed),
+        seen.geometry.warnings,
     )  # fmt: skip
 
 

@@ -188,7 +188,7 @@ def improve_command(
             pictures=pictures, trade_off=others,
         )  # fmt: skip
     say_all('note', [*result.surface.notes, *recorded.notes])
-    say_all('warning', recorded.warnings)
+    say_all('warning', [*recorded.warnings, *result.warnings])
     lines = [*_lines(result), *file_lines(files)]
     say_results(files, as_json, lines, model=chosen.words)
 

@@ -20,6 +20,8 @@ from paint_deposition.planning.improvement.limits import Limits, Wish
 from paint_deposition.planning.trade_off import Point
 
 DEFAULT_TOLERANCE = 0.1
+# Bag and robot program lay the same film to this share of the peak.
+ALIKE = 2e-3
 
 
 @dataclass(frozen=True)
@@ -90,6 +92,7 @@ class Improvement:
             bag, both read back, as a share of the greatest film.
         sigma_n_interval: 5 and 95 % quantiles of sigma_n before and after over models that the
             search did not see; None without an uncertain model.
+        odd: what is odd in how the gun runs over the part, with its likely cause.
     """
 
     surface: Surface
@@ -105,6 +108,7 @@ class Improvement:
     after: LaidFilm
     program_difference: float
     sigma_n_interval: tuple[tuple[float, float], tuple[float, float]] | None = None
+    odd: tuple[str, ...] = ()
 
     @property
     def target_um(self) -> float:
@@ -125,6 +129,18 @@ class Improvement:
     def paths(self) -> tuple[SprayPath, SprayPath]:
         """Both motions cut into sub-steps."""
         return spray_path(self.given)[0], spray_path(self.trajectory)[0]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What may be wrong, a line each with its likely cause."""
+        if self.program_difference <= ALIKE:
+            return self.odd
+        return (
+            *self.odd,
+            f'the film of the robot program differs from that of the bag by '
+            f'{100 * self.program_difference:.2f} % of the peak: its moves are long against the '
+            'changes of speed; allow shorter ones (move_min_m, settings_per_s) or more smoothness',
+        )
 
     @property
     def sentence(self) -> str:
@@ -189,4 +205,5 @@ class Improvement:
             'limits': asdict(self.limits),
             'wish': asdict(self.wish),
             'sentence': self.sentence,
+            'warnings': list(self.warnings),
         }
