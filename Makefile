@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure lint format lock clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -32,6 +32,9 @@ bench: build  ## measure the speed of the film integral and of the diagnosis
 
 bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
+
+bench-measure: build  ## count the readings that chosen points save
+	@$(IN_ENVIRONMENT) python benchmarks/measure.py $(ARGS)
 
 lint: build  ## check style, types and the order of the rooms
 	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports

@@ -29,6 +29,9 @@ def main() -> None:
         paint('recommend', '--model', folder / 'calibration/model.yaml', '--target-um', 20,
               '--tolerance', 0.05, '--width', 0.9, '-o', folder / 'index')  # fmt: skip
         keep(Image.open(folder / 'index/uniformity.png'), 'uniformity.png')
+        paint('measure', '--mesh', SAMPLES / 'measured_door/door.stl', '--trajectory',
+              SAMPLES / 'measured_door/door', '-o', folder / 'measure')  # fmt: skip
+        keep(Image.open(folder / 'measure/points.png'), 'measure.png')
         paint('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
         paint('plan', '--mesh', SAMPLES / 'door.stl', '--model',

@@ -21,6 +21,7 @@ KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
     'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
+    'measure': 'measurement',
 }  # fmt: skip
 
 
@@ -35,6 +36,8 @@ def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.C
         kind = KINDS[words[0]]
         if kind == 'comparison' and words.count('--model') > 1:
             kind = 'side_by_side'
+        if words[:1] == ['plan'] and 'auto' in words:
+            kind = 'plan_of_faces'
         if kind == 'recording' and any(word.endswith(('.mod', '.prg')) for word in words):
             kind = 'program'
         if kind == 'recording' and any(word.endswith(('.csv', '.txt', '.tsv')) for word in words):

@@ -32,9 +32,8 @@ def test_every_command_that_prints_json_has_its_schema():
         if any('--json' in option.opts for option in commands.get_command(context, name).params)
     }
     assert printing == set(KINDS)
-    assert {*KINDS.values(), 'program', 'side_by_side', 'pose_table', 'gun_on_part'} == set(
-        KINDS_OF_JSON
-    )
+    others = {'program', 'side_by_side', 'pose_table', 'gun_on_part', 'plan_of_faces'}
+    assert {*KINDS.values(), *others} == set(KINDS_OF_JSON)
 
 
 def test_provenance_names_each_file_with_its_digest():

@@ -3,12 +3,14 @@
 from paint_deposition.api.geometry import GunOnPart, look_at
 from paint_deposition.api.improvement import improve
 from paint_deposition.api.inference import calibrate, compare, compare_models, diagnose, refit
+from paint_deposition.api.measuring import choose_readings
 from paint_deposition.api.pictures import plot
-from paint_deposition.api.planning import plan, recommend
+from paint_deposition.api.planning import plan, plan_faces, recommend
 from paint_deposition.api.samples import sample_folder
 from paint_deposition.api.simulation import Film, simulate
 from paint_deposition.api.writing import write
 from paint_deposition.comparison.comparison import Comparison, SideBySide
+from paint_deposition.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
@@ -20,7 +22,9 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import GunEnvelope
 from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.readings.campaign import Campaign
@@ -29,13 +33,16 @@ from paint_deposition.readings.readings import Readings
 __all__ = [
     'Calibration',
     'Campaign',
+    'ChosenReadings',
     'Comparison',
     'DepositionModel',
     'Diagnosis',
     'Film',
+    'GunEnvelope',
     'GunOnPart',
     'Improvement',
     'PaintError',
+    'PartPlan',
     'Plan',
     'Readings',
     'Recommendation',
@@ -43,12 +50,14 @@ __all__ = [
     'Surface',
     'Trajectory',
     'calibrate',
+    'choose_readings',
     'compare',
     'compare_models',
     'diagnose',
     'improve',
     'look_at',
     'plan',
+    'plan_faces',
     'plot',
     'read_campaign',
     'read_mesh',

@@ -9,17 +9,20 @@ from matplotlib.axes import Axes
 
 from paint_deposition.api.simulation import Film
 from paint_deposition.comparison.comparison import Comparison
+from paint_deposition.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.calibration import draw_agreement
 from paint_deposition.report.pictures.film import draw_film
+from paint_deposition.report.pictures.measuring_points import draw_points
 from paint_deposition.report.pictures.uniformity import draw_curve
 
 
 def plot(result: Any, ax: Axes | None = None) -> Axes:
-    """Draw a result: a film or a plan on its part, an index curve, or measured over predicted.
+    """Draw a result: a film, a plan or points on their part, a curve, or measured over predicted.
 
     Args:
         result: what a verb of this package returned.
@@ -43,8 +46,14 @@ def _draw(result: Any, ax: Axes) -> None:
 
 @_draw.register(Film)
 @_draw.register(Plan)
-def _(result: Film | Plan, ax: Axes) -> None:
+@_draw.register(PartPlan)
+def _(result: Film | Plan | PartPlan, ax: Axes) -> None:
     draw_film(ax, result.surface, result.film_um, result.path, result.statistics.painted_above_um)
+
+
+@_draw.register
+def _(result: ChosenReadings, ax: Axes) -> None:
+    draw_points(ax, result)
 
 
 @_draw.register

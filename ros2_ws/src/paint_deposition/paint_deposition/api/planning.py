@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import GunEnvelope
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.optimised_plan import optimised
+from paint_deposition.planning.part_plan import PartPlan
+from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan, PlanRequest
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.recommendation import Recommendation
@@ -55,3 +60,30 @@ def plan(
     """
     plain = planned(surface, model or DepositionModel(), PlanRequest(**wanted), frame_id, progress)
     return optimised(plain, progress) if optimise else plain
+
+
+def plan_faces(
+    surface: Surface,
+    model: DepositionModel | None = None,
+    *,
+    frame_id: str = 'part',
+    face_angle_deg: float = math.degrees(WIDEST_RAD),
+    envelope: GunEnvelope | None = None,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+    **wanted: Any,
+) -> PartPlan:
+    """Lay passes over a part that has several sides, each of them sprayed by itself.
+
+    Args:
+        surface, model, frame_id, progress, wanted: as for ``plan``. With ``outward``, faces on the
+            back are left out.
+        face_angle_deg: greatest angle between a normal of a face and its mean [deg].
+        envelope: of the gun, for the check that it keeps clear of the part.
+
+    Raises:
+        PlanError: the request has no answer; says why and what comes closest.
+    """
+    return planned_faces(
+        surface, model or DepositionModel(), PlanRequest(**wanted), frame_id,
+        math.radians(face_angle_deg), envelope, progress,
+    )  # fmt: skip

@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import singledispatch
 from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.simulation import Film
 from paint_deposition.comparison.comparison import Comparison, SideBySide
+from paint_deposition.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.files.provenance import origin
+from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.study import Study
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.trade_off import Point
@@ -26,7 +30,9 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.pictures.calibration import write_calibration_pictures
 from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.report.pictures.geometry import write_geometry_picture
 from paint_deposition.report.pictures.improvement import write_improvement_picture
+from paint_deposition.report.pictures.measuring_points import write_measuring_picture
 from paint_deposition.report.pictures.profiles import write_comparison_picture
 from paint_deposition.report.pictures.trade_off import write_trade_off
 from paint_deposition.report.pictures.uniformity import write_uniformity
@@ -34,6 +40,7 @@ from paint_deposition.results.calibration import write_calibration
 from paint_deposition.results.film import write_film
 from paint_deposition.results.fitted_model import write_fitted
 from paint_deposition.results.improvement import write_improvement
+from paint_deposition.results.measuring import write_chosen_readings
 from paint_deposition.results.plan import write_plan
 from paint_deposition.results.residual_mesh import file_name, write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
@@ -53,13 +60,14 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         folder: where to; made if it is not there.
         start: of a calibration or a diagnosis, the ``ModelFile`` that it started from: its name,
             history and uncertainties are carried on.
-        made_from: of a film, a plan, an improvement or a recommendation, more to say in its
-            figures, such as the files used.
+        made_from: of a film, a plan, an improvement, chosen points or a recommendation, more to
+            say in its figures, such as the files used.
         model: of a recommendation, what it was computed with.
         part_pose, frame_id: of a plan or an improvement, where the part stands in the robot's
             frame, [x y z qx qy qz qw], and the name of that frame; its files have their poses in
-            that frame then.
-        trade_off: of these, ``Point``s of other weights of the paint, for a table and a picture.
+            that frame then. The first of them also of chosen points.
+        trade_off: of plan or improvement, ``Point``s of other weights of the paint, for a table
+            and a picture.
 
     Returns:
         The paths written.
@@ -145,9 +153,10 @@ def _(
     return files
 
 
-@write.register
+@write.register(Plan)
+@write.register(PartPlan)
 def _(
-    result: Plan,
+    result: Plan | PartPlan,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
@@ -163,6 +172,15 @@ def _(
         Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,
     )  # fmt: skip
+    if isinstance(result, PartPlan):
+        # The film is seen from one side, the passes from three. That they lie aside of the one
+        # side that a part usually has is not odd here.
+        geometry = spray_geometry(result.surface, result.path, result.model, frame_id)
+        geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
+        files.append(Path(folder) / f'passes.{pictures}')
+        title = 'Planned passes over the faces'
+        write_geometry_picture(files[-1], result.surface, result.path, geometry, title)
+        return [*files, picture]
     plain = result.plain or result
     return [*files, picture, *_write_trade_off(Path(folder), plain.point, trade_off, pictures)]
 
@@ -195,6 +213,21 @@ def _write_trade_off(
         write_trade_off_table(folder / 'pareto.csv', points),
         write_trade_off(folder / f'pareto.{pictures}', given, points),
     ]
+
+
+@write.register
+def _(
+    result: ChosenReadings,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
+    about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
+    about |= _provenance(result.model, _files(about))
+    part = None if part_pose is None else Rigid.of(part_pose)
+    files = write_chosen_readings(folder, result, about, part)
+    return [*files, write_measuring_picture(Path(folder) / f'points.{pictures}', result)]
 
 
 def _provenance(

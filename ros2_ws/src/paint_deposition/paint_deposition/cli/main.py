@@ -23,6 +23,7 @@ COMMANDS = {
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
     'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
+    'measure': ('measure', 'Choose where to put the gauge on a part.'),
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),

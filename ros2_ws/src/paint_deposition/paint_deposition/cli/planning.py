@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli.faces import faces_lines, faces_options
 from paint_deposition.cli.model_choice import campaign_model_words, chosen_model
 from paint_deposition.cli.options import (
     BODY,
@@ -226,6 +227,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @click.option(
     '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
 )
+@faces_options
 @output_option('the bag, passes.csv, passes.mod, plan.json and the film')
 @PICTURES
 @JSON
@@ -243,6 +245,7 @@ def plan_command(
     pareto: bool,
     pictures: str,
     as_json: bool,
+    lay: Callable[..., tuple[pd.Plan | pd.PartPlan, tuple]],
     **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
@@ -253,7 +256,7 @@ def plan_command(
     with Progress('plan') as tell:
         tell('reading the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
-        result = pd.plan(
+        result, contacts = lay(
             surface, chosen.model, frame_id=frame_id if part_pose is None else 'part',
             progress=tell, travel_rad=math.radians(travel_deg), **wanted,
         )  # fmt: skip
@@ -278,7 +281,9 @@ def plan_command(
             pictures=pictures, trade_off=others,
         )  # fmt: skip
     say_all('note', surface.notes)
-    lines = [*_plan_lines(result), *file_lines(files)]
+    say_all('warning', map(str, contacts))
+    told = faces_lines(result) if isinstance(result, pd.PartPlan) else _plan_lines(result)
+    lines = [*told, *file_lines(files)]
     say_results(files, as_json, lines, model=chosen.words)
 
 

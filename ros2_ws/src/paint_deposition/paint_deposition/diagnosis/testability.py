@@ -67,22 +67,33 @@ def _detectable(
 
 
 def _ratio(space: ModelSpace, direction: np.ndarray, null: np.ndarray, draws: np.ndarray) -> float:
-    """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried.
-
-    Args:
-        space: its test is simulated.
-        direction: (P,) unit vector of whitened deviations.
-        null: simulated evidence if no cause acted. draws: (P, DRAWS) deviations behind the first.
-    """
-    chosen = _following(space, direction)
-    rest = np.exp(null[:DRAWS]) - np.exp(space.evidence(draws, chosen))
-    moved = draws[:, np.newaxis] + np.multiply.outer(direction, RATIOS)[:, :, np.newaxis]
-    along = space.evidence(moved.reshape(len(direction), -1), chosen)
-    evidence = np.log(np.exp(along.reshape(len(RATIOS), DRAWS)) + rest)
-    power = np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
+    """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried."""
+    power = power_along(space, direction, RATIOS, null, draws)
     if power[-1] < POWER:
         return np.inf
     return float(np.interp(POWER, np.maximum.accumulate(power), RATIOS))
+
+
+def power_along(
+    space: ModelSpace,
+    direction: np.ndarray,
+    ratios: np.ndarray,
+    null: np.ndarray,
+    draws: np.ndarray,
+) -> np.ndarray:
+    """(R,) probability that the test finds a deviation of each of R lengths.
+
+    Args:
+        space: its test is simulated.
+        direction: (P,) unit vector of whitened deviations. ratios: (R,) the lengths.
+        null: simulated evidence if no cause acted. draws: (P, D) deviations behind its first D.
+    """
+    chosen, count = _following(space, direction), draws.shape[1]
+    rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
+    moved = draws[:, np.newaxis] + np.multiply.outer(direction, ratios)[:, :, np.newaxis]
+    along = space.evidence(moved.reshape(len(direction), -1), chosen)
+    evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
+    return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
 
 
 def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:

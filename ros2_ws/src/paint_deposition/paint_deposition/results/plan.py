@@ -9,6 +9,7 @@ from paint_deposition.files.planned_model import DIGEST, PLAN_FILE
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.results.film import writable, write_film
 from paint_deposition.results.passes import Passes, write_passes
@@ -16,7 +17,7 @@ from paint_deposition.results.passes import Passes, write_passes
 
 def write_plan(
     folder: str | Path,
-    plan: Plan,
+    plan: Plan | PartPlan,
     surface: Surface,
     details: Mapping[str, Any] | None = None,
     part: tuple[str, Rigid] | None = None,

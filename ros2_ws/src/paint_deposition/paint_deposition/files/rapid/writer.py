@@ -1,9 +1,11 @@
-"""Planned passes as an ABB RAPID module."""
+"""Planned passes, and places for a gauge, as ABB RAPID modules."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
+
+import numpy as np
 
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.part_frame import Rigid
@@ -25,6 +27,15 @@ MODULE = r"""MODULE PaintPasses
 {moves}
     SetDO doGun,0;
   ENDPROC
+ENDMODULE
+"""
+GAUGE_MODULE = r"""MODULE PaintGauge
+  ! Places for the gauge in wobjPart, taught on the robot: z of the tool points into the surface.
+  ! Millimetres; axis configurations are free. pGauge{{1}} is point P1 of points.csv, and so on.
+{about}  CONST num nGauge:={count};
+  CONST robtarget pGauge{{{count}}}:=[
+{targets}
+  ];
 ENDMODULE
 """
 NOWHERE = '[[0,0,0],[1,0,0,0]]'
@@ -54,7 +65,10 @@ def module_text(
     for speed in speeds:
         if not 0.0 < speed < 10.0:
             raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
-    data = [f'  CONST robtarget p{k}:={_target(move)};' for k, move in enumerate(moves, start=1)]
+    data = [
+        f'  CONST robtarget p{k}:={_target(move.position_m, move.quaternion_xyzw)};'
+        for k, move in enumerate(moves, start=1)
+    ]
     data += [
         f'  CONST speeddata {name}:=[{speed * 1e3:.3f},500,5000,1000];'
         for speed, name in speeds.items()
@@ -71,8 +85,7 @@ def module_text(
         speed_name = speeds[_speed(move)]
         run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
     about = ''.join(f'  ! {comment}\n' for comment in comments)
-    if part is not None:
-        about += f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{_pose(part.values)},{NOWHERE}];\n'
+    about += _work_object(part)
     return MODULE.format(
         about=about,
         data='\n'.join(data),
@@ -93,8 +106,29 @@ def _flow(move: Move) -> float:
     return round(float(move.flow), 4)
 
 
-def _target(move: Move) -> str:
-    pose = _pose([*move.position_m, *move.quaternion_xyzw])
+def gauge_module_text(
+    positions_m: np.ndarray, quaternions_xyzw: np.ndarray, part: Rigid | None = None
+) -> str:
+    """A module with the targets of a measuring robot, in the order of the points.
+
+    Args:
+        positions_m, quaternions_xyzw: (P, 3) and (P, 4) poses of the gauge in the part's frame.
+        part: as in ``module_text``.
+    """
+    targets = (_target(*pose) for pose in zip(positions_m, quaternions_xyzw, strict=True))
+    listed = ',\n'.join(f'    {target}' for target in targets)
+    return GAUGE_MODULE.format(about=_work_object(part), count=len(positions_m), targets=listed)
+
+
+def _work_object(part: Rigid | None) -> str:
+    """The line that defines the work object by the pose of the part, where that is known."""
+    if part is None:
+        return ''
+    return f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{_pose(part.values)},{NOWHERE}];\n'
+
+
+def _target(position_m: np.ndarray, quaternion_xyzw: np.ndarray) -> str:
+    pose = _pose([*position_m, *quaternion_xyzw])
     return f'{pose[:-1]},{ANY_AXES}]'
 
 

@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from paint_deposition.files.tables import words as trade
 from paint_deposition.files.tables.layout import Layout
@@ -50,6 +50,11 @@ class Columns:
     def has_place(self) -> bool:
         """Whether the rows say where they were taken."""
         return all(q in self.at for q in AXES) or all(q in self.at for q in ON_FACE)
+
+    def without_thickness(self) -> 'Columns':
+        """The same for a list of places: what is measured there, or is yet to be, says nothing."""
+        at = {quantity: column for quantity, column in self.at.items() if quantity != 'thickness'}
+        return replace(self, at=at, repeats=())
 
     @property
     def score(self) -> int:

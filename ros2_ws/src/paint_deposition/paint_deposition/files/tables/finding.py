@@ -32,6 +32,8 @@ def read_table(path: Path, needs: str, layout: Layout) -> Table:
     """
     complaints = Complaints(path)
     sheet, columns = _sheet_and_columns(sheets_of(path), needs, layout, complaints)
+    if needs == 'place':
+        columns = columns.without_thickness()
     for quantity, column in columns.at.items():
         heading = columns.headings[column]
         if quantity in NUMBERS and columns.headings.count(heading) > 1:
@@ -42,7 +44,8 @@ def read_table(path: Path, needs: str, layout: Layout) -> Table:
     rows = sorted_rows(sheet, columns, complaints)
     if not rows.kept:
         complaints.refuse_any()
-        raise complaints.of_file('no readings below the header')
+        empty = f", '{columns.headings[columns.repeats[0]]}' is empty" if rows.blank else ''
+        raise complaints.of_file(f'no readings below the header{empty}')
     width = len(columns.headings)
     cells = [[*sheet.rows[k][:width], *[''] * (width - len(sheet.rows[k]))] for k in rows.kept]
     form = sheet.form + ('' if columns.header >= 0 else ', no headings')

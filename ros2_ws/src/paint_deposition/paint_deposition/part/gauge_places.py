@@ -1,0 +1,67 @@
+"""Places on a part where a gauge can stand: clear of edges and bends, at a distance."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from paint_deposition.part.face_places import from_edges_m, on_face_m
+from paint_deposition.part.groups import near_pairs
+from paint_deposition.part.surface import Surface
+
+# The foot of a usual gauge, from its middle to its rim [m].
+FOOT_M = 0.015
+# Under the foot the surface turns away by no more: a radius of about 85 mm.
+MOST_LEAN_RAD = np.radians(10.0)
+# Area that discs thrown at random take up until none fits any more, for a disc of diameter 1.
+AREA_A_DISC = 1.436
+# A grid is made finer by this factor until it has points enough, down to this pitch [m].
+FINER, LEAST_PITCH_M = 0.98, 0.005
+
+
+def can_stand(surface: Surface, foot_m: float = FOOT_M) -> np.ndarray:
+    """(V,) bool, whether a foot of this radius [m] stands level around each vertex."""
+    positions, normals = surface.vertices_m, surface.normals
+    lean = np.zeros(len(positions))
+    for block, one, other, _ in near_pairs(positions, positions, foot_m):
+        cosine = np.einsum('nk,nk->n', normals[block][one], normals[other])
+        # What faces the other way is the back of the sheet.
+        turned = np.where(cosine > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+        np.maximum.at(lean, block.start + one, turned)
+    return (surface.points().edge_distance_m > foot_m) & (lean <= MOST_LEAN_RAD)
+
+
+def spread_places(surface: Surface, usable: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
+    """About ``count`` of the usable vertices (V,) bool, drawn at a distance; their rows."""
+    area_m2 = float(surface.vertex_areas_m2[usable].sum())
+    apart_m = np.sqrt(area_m2 / (AREA_A_DISC * count))
+    order = np.random.default_rng(seed).permutation(np.flatnonzero(usable))
+    tree, free, kept = cKDTree(surface.vertices_m[order]), np.ones(len(order), dtype=bool), []
+    for row, vertex in enumerate(order):
+        if free[row]:
+            kept.append(vertex)
+            free[tree.query_ball_point(surface.vertices_m[vertex], apart_m)] = False
+    return np.array(kept, dtype=int)
+
+
+def grid_places(surface: Surface, usable: np.ndarray, count: int) -> np.ndarray:
+    """``count`` of the usable vertices (V,) bool on a square grid over the face; their rows.
+
+    The widest grid that has as many; what it has too many is left out here and there.
+    """
+    rows = np.flatnonzero(usable)
+    face = from_edges_m(surface, surface.vertices_m)
+    tree, size = cKDTree(surface.vertices_m), face.max(axis=0)
+    pitch_m = 1.5 * np.sqrt(surface.vertex_areas_m2[rows].sum() / count)
+    while True:
+        across, up = (_centred(length, pitch_m) for length in size)
+        places, hit = on_face_m(surface, np.stack(np.meshgrid(across, up), -1).reshape(-1, 2))
+        near = np.unique(tree.query(places[hit])[1])
+        near = near[usable[near]]
+        if len(near) >= count or pitch_m < LEAST_PITCH_M:
+            return near[np.linspace(0, len(near) - 1, min(count, len(near))).round().astype(int)]
+        pitch_m *= FINER
+
+
+def _centred(length_m: float, pitch_m: float) -> np.ndarray:
+    """Places at a pitch along a length, as far from both of its ends."""
+    count = int(length_m / pitch_m) + 1
+    return 0.5 * (length_m - (count - 1) * pitch_m) + pitch_m * np.arange(count)

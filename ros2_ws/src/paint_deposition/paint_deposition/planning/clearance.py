@@ -1,0 +1,136 @@
+"""Whether gun and spray keep clear of the part along a whole motion."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import require_above_zero
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+
+# Poses are looked at after this much travel or turn.
+STEP_M, STEP_RAD = 0.01, math.radians(2.0)
+# Contacts closer together in time than this are one.
+ONE_CONTACT_S = 0.5
+
+
+@dataclass(frozen=True)
+class GunEnvelope:
+    """What must stay clear of the part, on the tool's axis.
+
+    Attributes:
+        radius_m: of the gun and of the cylinder before it.
+        length_m: of the gun, behind the TCP.
+        before_m: of the cylinder before the TCP in which there must be no part.
+    """
+
+    radius_m: float = 0.08
+    length_m: float = 0.4
+    before_m: float = 0.1
+
+    def __post_init__(self) -> None:
+        require_above_zero(gun_radius_m=self.radius_m, gun_length_m=self.length_m)
+        if self.before_m < 0.0:
+            require_above_zero(keep_off_m=self.before_m)
+
+    @property
+    def middle_m(self) -> float:
+        """Of the whole cylinder, along tool z from the TCP [m]."""
+        return 0.5 * (self.before_m - self.length_m)
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of the sphere about that middle that holds it all [m]."""
+        return math.hypot(self.radius_m, 0.5 * (self.before_m + self.length_m))
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The part within the envelope for a while.
+
+    Attributes:
+        begin_s, end_s: since the first pose.
+        place_m: (3,) of the part that is deepest inside [m].
+        depth_m: how far it is inside [m].
+        by_gun: whether it meets the gun, not only the cylinder before it.
+    """
+
+    begin_s: float
+    end_s: float
+    place_m: np.ndarray
+    depth_m: float
+    by_gun: bool
+
+    def __str__(self) -> str:
+        where = ', '.join(f'{value:.3f}' for value in self.place_m)
+        what = 'the gun touches the part' if self.by_gun else 'the part is too near before the gun'
+        return (
+            f'{what} at ({where}) m from {self.begin_s:.1f} to {self.end_s:.1f} s, by '
+            f'{self.depth_m * 1e3:.0f} mm'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``contacts`` in a plan."""
+        return {
+            'begin_s': self.begin_s, 'end_s': self.end_s, 'place_m': self.place_m.tolist(),
+            'depth_m': self.depth_m, 'by_gun': self.by_gun,
+        }  # fmt: skip
+
+
+def contacts(
+    surface: Surface, trajectory: Trajectory, envelope: GunEnvelope
+) -> tuple[Contact, ...]:
+    """Where the envelope meets the part, by the vertices of its refined mesh.
+
+    What is smaller than an edge of that mesh may be missed by half an edge.
+    """
+    rows = _telling(trajectory)
+    positions = trajectory.positions_m[rows]
+    turns = Rotation.from_quat(trajectory.quaternions_xyzw[rows])
+    axes = turns.as_matrix()[:, :, 2]
+    near = cKDTree(surface.vertices_m).query_ball_point(
+        positions + envelope.middle_m * axes, envelope.reach_m
+    )
+    seconds = 1e-9 * (trajectory.stamps_ns[rows] - trajectory.stamps_ns[0])
+    found: list[Contact] = []
+    for time_s, position, axis, vertices in zip(seconds, positions, axes, near, strict=True):
+        if not vertices:
+            continue
+        way = surface.vertices_m[vertices] - position
+        along = way @ axis
+        aside = np.linalg.norm(way - along[:, np.newaxis] * axis, axis=1)
+        depth = np.minimum.reduce(
+            [envelope.radius_m - aside, envelope.before_m - along, along + envelope.length_m]
+        )
+        deepest = int(np.argmax(depth))
+        if depth[deepest] <= 0.0:
+            continue
+        by_gun = bool(((depth > 0.0) & (along < 0.0)).any())
+        here = Contact(
+            float(time_s), float(time_s), surface.vertices_m[vertices[deepest]],
+            float(depth[deepest]), by_gun,
+        )  # fmt: skip
+        if found and time_s - found[-1].end_s < ONE_CONTACT_S:
+            found[-1] = _joined(found[-1], here)
+        else:
+            found.append(here)
+    return tuple(found)
+
+
+def _joined(before: Contact, here: Contact) -> Contact:
+    deeper = max(before, here, key=lambda contact: contact.depth_m)
+    by_gun = before.by_gun or here.by_gun
+    return Contact(before.begin_s, here.end_s, deeper.place_m, deeper.depth_m, by_gun)
+
+
+def _telling(trajectory: Trajectory) -> np.ndarray:
+    """Rows of poses that lie a step apart, with the last one."""
+    way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / STEP_M
+    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
+    way += (turns[:-1].inv() * turns[1:]).magnitude() / STEP_RAD
+    steps = np.floor(np.concatenate([[0.0], np.cumsum(way)]))
+    return np.unique(np.append(np.unique(steps, return_index=True)[1], len(trajectory) - 1))

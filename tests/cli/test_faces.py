@@ -1,0 +1,48 @@
+"""`paint plan --faces auto` as a user runs it."""
+
+import json
+
+import pytest
+import trimesh
+
+from cli.command import assert_refused, paint
+from folded_parts import hood
+
+
+@pytest.fixture
+def mesh(tmp_path):
+    surface = hood(0.06)
+    path = tmp_path / 'hood.ply'
+    trimesh.Trimesh(surface.vertices_m, surface.faces, process=False).export(path)
+    return path
+
+
+@pytest.mark.slow
+def test_a_hood_is_planned_on_two_faces(mesh, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06)
+    done = paint('plan', '--mesh', mesh, *options, '--json', '-o', tmp_path / 'plan')
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert len(told['faces']) == 2
+    assert told['sigma_n'] < told['one_raster']['sigma_n']
+    names = {path.name for path in (tmp_path / 'plan').iterdir()}
+    assert {'trajectory', 'passes.csv', 'passes.mod', 'passes.png', 'film.png'} <= names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('faces', ['one', 'auto'])
+def test_a_part_that_is_too_near_is_told_of(faces, mesh, tmp_path):
+    options = ('--faces', faces, '--target-um', 20, '--max-edge-length-m', 0.06)
+    done = paint('plan', '--mesh', mesh, *options, '--keep-off-m', 0.4, '-o', tmp_path / 'near')
+    assert done.returncode == 0
+    assert 'warning: the part is too near before the gun at (' in done.stderr
+
+
+def test_faces_are_not_optimised_besides(mesh, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--optimise')
+    assert_refused(paint('plan', '--mesh', mesh, *options, '-o', tmp_path / 'plan'), '--optimise')
+
+
+def test_an_angle_that_is_none_is_refused(mesh, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--face-angle-deg', 90)
+    assert_refused(paint('plan', '--mesh', mesh, *options, '-o', tmp_path / 'plan'), '90')

@@ -1,0 +1,133 @@
+"""Plans for parts with several sides: film, order and files."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from folded_parts import bumper, hood
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PlanError
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import contacts
+from paint_deposition.planning.face_order import FacePasses, in_order, motion_over
+from paint_deposition.planning.part_plan import plan_faces
+from paint_deposition.planning.passes import PassStyle, PlannedPass
+from paint_deposition.planning.plan import PlanRequest
+from paint_deposition.results.plan import write_plan
+from surfaces import solid
+
+NARROW = DepositionModel(
+    planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
+)
+PARTS = {'hood': hood, 'bumper': bumper}
+STYLE = PassStyle(standoff_m=0.2, speed_m_per_s=0.3)
+
+
+@pytest.fixture(scope='module', params=PARTS)
+def planned(request):
+    return plan_faces(PARTS[request.param](), NARROW, PlanRequest(target_um=20.0), 'part')
+
+
+def film_of(plan, trajectory) -> np.ndarray:
+    path, _ = spray_path(trajectory, max_step_m=plan.model.max_step_m)
+    integrator = FilmIntegrator(plan.surface.points(), plan.model)
+    integrator.add(path)
+    return integrator.film_um
+
+
+def level_pass(y_m: float, begin_m: float = 0.0, end_m: float = 1.0) -> PlannedPass:
+    """A straight pass along x."""
+    places = np.array([[begin_m, y_m, 0.2], [end_m, y_m, 0.2]])
+    turns = np.tile(np.diag([1.0, -1.0, -1.0]), (2, 1, 1))
+    return PlannedPass(y_m, places, turns, np.array([0.0, 1.0]), 0.1, 0.8, 0.3)
+
+
+@pytest.mark.slow
+def test_faces_paint_the_whole_part_more_evenly_than_one_raster(planned):
+    assert planned.statistics.coverage == 1.0
+    assert planned.sigma_n < 0.5 * planned.sigma_n_one_raster
+    assert planned.statistics.mean_um == pytest.approx(20.0, rel=0.02)
+
+
+@pytest.mark.slow
+def test_blending_evens_the_seams(planned):
+    assert planned.sigma_n < 0.6 * planned.sigma_n_unblended
+
+
+@pytest.mark.slow
+def test_the_film_is_that_of_the_motion(planned):
+    np.testing.assert_allclose(planned.film_um, film_of(planned, planned.trajectory), rtol=1e-4)
+
+
+@pytest.mark.slow
+def test_the_motion_has_no_jump_and_keeps_clear(planned):
+    motion = planned.trajectory
+    step = np.linalg.norm(np.diff(motion.positions_m, axis=0), axis=1)
+    assert np.all(step <= 1.3 * 1e-9 * np.diff(motion.stamps_ns))
+    assert planned.contacts == contacts(planned.surface, motion, planned.envelope) == ()
+
+
+@pytest.mark.slow
+def test_files_read_back_to_the_same_film(planned, tmp_path):
+    write_plan(tmp_path, planned, planned.surface)
+    bag = film_of(planned, read_recording(tmp_path / 'trajectory'))
+    program = film_of(planned, read_recording(tmp_path / 'passes.mod'))
+    peak = planned.film_um.max()
+    assert np.abs(bag - planned.film_um).max() < 1e-3 * peak
+    # Zones and acceleration are left out of a program; its moves are straight.
+    assert np.abs(program - planned.film_um).max() < 5e-3 * peak
+
+
+@pytest.mark.slow
+def test_the_back_of_a_closed_part_stays_bare():
+    sheet = hood(0.08)
+    surface = Surface.from_triangles(*solid(sheet.vertices_m, sheet.faces, 0.002), 1.0)
+    found = plan_faces(surface, NARROW, PlanRequest(target_um=20.0, outward=(0.0, 0.0, 1.0)))
+    assert len(found.faces) == 2
+    assert found.statistics.area_m2 == pytest.approx(sheet.area_m2, rel=0.05)
+
+
+def test_a_tolerance_out_of_reach_names_the_closest():
+    request = PlanRequest(target_um=20.0, tolerance=1e-4)
+    with pytest.raises(PlanError, match=r'the closest is 0\.0'):
+        plan_faces(hood(0.08), NARROW, request)
+
+
+def test_faces_follow_each_other_with_least_travel():
+    """Two faces end to end: the second is run the other way round."""
+    first = FacePasses((level_pass(0.0), level_pass(0.3, 1.0, 0.0)), STYLE)
+    second = FacePasses((level_pass(0.9), level_pass(0.6, 1.0, 0.0)), STYLE)
+    one, other = in_order([second, first])
+    assert float(np.linalg.norm(other.start_m - one.end_m)) == pytest.approx(0.3)
+    fixed = replace(STYLE, one_way=True)
+    kept = in_order([FacePasses(face.passes, fixed) for face in (second, first)])
+    begins = {face.passes[0].across_m for face in kept}
+    assert begins == {0.0, 0.9}
+
+
+def test_a_pass_run_the_other_way_sprays_the_same_stretch():
+    face = FacePasses((level_pass(0.0),), STYLE)
+    (turned,) = face.reversed().passes
+    sprayed = np.interp([turned.on_m, turned.off_m], turned.along_m, turned.positions_m[:, 0])
+    np.testing.assert_allclose(sprayed, [0.8, 0.1])
+
+
+def test_between_faces_the_gun_is_drawn_back_until_it_is_clear():
+    faces = [FacePasses((level_pass(y),), STYLE) for y in (0.0, 1.0)]
+    asked = []
+
+    def clear_at_the_third(way) -> bool:
+        asked.append(way.positions_m[:, 2].max())
+        return len(asked) == 3
+
+    motion = motion_over(faces, 'part', clear_at_the_third)
+    np.testing.assert_allclose(asked, [0.3, 0.4, 0.6])
+    assert motion.trajectory.positions_m[:, 2].max() == pytest.approx(0.6)
+    seconds = 1e-9 * motion.trajectory.trigger_stamps_ns
+    assert np.all(np.diff(seconds) > 0.0)
+    assert motion.trajectory.trigger_flow.tolist() == [1.0, 0.0, 1.0, 0.0]
