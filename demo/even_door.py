@@ -1,4 +1,4 @@
-"""A better model paints a more even door: paint, measure, diagnose, choose the speeds again, paint.
+"""A better model, a more even door: paint, measure, diagnose, choose the speeds again, paint.
 
 Panel and doors are painted in the virtual paint shop of the tests, which shares no code with the
 model: only it knows what is hidden, and what film there is between the readings.
