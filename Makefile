@@ -17,7 +17,7 @@ help:  ## list the targets
 build:  ## set up the environment and the workspace (takes minutes the first time only)
 	@setup/build.sh
 
-demo: build  ## paint a door through the nodes, recommend an index, diagnose a measured door
+demo: build  ## paint a door through the nodes, recommend an index, diagnose, paint a better door
 	@$(IN_ENVIRONMENT) python demo/demo.py runs/demo
 
 test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
