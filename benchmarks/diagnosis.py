@@ -6,8 +6,6 @@ selection by BIC get the same draws. Results are kept line by line, so that a ru
 and taken up again; `--report-only` prints the table of what is there.
 """
 
-import json
-import multiprocessing
 import os
 import sys
 import time
@@ -17,7 +15,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from tqdm import tqdm
 
 # One thread a process: several campaigns are in work at once, and would wait for each other.
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
@@ -28,6 +25,7 @@ sys.path.insert(0, str(ROOT))
 
 from benchmarks.amounts import true_amounts  # noqa: E402
 from benchmarks.campaigns import PaintedCase, name_of  # noqa: E402
+from benchmarks.records import add, kept  # noqa: E402
 from benchmarks.rivals import Oracle, Points, stepwise_bic, visible_strength  # noqa: E402
 from benchmarks.scores import failures, table  # noqa: E402
 from benchmarks.unseen import oracle_unseen_error, unseen_error  # noqa: E402
@@ -227,20 +225,12 @@ def main(
     parcels = PARCELS
     if quick:
         count, redraws, parcels = QUICK['cases'], QUICK['redraws'], QUICK['parcels']
-    results.parent.mkdir(parents=True, exist_ok=True)
     FILMS.mkdir(parents=True, exist_ok=True)
-    lines = results.read_text().splitlines() if results.exists() else []
-    records = [json.loads(line) for line in lines]
+    records = kept(results)
     if not report_only:
         found = every_cause(seed) if every else cases(count, chosen, seed)
         done = {(r['case'], r['redraw']) for r in records}
-        todo = tasks(found, parcels, redraws, done)
-        pool = multiprocessing.get_context('spawn').Pool(jobs)
-        with results.open('a') as file, pool:
-            for block in tqdm(pool.imap_unordered(run, todo), total=len(todo), mininterval=20):
-                records += block
-                file.writelines(json.dumps(record, default=float) + '\n' for record in block)
-                file.flush()
+        records = add(results, run, tasks(found, parcels, redraws, done), jobs)
     click.echo(table(records))
     if failed:
         click.echo('\n' + failures(records))

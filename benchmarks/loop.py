@@ -7,8 +7,6 @@ All films are the shop's own. An oracle knows which effects act and has 300 read
 Results are kept line by line, so that a run can be cut off and taken up again.
 """
 
-import json
-import multiprocessing
 import os
 import sys
 import tempfile
@@ -18,7 +16,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from tqdm import tqdm
 
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
     os.environ.setdefault(threads, '1')
@@ -26,6 +23,7 @@ for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.records import add, kept  # noqa: E402
 from tests.virtual_paint_shop.draw import draw_jobs, stream  # noqa: E402
 from tests.virtual_paint_shop.files import write  # noqa: E402
 from tests.virtual_paint_shop.gauge import GaugeNoise, scatter  # noqa: E402
@@ -87,13 +85,13 @@ class World:
         return read_campaign(write(both, self.folder / name, sigma_column=True))
 
 
-def run_one(job: tuple[int, str, int]) -> dict:
+def run_one(job: tuple[int, str, int]) -> list[dict]:
     """Go round the loop on one part."""
     warnings.simplefilter('ignore')
     seed, hidden, parcels = job
     with tempfile.TemporaryDirectory() as name:
         world = World.of(seed, hidden, parcels, Path(name))
-        return {'seed': seed, 'hidden': hidden} | _turned(world)
+        return [{'seed': seed, 'hidden': hidden} | _turned(world)]
 
 
 def _turned(world: World) -> dict:
@@ -188,22 +186,12 @@ def main(
     parts: int, seed: int, parcels: int, processes: int, results: Path, only_summary: bool
 ) -> None:
     """Measure what diagnosing is worth in evenness of the next part."""
-    results.parent.mkdir(parents=True, exist_ok=True)
-    lines = results.read_text().splitlines() if results.exists() else []
-    records = [json.loads(line) for line in lines]
+    records = kept(results)
     if not only_summary:
         known = {r['seed'] for r in records}
-        todo = [
-            (seed + n, HIDDEN[n % len(HIDDEN)], parcels)
-            for n in range(parts)
-            if seed + n not in known
-        ]
-        pool = multiprocessing.get_context('spawn').Pool(processes)
-        with results.open('a') as file, pool:
-            for record in tqdm(pool.imap_unordered(run_one, todo), total=len(todo)):
-                records.append(record)
-                file.write(json.dumps(record, default=float) + '\n')
-                file.flush()
+        jobs = [(seed + n, HIDDEN[n % len(HIDDEN)], parcels) for n in range(parts)]
+        todo = [job for job in jobs if job[0] not in known]
+        records = add(results, run_one, todo, processes)
     click.echo(table(records))
 
 

@@ -7,8 +7,6 @@ Results are kept line by line, so that a run can be cut off and taken up again; 
 prints the tables of what is there.
 """
 
-import json
-import multiprocessing
 import os
 import sys
 import warnings
@@ -18,7 +16,6 @@ from pathlib import Path
 
 import click
 import numpy as np
-from tqdm import tqdm
 
 # One thread a process: several doors are at work at once, and would wait for each other.
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
@@ -27,6 +24,7 @@ for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from benchmarks.records import add, kept  # noqa: E402
 from tests.virtual_paint_shop.bench import Bench  # noqa: E402
 from tests.virtual_paint_shop.draw import draw_jobs, stream  # noqa: E402
 from tests.virtual_paint_shop.gauge import GaugeNoise, measure  # noqa: E402
@@ -210,26 +208,21 @@ def main(
     doors: int, count: int, first_seed: int, processes: int, results: Path, report_only: bool
 ) -> None:
     """Compare chosen points with a grid and with random ones."""
-    results.parent.mkdir(parents=True, exist_ok=True)
-    lines = results.read_text().splitlines() if results.exists() else []
-    records = {tuple(r['job']): r for r in map(json.loads, lines)}
+    records = kept(results)
     seeds = range(first_seed, first_seed + doors)
     jobs = [(seed, n) for n in COUNTS for seed in seeds]
     jobs += [(seed, truth, count) for seed in seeds for truth in TRUTHS]
-    todo = [] if report_only else [job for job in jobs if job not in records]
-    with multiprocessing.get_context('spawn').Pool(processes) as pool, results.open('a') as file:
-        for record in tqdm(pool.imap_unordered(run, todo), total=len(todo), mininterval=10):
-            records[tuple(record['job'])] = record
-            file.write(json.dumps(record) + '\n')
-            file.flush()
-    powers = [r for r in records.values() if 'power' in r]
-    said = [r for r in records.values() if 'said' in r]
+    if not report_only:
+        done = {tuple(r['job']) for r in records}
+        records = add(results, run, [job for job in jobs if job not in done], processes)
+    powers = [r for r in records if 'power' in r]
+    said = [r for r in records if 'said' in r]
     click.echo('\n'.join([*power_table(powers), '', *diagnosis_table(said)]))
 
 
-def run(job: tuple) -> dict:
+def run(job: tuple) -> list[dict]:
     """One line of the results."""
-    return {'job': job} | (expected(job) if len(job) == 2 else diagnosed(job))
+    return [{'job': job} | (expected(job) if len(job) == 2 else diagnosed(job))]
 
 
 if __name__ == '__main__':

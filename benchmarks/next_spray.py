@@ -6,8 +6,6 @@ hidden world, and both are diagnosed together. Results are kept line by line, so
 cut off and taken up again; `--summary` prints what is there.
 """
 
-import json
-import multiprocessing
 import os
 import sys
 import tempfile
@@ -17,7 +15,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
-from tqdm import tqdm
 
 # One thread a process: several campaigns are at work at once, and would wait for each other.
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
@@ -25,6 +22,8 @@ for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
+
+from benchmarks.records import add, kept  # noqa: E402
 
 # Effects that are easily taken for another one.
 TRUTHS = (
@@ -203,23 +202,16 @@ def main(
     truths: str, each: int, first_seed: int, processes: int, results: Path, only_summary: bool
 ) -> None:
     """Score the first proposed spray on parts with hidden effects."""
-    results.parent.mkdir(parents=True, exist_ok=True)
-    lines = results.read_text().splitlines() if results.exists() else []
-    records = [json.loads(line) for line in lines]
+    records = kept(results)
     if not only_summary:
         known = {(r['seed'], r['truth']) for r in records}
-        todo = [
+        jobs = [
             (first_seed + 100 * TRUTHS.index(truth) + k, truth, SCALES[k % len(SCALES)])
             for k in range(each)
             for truth in truths.split(',')
         ]
-        todo = [job for job in todo if job[:2] not in known]
-        pool = multiprocessing.get_context('spawn').Pool(processes)
-        with results.open('a') as file, pool:
-            for found in tqdm(pool.imap_unordered(run_one, todo), total=len(todo), mininterval=20):
-                records += found
-                file.writelines(json.dumps(record, default=float) + '\n' for record in found)
-                file.flush()
+        todo = [job for job in jobs if job[:2] not in known]
+        records = add(results, run_one, todo, processes)
     click.echo(table(records))
 
 

@@ -14,7 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.posterior import Posterior
-from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.fitting.draws import drawn
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -30,6 +30,7 @@ from paint_deposition.planning.improvement.limits import split_options
 from paint_deposition.planning.improvement.moves import moves_of
 from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.pass_films import spread
+from paint_deposition.planning.plan import simulated
 from paint_deposition.planning.surface_map import painted_side, pass_axes
 from paint_deposition.results.passes import BAG, PROGRAM, Passes, write_passes
 
@@ -79,7 +80,7 @@ def improve(
     seen = look_at(surface, trajectory, model)
     surface, given = seen.surface, Programme.of(trajectory)
     progress('the film as it is', 0.0)
-    film_um, emitted = _film(surface, model, trajectory)
+    film_um, emitted = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
         raise RecordingError(f'{trajectory.source}: no paint lands on the part')
     if judged is None:
@@ -92,8 +93,8 @@ def improve(
     progress('the film of the written files', 0.0)
     passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
     improved, program = _read_back(passes)
-    new_um, new_emitted = _film(surface, model, improved)
-    program_um, _ = _film(surface, model, program)
+    new_um, new_emitted = simulated(surface, model, improved)
+    program_um, _ = simulated(surface, model, program)
     tolerance = wish.tolerance or DEFAULT_TOLERANCE
     band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
     path, improved_path = seen.path, spray_path(improved)[0]
@@ -107,16 +108,6 @@ def improve(
         _interval(surface, judged, model, posterior, (given, Programme.of(improved)), seed),
         seen.geometry.warnings,
     )  # fmt: skip
-
-
-def _film(
-    surface: Surface, model: DepositionModel, trajectory: Trajectory
-) -> tuple[np.ndarray, float]:
-    """(V,) film of a motion [um], and what it sprays [cm3]."""
-    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
-    integrator.add(path)
-    return integrator.film_um, integrator.emitted_cm3
 
 
 def _judged(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) -> np.ndarray:

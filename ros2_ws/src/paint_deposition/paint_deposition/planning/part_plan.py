@@ -10,7 +10,6 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -21,7 +20,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import Contact, GunEnvelope, contacts
 from paint_deposition.planning.face_order import in_order, motion_over
 from paint_deposition.planning.passes import PlannedPass
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.planning.plan import PlanRequest, plan, simulated
 from paint_deposition.planning.seams import blend, sigma_n_of
 
 # Faces that turn further from the side of the gun are its back.
@@ -166,7 +165,7 @@ def plan_faces(
     running = in_order(blended.faces)
     progress('motion', 0.0)
     motion = motion_over(running, frame_id, lambda way: not contacts(surface, way, envelope))
-    film, emitted = _film(surface, model, motion.trajectory)
+    film, emitted = simulated(surface, model, motion.trajectory)
     sigma_n = sigma_n_of(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
@@ -201,15 +200,6 @@ def _of_the_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ..
 def _outward(surface: Surface) -> np.ndarray:
     mean = surface.vertex_areas_m2 @ surface.normals
     return mean / np.linalg.norm(mean)
-
-
-def _film(
-    surface: Surface, model: DepositionModel, trajectory: Trajectory
-) -> tuple[np.ndarray, float]:
-    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
-    integrator.add(path)
-    return integrator.film_um, integrator.emitted_cm3
 
 
 def _one_raster(

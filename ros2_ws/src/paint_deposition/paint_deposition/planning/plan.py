@@ -296,7 +296,7 @@ def simulated(
     surface: Surface,
     model: DepositionModel,
     trajectory: Trajectory,
-    progress: Callable[[float], None],
+    progress: Callable[[float], None] = lambda share: None,
 ) -> tuple[np.ndarray, float]:
     """(V,) film of a motion [um], and what it sprays [cm3]."""
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
