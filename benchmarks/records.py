@@ -18,7 +18,7 @@ def kept(results: Path) -> list[dict]:
 def add(
     results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple], processes: int
 ) -> list[dict]:
-    """Run tasks side by side, each giving records, and append these to a file; returns all in it."""
+    """Run tasks side by side, append their records to a file, and return all that it holds."""
     results.parent.mkdir(parents=True, exist_ok=True)
     with multiprocessing.get_context('spawn').Pool(processes) as pool, results.open('a') as file:
         for found in tqdm(pool.imap_unordered(run, todo), total=len(todo), mininterval=20):
