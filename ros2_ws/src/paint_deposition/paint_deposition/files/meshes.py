@@ -8,8 +8,9 @@ from paint_deposition.errors import MeshError
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.creases import Edges
-from paint_deposition.part.refinement import face_areas_m2, weld
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.welding import weld
 
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
@@ -49,7 +50,7 @@ def read_mesh(
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
     read = _load(path, body)
     vertices, faces, notes = read.vertices * (read.unit_m * scale), read.faces, [*read.notes]
-    _check_extent(path, vertices[faces.ravel()])
+    _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
     faces = _without_degenerate(path, vertices, faces, notes)
     faces = _oriented(vertices, faces, notes)
@@ -113,7 +114,10 @@ def _load(path: Path, body: str | None) -> Bodies:
     return bodies
 
 
-def _check_extent(path: Path, corners_m: np.ndarray) -> None:
+def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
+    used = np.zeros(len(vertices_m), dtype=bool)
+    used[faces] = True
+    corners_m = vertices_m if used.all() else vertices_m[used]
     extent = float(np.ptp(corners_m, axis=0).max())
     if extent > LARGEST_M:
         raise MeshError(
@@ -130,8 +134,7 @@ def _check_extent(path: Path, corners_m: np.ndarray) -> None:
 def _without_degenerate(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
-    corners = vertices_m[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = edge_lengths_m(vertices_m, faces).max(axis=1)
     good = 2.0 * face_areas_m2(vertices_m, faces) > LEAST_HEIGHT_M * longest
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
@@ -148,11 +151,15 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         notes.append(f'{count} triangles wound against their neighbours were turned round')
         faces, edges = turned, Edges.of(turned)
     closed = not len(edges.single) and not len(edges.clashing)
-    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-    if closed and np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times the volume
+    if closed and _volume_m3(vertices_m, faces) < 0.0:
         notes.append('the closed body was inside out and was turned round')
         faces = faces[:, ::-1]
     return np.ascontiguousarray(faces)
+
+
+def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+    return float(np.einsum('ij,ij->', a, np.cross(b, c))) / 6.0
 
 
 def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:

@@ -77,9 +77,12 @@ class Surface:
         Raises:
             MeshError: refinement would give too many triangles.
         """
+        vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
+        faces = np.ascontiguousarray(faces, dtype=np.int64)
         edges = creases.Edges.of(faces)
-        rim = creases.rim_folds(vertices_m, faces, edges)
-        origin, patches = creases.split_at_creases(vertices_m, faces, edges, rim)
+        folds = creases.folds_rad(vertices_m, faces, edges)
+        rim = creases.rim_folds(vertices_m, faces, edges, folds)
+        origin, patches = creases.split_at_creases(faces, edges, folds, rim)
         strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
