@@ -41,7 +41,7 @@ def _next(half_edge):
 @njit(cache=True, nogil=True)
 def _sorted(vertices, count):
     """Half-edges sorted by counting, by the higher of their vertices first, then by the lower."""
-    order = np.arange(len(vertices), dtype=np.int32)
+    order = np.arange(len(vertices)).astype(np.int32)
     for lower in (False, True):
         place = np.zeros(count + 1, dtype=np.int32)
         for h in range(len(vertices)):
