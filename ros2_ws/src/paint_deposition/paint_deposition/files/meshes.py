@@ -1,5 +1,6 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
@@ -49,7 +50,11 @@ def read_mesh(
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
     read = _load(path, body)
-    vertices, faces, notes = read.vertices * (read.unit_m * scale), read.faces, [*read.notes]
+    notes, unit_m = [*read.notes], read.unit_m
+    vertices, faces = read.vertices, read.faces
+    del read
+    if unit_m * scale != 1.0:
+        vertices = vertices * (unit_m * scale)
     _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
     faces = _without_degenerate(path, vertices, faces, notes)
@@ -106,8 +111,8 @@ def _load(path: Path, body: str | None) -> Bodies:
             f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
             'export it again'
         )
-    wrong = np.sum(~np.isfinite(vertices).all(axis=1))
-    if wrong:
+    if not np.isfinite(vertices).all():
+        wrong = np.sum(~np.isfinite(vertices).all(axis=1))
         raise MeshError(
             f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
         )
@@ -134,7 +139,7 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
 def _without_degenerate(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
-    longest = edge_lengths_m(vertices_m, faces).max(axis=1)
+    longest = reduce(np.maximum, edge_lengths_m(vertices_m, faces).T)
     good = 2.0 * face_areas_m2(vertices_m, faces) > LEAST_HEIGHT_M * longest
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')

@@ -44,13 +44,14 @@ def _sorted(vertices, count):
     order = np.arange(len(vertices)).astype(np.int32)
     for lower in (False, True):
         place = np.zeros(count + 1, dtype=np.int32)
-        for h in range(len(vertices)):
-            start, end = vertices[h], vertices[_next(h)]
+        for i in range(len(vertices)):
+            start, end = vertices[i], vertices[_next(i)]
             place[(min(start, end) if lower else max(start, end)) + 1] += 1
         for v in range(count):
             place[v + 1] += place[v]
         ordered = np.empty_like(order)
-        for h in order:
+        for i in range(len(order)):
+            h = order[i]
             start, end = vertices[h], vertices[_next(h)]
             key = min(start, end) if lower else max(start, end)
             ordered[place[key]] = h

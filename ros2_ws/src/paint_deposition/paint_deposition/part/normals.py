@@ -38,13 +38,13 @@ def mean_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def _normals(vertices_m: np.ndarray, faces: np.ndarray, fitted: bool) -> np.ndarray:
     vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
-    around = _corners_at(triangles, len(vertices))
+    first, corner = _corners_at(triangles, len(vertices))
     normals = np.empty((len(vertices), 3))
     blocks = max(1, min(get_num_threads(), len(vertices) // LEAST_BLOCK))
     bounds = np.linspace(0, len(vertices), blocks + 1).astype(np.int64)
     with ThreadPoolExecutor(blocks) as threads:
         work = [
-            threads.submit(_fill, vertices, triangles, *around, fitted, start, stop, normals)
+            threads.submit(_fill, vertices, triangles, first, corner, fitted, start, stop, normals)
             for start, stop in pairwise(bounds)
         ]
     for done in work:
