@@ -86,7 +86,7 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
 
 
 def _binary_stl(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices and faces of a complete binary STL: trimesh takes five times the memory for it."""
+    """Vertices and faces of a complete binary STL: trimesh takes five times the file's memory."""
     with path.open('rb') as file:
         head = file.read(STL_HEAD)
     count = int.from_bytes(head[80:], 'little')
