@@ -10,8 +10,9 @@ from trimesh.creation import cylinder
 from paint_deposition.errors import MeshError
 from paint_deposition.part import refinement
 from paint_deposition.part.creases import Edges
-from paint_deposition.part.refinement import face_areas_m2, refine, weld
+from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.welding import weld
 
 
 @pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])

@@ -65,3 +65,13 @@ def test_json_fails_before_it_writes(tmp_path):
     with pytest.raises(ValueError, match='cannot be written as JSON'):
         write_json(tmp_path / 'x.json', {'object': object()})
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_is_as_numpy_writes_it(painted, tmp_path):
+    surface, film, stats = painted
+    film = film * np.geomspace(1e-9, 1e9, len(film))
+    csv = write_film(tmp_path, surface, film, stats)[1]
+    rows = np.column_stack([surface.vertices_m, film])
+    header = 'x_m,y_m,z_m,thickness_um'
+    np.savetxt(tmp_path / 'plain.csv', rows, '%.9g', ',', header=header, comments='')
+    assert csv.read_bytes() == (tmp_path / 'plain.csv').read_bytes()

@@ -1,15 +1,18 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
+from functools import reduce
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.errors import MeshError
+from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.creases import Edges
-from paint_deposition.part.refinement import face_areas_m2, weld
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.welding import weld
 
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
@@ -28,7 +31,8 @@ def read_mesh(
 
     The winding says which side is outward, toward the gun. An open surface is taken as it is; a
     closed body that is inside out is turned round, and triangles wound against their neighbours
-    are turned to the majority, both with a note in ``Surface.notes``.
+    are turned to the majority, both with a note in ``Surface.notes``. A large part is kept on
+    disk for the next time, see ``files.surface_cache``.
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
@@ -47,13 +51,15 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    read = _load(path, body)
-    vertices, faces, notes = read.vertices * (read.unit_m * scale), read.faces, [*read.notes]
-    _check_extent(path, vertices[faces.ravel()])
-    vertices, faces = weld(vertices, faces)
-    faces = _without_degenerate(path, vertices, faces, notes)
-    faces = _oriented(vertices, faces, notes)
-    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
+    place = surface_cache.place_of(
+        path, scale, max_edge_length_m, None if down is None else np.asarray(down).tolist(), body
+    )
+    surface = surface_cache.find(place) if place else None
+    if surface is None:
+        surface = _prepared(path, scale, max_edge_length_m, down, body)
+        if place:
+            surface_cache.keep(place, surface)
+    return surface
 
 
 def write_mesh_ply(
@@ -83,6 +89,26 @@ def write_mesh_ply(
         painted.export(temporary, file_type='ply', vertex_normal=True)
 
 
+def _prepared(
+    path: Path,
+    scale: float,
+    max_edge_length_m: float,
+    down: np.ndarray | None,
+    body: str | None,
+) -> Surface:
+    read = _load(path, body)
+    notes, unit_m = [*read.notes], read.unit_m
+    vertices, faces = read.vertices, read.faces
+    del read
+    if unit_m * scale != 1.0:
+        vertices = vertices * (unit_m * scale)
+    _check_extent(path, vertices, faces)
+    vertices, faces = weld(vertices, faces)
+    faces = _without_degenerate(path, vertices, faces, notes)
+    faces = _oriented(vertices, faces, notes)
+    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
+
+
 def _require_positive(name: str, value: float, meaning: str) -> None:
     if not (np.isfinite(value) and value > 0.0):
         raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
@@ -105,15 +131,18 @@ def _load(path: Path, body: str | None) -> Bodies:
             f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
             'export it again'
         )
-    wrong = np.sum(~np.isfinite(vertices).all(axis=1))
-    if wrong:
+    if not np.isfinite(vertices).all():
+        wrong = np.sum(~np.isfinite(vertices).all(axis=1))
         raise MeshError(
             f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
         )
     return bodies
 
 
-def _check_extent(path: Path, corners_m: np.ndarray) -> None:
+def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
+    used = np.zeros(len(vertices_m), dtype=bool)
+    used[faces] = True
+    corners_m = vertices_m if used.all() else vertices_m[used]
     extent = float(np.ptp(corners_m, axis=0).max())
     if extent > LARGEST_M:
         raise MeshError(
@@ -130,8 +159,7 @@ def _check_extent(path: Path, corners_m: np.ndarray) -> None:
 def _without_degenerate(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
-    corners = vertices_m[faces]
-    longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+    longest = reduce(np.maximum, edge_lengths_m(vertices_m, faces).T)
     good = 2.0 * face_areas_m2(vertices_m, faces) > LEAST_HEIGHT_M * longest
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
@@ -148,11 +176,15 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         notes.append(f'{count} triangles wound against their neighbours were turned round')
         faces, edges = turned, Edges.of(turned)
     closed = not len(edges.single) and not len(edges.clashing)
-    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-    if closed and np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times the volume
+    if closed and _volume_m3(vertices_m, faces) < 0.0:
         notes.append('the closed body was inside out and was turned round')
         faces = faces[:, ::-1]
     return np.ascontiguousarray(faces)
+
+
+def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
+    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+    return float(np.einsum('ij,ij->', a, np.cross(b, c))) / 6.0
 
 
 def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:

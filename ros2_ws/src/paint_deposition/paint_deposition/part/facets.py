@@ -19,12 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial import cKDTree
 
+from paint_deposition.part.half_edges import edges_of
+
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
 GUN_M = 0.3
 # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
 LEAST_EDGE_M = 0.004
 MOST_EDGES = 5_000
+BLOCK = 1 << 16
 # A point within a triangle lies near the middles of its sides, and of few others.
 NEAR_EDGES = 8
 
@@ -87,30 +90,42 @@ class CurvedEdges:
             vertices_m, normals: (V, 3) corners of smooth patches [m], unit normals.
             faces: (F, 3).
         """
-        ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-        start, end = np.unique(np.sort(ends, axis=1), axis=0).T
-        along = vertices_m[end] - vertices_m[start]
-        lengths = np.linalg.norm(along, axis=1)
-        along /= lengths[:, None]
-        at_start = np.einsum('ij,ij->i', normals[start], along)
-        at_end = np.einsum('ij,ij->i', normals[end], along)
-        lean, turn = 0.5 * (at_start + at_end), at_end - at_start
-        sagitta = lengths * turn / 8.0
-        error = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
-        error[lengths < LEAST_EDGE_M] = 0.0
-        worst = np.argsort(-error, kind='stable')[:MOST_EDGES]
-        worst = worst[error[worst] > LEAST_ERROR]
-        start, end, along, lean = start[worst], end[worst], along[worst], lean[worst]
+        edges = edges_of(faces)[0]
+        # Few edges matter: with those of a block at a time, a fine mesh takes little memory.
+        blocks = [edges[first : first + BLOCK] for first in range(0, len(edges), BLOCK)]
+        kept = [block[_bends(vertices_m, normals, block)[0] > LEAST_ERROR] for block in blocks]
+        edges = np.concatenate(kept)
+        error = _bends(vertices_m, normals, edges)[0]
+        edges = edges[np.argsort(-error, kind='stable')[:MOST_EDGES]]
+        _, along, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
+        start, end = edges.T
         normal = _unit(normals[start] + normals[end])
         middle = 0.5 * (vertices_m[start] + vertices_m[end])
         return CurvedEdges(
             middle,
             normal,
-            middle + sagitta[worst, None] * normal,
+            middle + sagitta[:, None] * normal,
             _unit(normal - 1.5 * lean[:, None] * along),
-            lengths[worst],
+            lengths,
             np.arccos(np.clip(np.einsum('ij,ij->i', normals[start], normals[end]), -1.0, 1.0)),
         )
+
+
+def _bends(
+    vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Of edges (E, 2): what they cost, unit vectors along them, lengths, leans and sagittas."""
+    start, end = edges.T
+    along = vertices_m[end] - vertices_m[start]
+    lengths = np.linalg.norm(along, axis=1)
+    along /= lengths[:, None]
+    at_start = np.einsum('ij,ij->i', normals[start], along)
+    at_end = np.einsum('ij,ij->i', normals[end], along)
+    lean, turn = 0.5 * (at_start + at_end), at_end - at_start
+    sagitta = lengths * turn / 8.0
+    error = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
+    error[lengths < LEAST_EDGE_M] = 0.0
+    return error, along, lengths, lean, sagitta
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -3,17 +3,55 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
+from numba import njit
 from scipy.spatial import cKDTree
 
 BLOCK = 4096
 
 
 def connected(pairs: np.ndarray, count: int) -> tuple[int, np.ndarray]:
-    """How many groups (P, 2) pairs make of ``count`` members, and (count,) the group of each."""
-    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(count, count))
-    return connected_components(links, directed=False)
+    """How many groups (P, 2) pairs make of ``count`` members, and (count,) the group of each.
+
+    Groups are numbered in the order of their first members.
+    """
+    return numbered_groups(_joined(np.ascontiguousarray(pairs, dtype=np.int32), count))
+
+
+@njit(cache=True, nogil=True)
+def joined_groups(parent, one, other):
+    """Join two members' groups; ``parent`` (N,) leads from each member to the group's first."""
+    while parent[one] != one:
+        parent[one] = parent[parent[one]]
+        one = parent[one]
+    while parent[other] != other:
+        parent[other] = parent[parent[other]]
+        other = parent[other]
+    if one < other:
+        parent[other] = one
+    else:
+        parent[one] = other
+
+
+@njit(cache=True, nogil=True)
+def numbered_groups(parent):
+    """How many groups there are, and (N,) the number of each member's."""
+    group = np.empty_like(parent)
+    count = 0
+    for member in range(len(parent)):
+        if parent[member] == member:
+            group[member] = count
+            count += 1
+        else:  # what leads to the first member comes before this one
+            group[member] = group[parent[member]]
+    return count, group
+
+
+@njit(cache=True, nogil=True)
+def _joined(pairs, count):
+    parent = np.arange(count).astype(np.int32)
+    for p in range(len(pairs)):
+        joined_groups(parent, pairs[p, 0], pairs[p, 1])
+    return parent
 
 
 def near_pairs(

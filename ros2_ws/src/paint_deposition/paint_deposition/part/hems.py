@@ -64,6 +64,8 @@ def strip_vertices(
         patches: (F, 3) triangles on vertices that no two smooth patches share.
         hem_half_edges: (H,) both half-edges of each fold of a hem, as numbered by ``Edges``.
     """
+    if not len(hem_half_edges):
+        return np.zeros(len(vertices_m), dtype=bool)
     patch = _patch_of_vertex(patches, len(vertices_m))
     length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
     of_face = patch[patches[:, 0]]
@@ -75,6 +77,8 @@ def strip_vertices(
 
 def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarray:
     """(count,) bool: the flag of patches' first vertices, for all vertices of the refined ones."""
+    if not flagged.any():
+        return np.zeros(count, dtype=bool)
     patch = _patch_of_vertex(fine, count)
     return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
 

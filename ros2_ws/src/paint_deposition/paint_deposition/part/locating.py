@@ -47,9 +47,12 @@ class SurfaceLocator:
 
     def __init__(self, vertices_m: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> None:
         self._vertices_m, self._faces, self._normals = vertices_m, faces, normals
-        corners = vertices_m[faces]
-        self._centres = corners.mean(axis=1)
-        self._reach_m = float(np.linalg.norm(corners - self._centres[:, None], axis=2).max())
+        # A corner at a time: all together take much memory on a fine mesh.
+        self._centres = sum(vertices_m[corner] for corner in faces.T) / 3.0
+        self._reach_m = max(
+            float(np.linalg.norm(vertices_m[corner] - self._centres, axis=1).max())
+            for corner in faces.T
+        )
         self._tree = cKDTree(self._centres)
 
     def locate(

@@ -1,29 +1,14 @@
 """From the triangles of a file to a conforming mesh of bounded edge length."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+from numba import njit
 
 from paint_deposition.errors import MeshError
-from paint_deposition.part.groups import connected
+from paint_deposition.part.half_edges import edges_of
 from paint_deposition.part.slivers import CutEdges, cut_edges, cut_slivers, find_slivers
 
-WELD_M = 1e-6
 MAX_TRIANGLES = 4_000_000
 KEY_BASE = np.int64(1) << 31
-
-
-def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Make vertices closer than a micrometre one: STL repeats them for every triangle.
-
-    Returns:
-        Vertices (V, 3) [m] in the order in which they first appear, and faces (F, 3) on them.
-    """
-    unique, label = np.unique(vertices_m, axis=0, return_inverse=True)
-    close = cKDTree(unique).query_pairs(WELD_M, output_type='ndarray')
-    group = connected(close, len(unique))[1][label.ravel()]
-    first = np.unique(group, return_index=True)[1]
-    order = np.argsort(first)
-    return vertices_m[first[order]], np.argsort(order)[group][faces]
 
 
 def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -39,13 +24,59 @@ def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) lengths of the edges from each corner to the next [m]."""
-    corners = vertices_m[faces]
-    return np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return _edge_lengths(*_plain(vertices_m, faces))
 
 
 def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    a, b, c = vertices_m[faces].transpose(1, 0, 2)
-    return np.cross(b - a, c - a)
+    return _cross_products(*_plain(vertices_m, faces))
+
+
+def _plain(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    return (
+        np.ascontiguousarray(vertices_m, dtype=np.float64),
+        np.ascontiguousarray(faces, dtype=np.int64),
+    )
+
+
+@njit(cache=True, nogil=True)
+def _cross_products(vertices, faces):
+    vectors = np.empty((len(faces), 3))
+    for f in range(len(faces)):
+        i, j, k = faces[f]
+        ax = vertices[j, 0] - vertices[i, 0]
+        ay = vertices[j, 1] - vertices[i, 1]
+        az = vertices[j, 2] - vertices[i, 2]
+        bx = vertices[k, 0] - vertices[i, 0]
+        by = vertices[k, 1] - vertices[i, 1]
+        bz = vertices[k, 2] - vertices[i, 2]
+        vectors[f, 0] = ay * bz - az * by
+        vectors[f, 1] = az * bx - ax * bz
+        vectors[f, 2] = ax * by - ay * bx
+    return vectors
+
+
+@njit(cache=True, nogil=True)
+def _lengths(vertices, edges):
+    lengths = np.empty(len(edges))
+    for e in range(len(edges)):
+        x = vertices[edges[e, 1], 0] - vertices[edges[e, 0], 0]
+        y = vertices[edges[e, 1], 1] - vertices[edges[e, 0], 1]
+        z = vertices[edges[e, 1], 2] - vertices[edges[e, 0], 2]
+        lengths[e] = np.sqrt(x * x + y * y + z * z)
+    return lengths
+
+
+@njit(cache=True, nogil=True)
+def _edge_lengths(vertices, faces):
+    lengths = np.empty((len(faces), 3))
+    for f in range(len(faces)):
+        for k in range(3):
+            start, end = faces[f, k], faces[f, (k + 1) % 3]
+            x = vertices[end, 0] - vertices[start, 0]
+            y = vertices[end, 1] - vertices[start, 1]
+            z = vertices[end, 2] - vertices[start, 2]
+            lengths[f, k] = np.sqrt(x * x + y * y + z * z)
+    return lengths
 
 
 def refine(
@@ -74,9 +105,8 @@ def refine(
     _refuse_too_many(vertices_m, faces, max_edge_length_m)
     mesh = _Growing(vertices_m, normals)
     while True:
-        edges, of_face = _edges(faces)
-        ends = mesh.vertices_m[edges]
-        length_m = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        edges, of_face = edges_of(faces)
+        length_m = _lengths(mesh.vertices_m, edges)
         known = mesh.known_middles(edges)
         too_long = length_m > max_edge_length_m
         in_step = known.max() < 0
@@ -89,12 +119,9 @@ def refine(
             mesh.add_cuts(edges, cut)
             faces = np.concatenate([np.delete(faces, thin, axis=0), pieces])
             continue
-        # Ranks instead of lengths: neighbours agree on which of two equal edges is the longer.
-        rank = np.empty(len(edges), dtype=np.int64)
-        rank[np.argsort(length_m, kind='stable')] = np.arange(len(edges))
-        longest = rank[of_face].argmax(axis=1)
-        own_longest = of_face[np.arange(len(faces)), longest]
-        halved = _closed_under_longest(too_long | (known >= 0), of_face, own_longest)
+        longest = _longest(length_m, of_face)
+        halved = too_long | (known >= 0)
+        _close_under_longest(halved, of_face, longest)
         middle = mesh.add_middles(edges, halved, known)
         faces = _split(mesh.vertices_m, faces, middle[of_face], longest)
 
@@ -152,24 +179,31 @@ class _Growing:
         self.normals = np.concatenate([self.normals, between])
 
 
-def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(E, 2) ends of the edges, lower first, and (F, 3) which one leaves each corner."""
-    following = np.roll(faces, -1, axis=1)
-    keys = np.minimum(faces, following) * KEY_BASE + np.maximum(faces, following)
-    keys, of_face = np.unique(keys, return_inverse=True)
-    return np.stack(np.divmod(keys, KEY_BASE), axis=1), of_face.reshape(-1, 3)
+@njit(cache=True, nogil=True)
+def _longest(length_m, of_face):
+    """(F,) 0 to 2, the longest edge; of equal ones that of higher number: neighbours agree."""
+    longest = np.zeros(len(of_face), dtype=np.int64)
+    for f in range(len(of_face)):
+        for k in (1, 2):
+            best, other = of_face[f, longest[f]], of_face[f, k]
+            longer = length_m[other] > length_m[best]
+            if longer or (length_m[other] == length_m[best] and other > best):
+                longest[f] = k
+    return longest
 
 
-def _closed_under_longest(
-    halved: np.ndarray, of_face: np.ndarray, own_longest: np.ndarray
-) -> np.ndarray:
-    """(E,) edges to halve: those given, and the longest of every triangle that is touched."""
-    halved = halved.copy()
-    while True:
-        touched = halved[of_face].any(axis=1) & ~halved[own_longest]
-        if not touched.any():
-            return halved
-        halved[own_longest[touched]] = True
+@njit(cache=True, nogil=True)
+def _close_under_longest(halved, of_face, longest):
+    """Add to the (E,) edges to halve the longest of every triangle that is touched."""
+    changed = True
+    while changed:
+        changed = False
+        for f in range(len(of_face)):
+            own = of_face[f, longest[f]]
+            if not halved[own] and (
+                halved[of_face[f, 0]] or halved[of_face[f, 1]] or halved[of_face[f, 2]]
+            ):
+                halved[own] = changed = True
 
 
 def _split(

@@ -77,10 +77,15 @@ class Surface:
         Raises:
             MeshError: refinement would give too many triangles.
         """
+        vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
+        faces = np.ascontiguousarray(faces, dtype=np.int64)
         edges = creases.Edges.of(faces)
-        rim = creases.rim_folds(vertices_m, faces, edges)
-        origin, patches = creases.split_at_creases(vertices_m, faces, edges, rim)
+        folds = creases.folds_rad(vertices_m, faces, edges)
+        rim = creases.rim_folds(vertices_m, faces, edges, folds)
+        origin, patches = creases.split_at_creases(faces, edges, folds, rim)
+        rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
         strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
+        del edges, folds  # large ones, before the next are made
         corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
@@ -95,7 +100,7 @@ class Surface:
             normals,
             vertex_areas,
             down / np.linalg.norm(down),
-            creases.rim_segments_m(vertices_m, faces, edges, rim),
+            rim_m,
             notes,
             in_hem=hems.carried_over(strip, fine, len(vertices)),
             curved_edges=CurvedEdges.of(corners, read_normals, patches),

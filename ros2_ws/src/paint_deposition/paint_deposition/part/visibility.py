@@ -30,9 +30,8 @@ class Occluder:
         self._origin_m = 0.5 * (vertices_m.min(axis=0) + vertices_m.max(axis=0))
         self._scene = EmbreeScene(robust=True)
         # The scene does not keep the mesh alive by itself.
-        self._mesh = TriangleMesh(
-            self._scene, (vertices_m - self._origin_m)[faces].astype(np.float32)
-        )
+        corners = (vertices_m - self._origin_m).astype(np.float32)
+        self._mesh = TriangleMesh(self._scene, corners, faces.astype(np.int32))
 
     def visible(self, origins_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
         """Whether nothing of the part lies between.

@@ -9,9 +9,9 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.half_edges import edges_of
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.visibility import Occluder
+from paint_deposition.report.pictures.seen_faces import seen_faces
 from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
 
@@ -27,7 +27,7 @@ PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 
 @dataclass(frozen=True)
 class PartPicture:
-    """What a picture shows of a part, found by a ray for each of its H x W pixels.
+    """What a picture of H x W pixels shows of a part.
 
     Attributes:
         view: the directions of the picture.
@@ -52,27 +52,18 @@ class PartPicture:
         view = View.of_front(surface.outward, surface.down)
         flat = view.flat(surface.vertices_m)
         low, high = flat.min(axis=0), flat.max(axis=0)
-        front = surface.faces[face_normals(surface.vertices_m, surface.faces) @ view.toward > 0.0]
         width, height = np.maximum(PIXELS * (high - low) / (high - low).max(), 1).astype(int)
-        right, up = (
-            start + (np.arange(count) + 0.5) * (end - start) / count
-            for start, end, count in zip(low, high, (width, height), strict=True)
+        step = (high - low) / (width, height)
+        toward = surface.vertices_m @ view.toward
+        nearest, weights, seen = seen_faces(
+            flat, toward, surface.faces, low, step, int(height), int(width)
         )
-        places = np.stack(np.meshgrid(right, up), axis=-1).reshape(-1, 2)
-        nearest = (surface.vertices_m @ view.toward).max() + 1.0
-        eyes = places @ np.stack([view.right, view.up]) + nearest * view.toward
-        hit = Occluder(surface.vertices_m, front).first_faces(
-            eyes, np.broadcast_to(-view.toward, eyes.shape)
-        )
-        corners = front[np.maximum(hit, 0)]
-        weights = _barycentric(places, flat[corners])
-        weights[hit < 0] = np.nan
         return PartPicture(
             view,
-            corners.reshape(height, width, 3),
-            weights.reshape(height, width, 3),
+            surface.faces[np.maximum(nearest, 0)],
+            weights,
             surface.normals,
-            flat[_borders(front[np.unique(hit[hit >= 0])])],
+            flat[_borders(surface.faces[seen])],
             low,
             high,
         )
@@ -149,18 +140,5 @@ class PartPicture:
 
 def _borders(faces: np.ndarray) -> np.ndarray:
     """(E, 2) edges with one triangle only: creases, where patches share no vertex, and rims."""
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    unique, count = np.unique(edges, axis=0, return_counts=True)
-    return unique[count == 1]
-
-
-def _barycentric(places: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(N, 3) weights of the corners of flat triangles (N, 3, 2) at places (N, 2) in them."""
-    first, second = (triangles[:, k] - triangles[:, 2] for k in (0, 1))
-    off = places - triangles[:, 2]
-    area = first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
-    with np.errstate(divide='ignore', invalid='ignore'):
-        a = (off[:, 0] * second[:, 1] - off[:, 1] * second[:, 0]) / area
-        b = (first[:, 0] * off[:, 1] - first[:, 1] * off[:, 0]) / area
-    a, b = np.clip(np.nan_to_num(a), 0.0, 1.0), np.clip(np.nan_to_num(b), 0.0, 1.0)
-    return np.stack([a, b, np.clip(1.0 - a - b, 0.0, 1.0)], axis=1)
+    edges, of_face = edges_of(faces)
+    return edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]

@@ -1,0 +1,170 @@
+"""How long `paint simulate` takes from the files of a part and a motion to the film, by stages.
+
+    python benchmarks/file_to_film.py [VERTICES ...] [--json FILE]
+
+The part is the side of a body, 4.5 m by 1.5 m, crowned, with a belt line and a window, meshed
+evenly, as a binary STL; the gun passes over it for 60 s, recorded at 250 Hz. Every size runs in a
+process of its own. Times of the processor add up all threads; memory is the most that the process
+held up to then. The stages do without the cache of parts; the command runs twice, first on a new
+part and then on the part seen before.
+"""
+
+import argparse
+import json
+import os
+import resource
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+SIZES = (10_000, 100_000, 1_000_000)
+LENGTH_M, HEIGHT_M = 4.5, 1.5
+SECONDS, RATE_HZ = 60.0, 250.0
+PASSES, STANDOFF_M = 4, 0.25
+COARSER_THAN_ANY_M = 1.0
+
+
+def body_side(vertices: int) -> tuple[np.ndarray, np.ndarray]:
+    """About that many vertices (V, 3) [m], and faces (F, 3) outward to -y."""
+    across = max(4, round((vertices * LENGTH_M / HEIGHT_M / 0.9) ** 0.5))
+    up = max(4, round(across * HEIGHT_M / LENGTH_M))
+    x, z = np.meshgrid(np.linspace(0, LENGTH_M, across), np.linspace(0, HEIGHT_M, up))
+    crown = 0.15 * (2.0 * z / HEIGHT_M - 1.0) ** 2 + 0.08 * (2.0 * x / LENGTH_M - 1.0) ** 2
+    belt = 0.6 * np.maximum(0.0, z - 0.95)
+    corners = np.stack([x, crown + belt, z], axis=2).reshape(-1, 3)
+    row, column = np.meshgrid(np.arange(up - 1), np.arange(across - 1), indexing='ij')
+    a = (row * across + column).ravel()
+    b, c, d = a + 1, a + across, a + across + 1
+    quads = np.stack([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)], axis=1)
+    middle = corners[quads.reshape(-1, 6)].mean(axis=1)
+    window = (np.abs(middle[:, 0] - 2.2) < 0.8) & (np.abs(middle[:, 2] - 1.2) < 0.2)
+    return corners, quads[~window].reshape(-1, 3)
+
+
+def write_inputs(folder: Path, vertices: int) -> None:
+    """Write part.stl and the recording gun/ to the folder."""
+    from paint_deposition.files.recordings.bags import write_pose_bag
+    from paint_deposition.motion.trajectory import Trajectory
+
+    corners, faces = body_side(vertices)
+    triangles = np.zeros(len(faces), dtype=[('n', '<f4', 3), ('v', '<f4', (3, 3)), ('a', '<u2')])
+    triangles['v'] = corners[faces]
+    head = bytes(80) + np.uint32(len(faces)).tobytes()
+    (folder / 'part.stl').write_bytes(head + triangles.tobytes())
+    count = int(SECONDS * RATE_HZ)
+    share = np.arange(count) / count * PASSES
+    row, along = np.divmod(share, 1.0)
+    x = LENGTH_M * np.where(row % 2 == 0, along, 1.0 - along)
+    z = HEIGHT_M * (row + 0.5) / PASSES
+    positions = np.stack([x, np.full(count, -STANDOFF_M), z], axis=1)
+    toward_the_part = np.sqrt(0.5) * np.array([-1.0, 0.0, 0.0, 1.0])
+    stamps = (1e9 / RATE_HZ * np.arange(count)).astype(np.int64) + 1_762_246_800_000_000_000
+    log = Trajectory(stamps, positions, np.tile(toward_the_part, (count, 1)), 'part')
+    write_pose_bag(folder / 'gun', log)
+
+
+class Stages:
+    """Wall and processor time of each piece of work, in the order of the work."""
+
+    def __init__(self) -> None:
+        self.rows: list[dict[str, Any]] = []
+
+    def of(self, name: str, work: Callable[[], Any]) -> Any:
+        """Do the work and note what it took."""
+        wall, processor = time.perf_counter(), time.process_time()
+        result = work()
+        wall_s, processor_s = time.perf_counter() - wall, time.process_time() - processor
+        memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+        self.rows.append(
+            {'stage': name, 'wall_s': wall_s, 'processor_s': processor_s, 'memory_mb': memory}
+        )
+        return result
+
+
+def run_stages(folder: Path) -> dict[str, Any]:
+    """What `paint simulate` does, one stage after the other, in this process."""
+    stages = Stages()
+    pd = stages.of('loading the libraries', _load)
+    log = stages.of('reading the recording', lambda: pd.read_recording(folder / 'gun'))
+    mesh = (folder / 'part.stl', 1.0, COARSER_THAN_ANY_M)
+    surface = stages.of('reading the mesh', lambda: pd.read_mesh(*mesh))
+    film = stages.of('painting', lambda: pd.simulate(surface, log))
+    stages.of('writing and drawing', lambda: pd.write(film, folder / 'film'))
+    return {'vertices': len(surface.vertices_m), 'stages': stages.rows}
+
+
+def _load() -> Any:
+    import paint_deposition as pd
+
+    for name in ('read_recording', 'read_mesh', 'simulate', 'write'):
+        getattr(pd, name)
+    return pd
+
+
+def run_command(folder: Path) -> dict[str, float]:
+    """The command itself, as its user starts it."""
+    command = [
+        'paint', 'simulate', '--mesh', str(folder / 'part.stl'), '--trajectory',
+        str(folder / 'gun'), '--max-edge-length-m', str(COARSER_THAN_ANY_M), '-o',
+        str(folder / 'out'),
+    ]  # fmt: skip
+    wall = time.perf_counter()
+    done = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+    _, status, used = os.wait4(done.pid, 0)
+    if status:
+        raise SystemExit(f'{" ".join(command)}: failed')
+    return {
+        'wall_s': time.perf_counter() - wall,
+        'processor_s': used.ru_utime + used.ru_stime,
+        'memory_mb': used.ru_maxrss / 1024,
+    }
+
+
+def measure(vertices: int) -> dict[str, Any]:
+    """Stages in a process, then the command on a new part and on one seen before."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.environ['PAINT_CACHE_DIR'] = ''
+        write_inputs(folder, vertices)
+        inner = [sys.executable, __file__, '--stages-of', name]
+        told = json.loads(subprocess.run(inner, stdout=subprocess.PIPE, check=True).stdout)
+        os.environ['PAINT_CACHE_DIR'] = str(folder / 'cache')
+        for which in ('new part', 'part seen before'):
+            told['stages'].append({'stage': f'paint simulate, {which}', **run_command(folder)})
+    return told
+
+
+def main() -> None:
+    """Measure all sizes."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('vertices', nargs='*', type=int, default=SIZES)
+    parser.add_argument('--json', type=Path, help='also write the figures to this file')
+    parser.add_argument('--stages-of', type=Path, help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.stages_of:
+        print(json.dumps(run_stages(given.stages_of)))
+        return
+    print(f'{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}')
+    measure(1000)  # compiles what is not yet on disk
+    tables = []
+    for vertices in given.vertices:
+        table = measure(vertices)
+        tables.append(table)
+        print(f'\n{table["vertices"]:9} vertices{"":16}{"wall":>9}{"processor":>11}{"memory":>10}')
+        for row in table['stages']:
+            print(
+                f'{row["stage"]:34}{row["wall_s"]:7.2f} s{row["processor_s"]:9.2f} s'
+                f'{row["memory_mb"]:7.0f} MB'
+            )
+    if given.json:
+        given.json.write_text(json.dumps(tables, indent=1), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()

@@ -1,0 +1,108 @@
+"""Prepared parts kept on disk, so that a part seen before is there at once.
+
+A part is found by all that it was made from: the bytes and the name of its file, how it was asked
+for, and the code and libraries that prepared it. Processes may share the folder: files appear
+whole, what is broken or gone is prepared anew, and the parts unused for longest make room.
+"""
+
+import hashlib
+import os
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import cache
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from zipfile import BadZipFile
+
+import numpy as np
+from platformdirs import user_cache_path
+
+from paint_deposition.files.atomic import replacing
+from paint_deposition.part.facets import CurvedEdges
+from paint_deposition.part.surface import Surface
+
+# Where parts are kept; set but empty: nowhere.
+FOLDER_VARIABLE = 'PAINT_CACHE_DIR'
+MOST_BYTES = 2_000_000_000
+# Smaller parts are prepared as fast as they are found.
+LEAST_VERTICES = 20_000
+LIBRARIES = ('numpy', 'scipy', 'trimesh', 'numba', 'cascadio')
+ARRAYS = ('vertices_m', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem')
+
+
+def place_of(path: Path, *asked: object) -> Path | None:
+    """The file that holds, or would hold, a part prepared as asked; None: it is not kept."""
+    folder = os.environ.get(FOLDER_VARIABLE)
+    # A .gltf refers to other files, whose bytes are not seen here.
+    if folder == '' or path.suffix.lower() == '.gltf' or not path.is_file():
+        return None
+    digest = hashlib.sha256(repr((path.name, asked, _prepared_by())).encode())
+    with path.open('rb') as file:
+        while block := file.read(1 << 20):
+            digest.update(block)
+    kept_in = Path(folder) if folder else user_cache_path('paint_deposition')
+    return kept_in / 'parts' / f'{digest.hexdigest()[:32]}.npz'
+
+
+def find(place: Path) -> Surface | None:
+    """The part that is kept there, or None."""
+    try:
+        with place.open('rb') as file, np.load(file, allow_pickle=False) as kept:
+            arrays = {name: kept[name] for name in ARRAYS}
+            curved = [kept[f'curved_{item.name}'] for item in fields(CurvedEdges)]
+            faces, notes = kept['faces'].astype(np.int64), tuple(kept['notes'].tolist())
+        os.utime(place)
+    except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+        return None
+    return Surface(faces=faces, notes=notes, curved_edges=CurvedEdges(*curved), **arrays)
+
+
+def keep(place: Path, surface: Surface) -> None:
+    """Keep a part for the next time, if it is large and the folder can be written."""
+    if len(surface.vertices_m) < LEAST_VERTICES or surface.in_hem is None:
+        return
+    arrays = {name: getattr(surface, name) for name in ARRAYS}
+    for item in fields(CurvedEdges):
+        arrays[f'curved_{item.name}'] = getattr(surface.curved_edges, item.name)
+    arrays['faces'] = surface.faces.astype(np.int32)
+    arrays['notes'] = np.array(surface.notes, dtype=np.str_)
+    try:
+        with replacing(place) as temporary:
+            np.savez(temporary, **arrays)
+        _make_room(sorted(place.parent.glob('*.npz'), key=_last_used))
+    except OSError:  # a full disk or a folder of somebody else: only time is lost
+        return
+
+
+def _make_room(oldest_first: Sequence[Path]) -> None:
+    sizes = [_size(path) for path in oldest_first]
+    excess = sum(sizes) - MOST_BYTES
+    for path, size in zip(oldest_first, sizes, strict=True):
+        if excess <= 0:
+            return
+        path.unlink(missing_ok=True)
+        excess -= size
+
+
+def _last_used(path: Path) -> float:
+    return path.stat().st_mtime if path.exists() else 0.0
+
+
+def _size(path: Path) -> int:
+    return path.stat().st_size if path.exists() else 0
+
+
+@cache
+def _prepared_by() -> tuple[str, ...]:
+    """Digest of the code that prepares parts, and the versions of what it is built on."""
+    package = Path(__file__).parent.parent
+    sources = [*package.glob('part/*.py'), *package.glob('files/*mesh*.py'), Path(__file__)]
+    code = hashlib.sha256(b'\0'.join(file.read_bytes() for file in sorted(sources)))
+    return (code.hexdigest(), *(_version(name) for name in LIBRARIES))
+
+
+def _version(library: str) -> str:
+    try:
+        return f'{library} {version(library)}'
+    except PackageNotFoundError:
+        return ''
