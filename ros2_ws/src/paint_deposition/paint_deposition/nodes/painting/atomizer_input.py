@@ -14,7 +14,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
@@ -39,6 +39,7 @@ class AtomizerInput:
         without_frame: poses that name no frame, since the last reset.
         refusal: why the last refused pose was refused, '' if none was since the last reset.
         refused_states: states that say no time or no possible flow, since the last reset.
+        states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
         tf_queue: poses that wait for their transform.
     """
@@ -70,6 +71,7 @@ class AtomizerInput:
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
         self.refused_states = 0
+        self.states_without_flow = 0
         self.without_frame = 0
         self.intervals = Intervals()
         self.tf_queue.clear()
@@ -132,6 +134,10 @@ class AtomizerInput:
                 self._node.get_logger().error(f'atomizer/state refused: {error}')
             self.refused_states += 1
             return
+        if message.spraying and flow == 0.0:
+            if not self.states_without_flow:
+                self._node.get_logger().warning(f'atomizer/state {SPRAYS_NOTHING}')
+            self.states_without_flow += 1
         self._node.film.add_trigger(TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:

@@ -36,6 +36,7 @@ def poses_status(node: PaintingNode) -> Status:
         'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
         'states refused': source.refused_states,
+        'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
     }
@@ -48,6 +49,7 @@ def poses_status(node: PaintingNode) -> Status:
             values,
         )
     counted['states refused'] = source.refused_states
+    counted['states that spray with flow 0'] = source.states_without_flow
     counted['poses without a frame'] = source.without_frame
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
     if wrong:
