@@ -9,13 +9,18 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+import rclpy
+from geometry_msgs.msg import Twist
 from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import (
     DIAGNOSTICS,
+    Onlooker,
     Robot,
     offline_um,
     parameters,
@@ -234,23 +239,37 @@ def test_progress_names_the_newest_pose_and_no_reset_lowers_it(simulator, robot,
     wait_until(lambda: len(player.heard['atomizer/progress']) >= len(MOTION) // 50)
 
 
-def test_a_partner_that_cannot_be_heard_is_an_error(simulator, ros_context, spin, onlooker,
-                                                    wait_until):  # fmt: skip
+def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
+    simulator, ros_context, ros_domain, spin, onlooker, executor, wait_until
+):
     simulator(pose_reliability='reliable')
     viewer = onlooker(DIAGNOSTICS)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    onlooker({'thickness/cloud': (PointCloud2, latched)})
-    spin(Robot(ros_context, reliable=False))
+    late = Onlooker(ros_context, {'thickness/cloud': (PointCloud2, latched)})
+    robot = Robot(ros_context, reliable=False)
+    spin(late, robot)
+    # Another participant: the middleware gives a topic one type in each of them.
+    elsewhere = Context()
+    rclpy.init(context=elsewhere, domain_id=ros_domain)
+    stranger = Node('stranger', context=elsewhere)
+    stranger.create_publisher(Twist, 'atomizer/state', 10)
 
-    def shown():
-        status = viewer.status('deposition_simulator: topics')
-        return status and 'atomizer/pose' in status.message and 'cloud' in status.message
+    def status():
+        return viewer.status('deposition_simulator: topics')
 
-    wait_until(shown)
-    status = viewer.status('deposition_simulator: topics')
-    assert status.level == b'\x02'
-    assert 'reliability' in status.message
-    assert 'durability' in status.message
+    topics = 'atomizer/pose', 'thickness/cloud', 'atomizer/state'
+    wait_until(lambda: status() and all(topic in status().message for topic in topics))
+    assert status().level == b'\x02'
+    assert 'atomizer/pose: /robot publishes another reliability' in status().message
+    assert 'thickness/cloud: /onlooker asks for another durability' in status().message
+    expected = '/stranger publishes the type geometry_msgs/msg/Twist, not paint_msgs/msg/Atomizer'
+    assert expected in status().message
+    for node in (late, robot):
+        executor.remove_node(node)
+        node.destroy_node()
+    stranger.destroy_node()
+    elsewhere.shutdown()
+    wait_until(lambda: status().level == b'\x00', what='the causes gone')
 
 
 def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):

@@ -58,12 +58,12 @@ def poses_status(node: PaintingNode) -> Status:
 
 
 def topics_status(node: PaintingNode) -> Status:
-    """Publishers and subscribers whose quality of service does not fit that of this node."""
-    found = node.watch.incompatible
+    """Publishers and subscribers that are there now and do not fit this node."""
+    found = node.watch.misfits()
     if found:
         listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
-        return Status(ERROR, listed, found)
-    return Status(OK, 'every quality of service fits')
+        return Status(ERROR, f'not heard: {listed}', found)
+    return Status(OK, 'every type and quality of service fits')
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
