@@ -8,13 +8,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
+from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
@@ -22,6 +23,14 @@ from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode
 
+POSE_TOPIC = 'atomizer/pose'
+STATE_TOPIC = 'atomizer/state'
+RELIABILITIES = {
+    'as_offered': None,
+    'best_effort': ReliabilityPolicy.BEST_EFFORT,
+    'reliable': ReliabilityPolicy.RELIABLE,
+}
+FOLLOW_PERIOD_S = 0.1
 POSES_A_BATCH = 50
 BATCH_PERIOD_S = 0.05
 PROGRESS_PERIOD_S = 0.2
@@ -38,6 +47,7 @@ class AtomizerInput:
         refused_frames: poses refused for their frame, by frame, since the last reset.
         without_frame: poses that name no frame, since the last reset.
         refusal: why the last refused pose was refused, '' if none was since the last reset.
+        states_received: since the node started.
         refused_states: states that say no time or no possible flow, since the last reset.
         states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
@@ -46,17 +56,29 @@ class AtomizerInput:
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
-        self.poses_received = 0
+        self.poses_received = self.states_received = 0
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
         self._poses: list[tuple[np.ndarray, np.ndarray]] = []
         self.tf_queue = TfQueue()
         self.reset()
-        # Best effort connects to reliable publishers, too.
-        reliability = ReliabilityPolicy[node.values['pose_reliability'].upper()]
-        profile = QoSProfile(depth=node.values['pose_queue_depth'], reliability=reliability)
-        node.watch.subscription(PoseStamped, 'atomizer/pose', self._take_pose, profile)
-        node.watch.subscription(AtomizerState, 'atomizer/state', self._take_state, profile)
+        self._topics = [
+            AtomizerTopic(
+                node.watch,
+                message,
+                topic,
+                take,
+                depth=node.values['pose_queue_depth'],
+                reliability=RELIABILITIES[node.values['pose_reliability']],
+                # The last state holds until the next one, whenever it was published.
+                latched=message is AtomizerState,
+            )
+            for message, topic, take in (
+                (PoseStamped, POSE_TOPIC, self._take_pose),
+                (AtomizerState, STATE_TOPIC, self._take_state),
+            )
+        ]
+        node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
         self._progress = node.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
         node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -89,6 +111,10 @@ class AtomizerInput:
         self._poses.clear()
         self.intervals.add(stamps)
         self._node.add_poses(PoseBatch(stamps, positions, quaternions))
+
+    def _follow_publishers(self) -> None:
+        for topic in self._topics:
+            topic.follow_publishers()
 
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
@@ -124,6 +150,7 @@ class AtomizerInput:
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 
     def _take_state(self, message: AtomizerState) -> None:
+        self.states_received += 1
         stamp = stamp_ns(message.header)
         try:
             if stamp == 0:
