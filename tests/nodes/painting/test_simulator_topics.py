@@ -272,6 +272,31 @@ def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
     wait_until(lambda: status().level == b'\x00', what='the causes gone')
 
 
+def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, executor, onlooker,
+                                        wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(DIAGNOSTICS)
+    guns = [Robot(ros_context), Robot(ros_context)]
+    spin(*guns)
+    wait_until(lambda: all(g.pose_publisher.get_subscription_count() for g in guns))
+    for row in range(50):
+        for side, gun in zip((0.0, 0.5), guns, strict=True):
+            position = MOTION.positions_m[row] + [0.0, 0.0, side]
+            stamp_ns = MOTION.stamps_ns[row] + round(4e6 * side)
+            gun.send_pose(stamp_ns, position, MOTION.quaternions_xyzw[row])
+
+    def status():
+        found = viewer.status(POSES)
+        return found and 'steps faster than a robot' in found.message and found
+
+    wait_until(lambda: status() and node.input.jumps.count > 40)
+    assert status().level == b'\x01'
+    wait_until(lambda: '2 publishers, /robot and /robot: their poses' in status().message)
+    executor.remove_node(guns[1])
+    guns[1].destroy_node()
+    wait_until(lambda: 'publishers' not in status().message)
+
+
 def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):
     node = DepositionSimulator(
         context=ros_context,

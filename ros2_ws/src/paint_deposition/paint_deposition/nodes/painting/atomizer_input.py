@@ -13,12 +13,14 @@ from rclpy.qos import ReliabilityPolicy
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
+from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.qos_watch import endpoint_name
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -36,6 +38,14 @@ BATCH_PERIOD_S = 0.05
 PROGRESS_PERIOD_S = 0.2
 
 
+def several_guns(publishers: list[str]) -> str:
+    """What it means that more than one publishes the poses."""
+    return (
+        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as the '
+        'motion of one gun; give each gun a topic or a namespace of its own'
+    )
+
+
 class AtomizerInput:
     """Takes `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
 
@@ -51,12 +61,15 @@ class AtomizerInput:
         refused_states: states that say no time or no possible flow, since the last reset.
         states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
+        jumps: steps between poses that no robot makes, since the last reset.
+        pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
     """
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
         self.poses_received = self.states_received = 0
+        self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
         self._poses: list[tuple[np.ndarray, np.ndarray]] = []
@@ -96,6 +109,7 @@ class AtomizerInput:
         self.states_without_flow = 0
         self.without_frame = 0
         self.intervals = Intervals()
+        self.jumps = Jumps()
         self.tf_queue.clear()
         self._stamps.clear()
         self._poses.clear()
@@ -110,11 +124,27 @@ class AtomizerInput:
         self._stamps.clear()
         self._poses.clear()
         self.intervals.add(stamps)
+        self._look_for_jumps(stamps, positions)
         self._node.add_poses(PoseBatch(stamps, positions, quaternions))
+
+    def _look_for_jumps(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
+        known = self.jumps.count
+        self.jumps.add(stamps_ns, positions_m)
+        if self.jumps.count and not known:
+            self._node.get_logger().error(
+                f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s between '
+                'two poses: do two guns publish on this topic, or two clocks stamp the poses?'
+            )
 
     def _follow_publishers(self) -> None:
         for topic in self._topics:
             topic.follow_publishers()
+        publishers = sorted(
+            endpoint_name(info) for info in self._node.watch.publishers_of(POSE_TOPIC)
+        )
+        if len(publishers) > max(1, len(self.pose_publishers)):
+            self._node.get_logger().warning(f'{POSE_TOPIC}: {several_guns(publishers)}')
+        self.pose_publishers = publishers
 
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1

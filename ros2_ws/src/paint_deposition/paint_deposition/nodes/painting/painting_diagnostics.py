@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
+from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
 
@@ -33,6 +34,9 @@ def poses_status(node: PaintingNode) -> Status:
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
+        'steps faster than a robot': source.jumps.count,
+        'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
         'states refused': source.refused_states,
@@ -51,7 +55,10 @@ def poses_status(node: PaintingNode) -> Status:
     counted['states refused'] = source.refused_states
     counted['states that spray with flow 0'] = source.states_without_flow
     counted['poses without a frame'] = source.without_frame
+    counted['steps faster than a robot'] = source.jumps.count
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
+    if len(source.pose_publishers) > 1:
+        wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     return Status(OK, 'painting' if counts.received else 'waiting for poses', values)

@@ -72,12 +72,12 @@ class QosWatch:
             for info in self._node.get_publishers_info_by_topic(topic):
                 why = _misfit(info, subscription.msg_type, info.qos_profile, self._asked(topic))
                 if why:
-                    found[topic] = f'{_name(info)} publishes {why}'
+                    found[topic] = f'{endpoint_name(info)} publishes {why}'
         for topic, publisher in self._outputs.items():
             for info in self._node.get_subscriptions_info_by_topic(topic):
                 why = _misfit(info, publisher.msg_type, publisher.qos_profile, info.qos_profile)
                 if why:
-                    found[topic] = f'{_name(info)} asks for {why}'
+                    found[topic] = f'{endpoint_name(info)} asks for {why}'
         for topic, what in found.items():
             if self._told.get(topic) != what:
                 self._node.get_logger().error(f'{topic}: {what}; they do not hear each other')
@@ -110,7 +110,8 @@ def _misfit(
     return f'another {" and ".join(policies) or "deadline, liveliness or lease"}'
 
 
-def _name(info: TopicEndpointInfo) -> str:
+def endpoint_name(info: TopicEndpointInfo) -> str:
+    """The full name of the node at a topic's other end."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
 
 
