@@ -199,6 +199,10 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     assert "'part' and no transform between them is known; set part_pose" in status.message
     assert node.film.up_to_date().film_um.max() == 0.0
     wait_until(lambda: viewer.newest('thickness/stats').poses_rejected == len(MOTION))
+    # Refused they were, but none is any more.
+    counted = f'{len(MOTION)} poses refused for their frame'
+    wait_until(lambda: counted in viewer.status(POSES).message, what='the error gone')
+    assert viewer.status(POSES).level == b'\x01'
 
 
 def test_a_pose_in_the_parent_frame_is_transformed(simulator, robot, painted):
@@ -243,7 +247,7 @@ def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
     simulator, ros_context, ros_domain, spin, onlooker, executor, wait_until
 ):
     simulator(pose_reliability='reliable')
-    viewer = onlooker(DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     late = Onlooker(ros_context, {'thickness/cloud': (PointCloud2, latched)})
     robot = Robot(ros_context, reliable=False)

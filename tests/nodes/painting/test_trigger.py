@@ -62,6 +62,24 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
     wait_until(lambda: node.input.states_received == 2, what='the next state')
 
 
+def test_poses_that_stop_while_the_gun_sprays_are_told(simulator, robot, painted, onlooker,
+                                                       wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(DIAGNOSTICS)
+    source = robot(node)
+
+    def shown(text, level):
+        status = viewer.status(POSES)
+        return status and text in status.message and status.level == level
+
+    motion = two_passes()
+    source.send(motion)
+    painted(node)
+    wait_until(lambda: shown('the gun sprays, and no pose has come for', b'\x01'))
+    source.send_state(motion.stamps_ns[-1] + 1, 0.0)
+    wait_until(lambda: shown('waiting for poses', b'\x00'))
+
+
 def test_poses_of_any_reliability_are_heard(simulator, ros_context, spin, painted, wait_until):
     """A best-effort robot joins a reliable one, which has been heard from its first pose on."""
     node = simulator(pose_queue_depth=5000)

@@ -23,7 +23,7 @@ class Jumps:
         self._last_m = np.empty((0, 3))
 
     def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
-        """Take stamps (N,) int64 and positions (N, 3) [m]; other steps than forward are no jumps."""
+        """Take stamps (N,) int64 and positions (N, 3) [m]; a stamp that goes back begins anew."""
         stamps_ns = np.concatenate([self._last_ns, stamps_ns])
         positions_m = np.concatenate([self._last_m, positions_m])
         self._last_ns, self._last_m = stamps_ns[-1:], positions_m[-1:]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
@@ -41,8 +42,8 @@ PROGRESS_PERIOD_S = 0.2
 def several_guns(publishers: list[str]) -> str:
     """What it means that more than one publishes the poses."""
     return (
-        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as the '
-        'motion of one gun; give each gun a topic or a namespace of its own'
+        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as '
+        'the motion of one gun; give each gun a topic or a namespace of its own'
     )
 
 
@@ -58,6 +59,8 @@ class AtomizerInput:
         without_frame: poses that name no frame, since the last reset.
         refusal: why the last refused pose was refused, '' if none was since the last reset.
         states_received: since the node started.
+        refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
+        sprays: whether the newest state says that the gun sprays; False before any.
         refused_states: states that say no time or no possible flow, since the last reset.
         states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
@@ -69,6 +72,8 @@ class AtomizerInput:
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
         self.poses_received = self.states_received = 0
+        self.refused_s = self.pose_s = -math.inf
+        self.sprays = False
         self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
@@ -132,8 +137,8 @@ class AtomizerInput:
         self.jumps.add(stamps_ns, positions_m)
         if self.jumps.count and not known:
             self._node.get_logger().error(
-                f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s between '
-                'two poses: do two guns publish on this topic, or two clocks stamp the poses?'
+                f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
+                'between two poses: do two guns publish on this topic, or two clocks stamp the poses?'
             )
 
     def _follow_publishers(self) -> None:
@@ -149,7 +154,7 @@ class AtomizerInput:
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
         self._newest = message
-        now_s = time.monotonic()
+        now_s = self.pose_s = time.monotonic()
         self.tf_queue.add(message, now_s)
         self.tf_queue.release(now_s, self._place, self._refuse)
         if len(self._stamps) >= POSES_A_BATCH:
@@ -172,6 +177,7 @@ class AtomizerInput:
     def _refuse(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
         self.refusal = str(missing)
+        self.refused_s = time.monotonic()
         if frame_id not in self.refused_frames:
             self._node.get_logger().error(
                 f"poses in frame '{frame_id}' are refused: the mesh is in frame "
@@ -195,6 +201,7 @@ class AtomizerInput:
             if not self.states_without_flow:
                 self._node.get_logger().warning(f'atomizer/state {SPRAYS_NOTHING}')
             self.states_without_flow += 1
+        self.sprays = flow > 0.0
         self._node.film.add_trigger(TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping
 
 from paint_deposition.nodes.painting.atomizer_input import several_guns
@@ -10,6 +12,10 @@ from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
 
 # Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
+# So long after it a refusal is no longer what is the matter now.
+RECENT_S = 5.0
+# A gun that sprays is moved; a robot that only slows down still sends poses.
+SILENT_S = 2.0
 # What happened to poses and states, in words, by the name of its count.
 IN_WORDS = {
     'gaps': 'gaps',
@@ -44,7 +50,8 @@ def poses_status(node: PaintingNode) -> Status:
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
     }
-    if source.refused_frames:
+    now_s = time.monotonic()
+    if source.refused_frames and now_s - source.refused_s < RECENT_S:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         return Status(
             ERROR,
@@ -52,16 +59,23 @@ def poses_status(node: PaintingNode) -> Status:
             f"'{node.frame.frame_id}' and {source.refusal}",
             values,
         )
+    counted['poses refused for their frame'] = source.poses_refused
     counted['states refused'] = source.refused_states
     counted['states that spray with flow 0'] = source.states_without_flow
     counted['poses without a frame'] = source.without_frame
     counted['steps faster than a robot'] = source.jumps.count
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
+    silent_s = now_s - source.pose_s
+    if source.sprays and silent_s > SILENT_S:
+        since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
+        wrong.insert(0, f'the gun sprays, and no pose has come {since}')
     if len(source.pose_publishers) > 1:
         wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
-    return Status(OK, 'painting' if counts.received else 'waiting for poses', values)
+    if silent_s > SILENT_S:
+        return Status(OK, 'waiting for poses', values)
+    return Status(OK, 'painting', values)
 
 
 def topics_status(node: PaintingNode) -> Status:

@@ -78,6 +78,8 @@ def _spin(node: PaintNode, told_to_stop: threading.Event) -> int:
     with _signals_finish(node.finished):
         if told_to_stop.is_set():  # while the node was being made
             node.finish()
+        else:
+            node.get_logger().info('ready')
         executor.spin_until_future_complete(node.finished)
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)
