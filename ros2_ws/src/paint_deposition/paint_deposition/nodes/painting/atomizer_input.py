@@ -138,7 +138,7 @@ class AtomizerInput:
         if self.jumps.count and not known:
             self._node.get_logger().error(
                 f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
-                'between two poses: do two guns publish on this topic, or two clocks stamp the poses?'
+                'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
 
     def _follow_publishers(self) -> None:
@@ -205,7 +205,9 @@ class AtomizerInput:
         self._node.film.add_trigger(TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:
-        message = PoseProgress(poses_received=self.poses_received)
+        message = PoseProgress(
+            reporter=self._node.get_fully_qualified_name(), poses_received=self.poses_received
+        )
         if self._newest is not None:
             message.header = self._newest.header
         self._progress.publish(message)

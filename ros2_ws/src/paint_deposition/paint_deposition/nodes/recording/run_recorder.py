@@ -162,7 +162,8 @@ class RunRecorder(PaintNode):
         topic = self._topics.get(self._pose_topic)
         if topic is None:
             return
-        progress = PoseProgress(poses_received=topic.messages)
+        reporter = self.get_fully_qualified_name()
+        progress = PoseProgress(reporter=reporter, poses_received=topic.messages)
         progress.header = header('', topic.newest_stamp_ns)
         self._progress.publish(progress)
 
