@@ -192,6 +192,8 @@ class RunRecorder(PaintNode):
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
+        if any(topic.unnumbered for topic in topics):
+            lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
         return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
 
@@ -215,6 +217,9 @@ class RunRecorder(PaintNode):
             level, message = WARN, 'messages were missed'
         values = {
             'run': self.run.folder,
+            'messages without a number, whose losses cannot be counted': sum(
+                topic.unnumbered for topic in topics
+            ),
             'bytes': size,
             'disk free bytes': free,
             'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,
