@@ -19,8 +19,8 @@ class Jumps:
     def __init__(self) -> None:
         self.count = 0
         self.fastest_m_per_s = 0.0
-        self._last_ns = np.empty(0, dtype=np.int64)
-        self._last_m = np.empty((0, 3))
+        self._last_ns: np.ndarray = np.empty(0, dtype=np.int64)
+        self._last_m: np.ndarray = np.empty((0, 3))
 
     def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
         """Take stamps (N,) int64 and positions (N, 3) [m]; a stamp that goes back begins anew."""
