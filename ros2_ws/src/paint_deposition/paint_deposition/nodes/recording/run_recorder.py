@@ -33,6 +33,9 @@ DEFAULT_TOPICS = (
     'thickness/stats',
     'comparison/stats',
     'planned_path',
+    # Where the part stood, for poses that are not in its frame.
+    '/tf',
+    '/tf_static',
     '/diagnostics',
     '/parameter_events',
 )
