@@ -139,7 +139,11 @@ class Robot(Node):
         self.pose_publisher.publish(message)
 
     def send_state(self, stamp_ns, flow: float) -> None:
-        message = AtomizerState(spraying=bool(flow > 0.0), flow=float(flow))
+        self.send_fields(stamp_ns, spraying=bool(flow > 0.0), flow=float(flow))
+
+    def send_fields(self, stamp_ns, **fields: object) -> None:
+        """A state of which only these fields are filled."""
+        message = AtomizerState(**fields)
         message.header.stamp = Time(nanoseconds=int(stamp_ns)).to_msg()
         self.state_publisher.publish(message)
 

@@ -99,6 +99,16 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     assert gun.notes == ()
 
 
+def test_a_state_that_sprays_with_flow_0_is_told(tmp_path):
+    messages = Messages()
+    entries = pose_entries(straight_pass(triggers=False))
+    entries += [('/state', START_NS + 1, messages.state(START_NS, True, 0.0, 60.0))]
+    bag = write_bag(tmp_path / 'run', sorted(entries, key=lambda entry: entry[1]))
+    recorded = read_trajectory(bag, None, '/state')
+    assert recorded.trigger_flow.tolist() == [0.0]
+    assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
+
+
 def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
     written, hour_ns = straight_pass(triggers=False), 3_600 * 10**9
     entries = pose_entries(written, delay_ns=hour_ns)

@@ -134,7 +134,6 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         max_edge_length_m=0.0045,
         publish_rate_hz=5.0,
         pose_queue_depth=5000,
-        pose_reliability='reliable',
     )
     assert len(node.surface.faces) > 100_000
     viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})

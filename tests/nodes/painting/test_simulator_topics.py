@@ -9,13 +9,18 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+import rclpy
+from geometry_msgs.msg import Twist
 from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
+from rclpy.context import Context
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from nodes.cell import (
     DIAGNOSTICS,
+    Onlooker,
     Robot,
     offline_um,
     parameters,
@@ -191,9 +196,15 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     status = viewer.status(POSES)
     assert status.level == b'\x02'
     assert "'base_link'" in status.message
-    assert "'part' and no transform between them is known; set part_pose" in status.message
+    # tf knows none either, where it is installed.
+    assert 'no transform between them' in status.message
+    assert 'set part_pose and part_parent_frame' in status.message
     assert node.film.up_to_date().film_um.max() == 0.0
     wait_until(lambda: viewer.newest('thickness/stats').poses_rejected == len(MOTION))
+    # Refused they were, but none is any more.
+    counted = f'{len(MOTION)} poses refused for their frame'
+    wait_until(lambda: counted in viewer.status(POSES).message, what='the error gone')
+    assert viewer.status(POSES).level == b'\x01'
 
 
 def test_a_pose_in_the_parent_frame_is_transformed(simulator, robot, painted):
@@ -234,23 +245,62 @@ def test_progress_names_the_newest_pose_and_no_reset_lowers_it(simulator, robot,
     wait_until(lambda: len(player.heard['atomizer/progress']) >= len(MOTION) // 50)
 
 
-def test_a_partner_that_cannot_be_heard_is_an_error(simulator, ros_context, spin, onlooker,
-                                                    wait_until):  # fmt: skip
+def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
+    simulator, ros_context, ros_domain, spin, onlooker, executor, wait_until
+):
     simulator(pose_reliability='reliable')
-    viewer = onlooker(DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    onlooker({'thickness/cloud': (PointCloud2, latched)})
-    spin(Robot(ros_context, reliable=False))
+    late = Onlooker(ros_context, {'thickness/cloud': (PointCloud2, latched)})
+    robot = Robot(ros_context, reliable=False)
+    spin(late, robot)
+    # Another participant: the middleware gives a topic one type in each of them.
+    elsewhere = Context()
+    rclpy.init(context=elsewhere, domain_id=ros_domain)
+    stranger = Node('stranger', context=elsewhere)
+    stranger.create_publisher(Twist, 'atomizer/state', 10)
 
-    def shown():
-        status = viewer.status('deposition_simulator: topics')
-        return status and 'atomizer/pose' in status.message and 'cloud' in status.message
+    def status():
+        return viewer.status('deposition_simulator: topics')
 
-    wait_until(shown)
-    status = viewer.status('deposition_simulator: topics')
-    assert status.level == b'\x02'
-    assert 'reliability' in status.message
-    assert 'durability' in status.message
+    topics = 'atomizer/pose', 'thickness/cloud', 'atomizer/state'
+    wait_until(lambda: status() and all(topic in status().message for topic in topics))
+    assert status().level == b'\x02'
+    assert 'atomizer/pose: /robot publishes another reliability' in status().message
+    assert 'thickness/cloud: /onlooker asks for another durability' in status().message
+    expected = '/stranger publishes the type geometry_msgs/msg/Twist, not paint_msgs/msg/Atomizer'
+    assert expected in status().message
+    for node in (late, robot):
+        executor.remove_node(node)
+        node.destroy_node()
+    stranger.destroy_node()
+    elsewhere.shutdown()
+    wait_until(lambda: status().level == b'\x00', what='the causes gone')
+
+
+def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, executor, onlooker,
+                                        wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(DIAGNOSTICS)
+    guns = [Robot(ros_context), Robot(ros_context)]
+    spin(*guns)
+    wait_until(lambda: all(g.pose_publisher.get_subscription_count() for g in guns))
+    for row in range(50):
+        for side, gun in zip((0.0, 0.5), guns, strict=True):
+            position = MOTION.positions_m[row] + [0.0, 0.0, side]
+            stamp_ns = MOTION.stamps_ns[row] + round(4e6 * side)
+            gun.send_pose(stamp_ns, position, MOTION.quaternions_xyzw[row])
+
+    def status():
+        found = viewer.status(POSES)
+        return found and 'steps faster than a robot' in found.message and found
+
+    wait_until(lambda: status() and node.input.jumps.count > 40)
+    assert status().level == b'\x01'
+    wait_until(lambda: '2 publishers, /robot and /robot: their poses' in status().message)
+    executor.remove_node(guns[1])
+    guns[1].destroy_node()
+    wait_until(lambda: 'publishers' not in status().message)
 
 
 def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):

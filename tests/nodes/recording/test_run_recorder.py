@@ -18,7 +18,7 @@ from paint_msgs.msg import PoseProgress, ThicknessStats
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
-from rclpy.serialization import deserialize_message
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import Bool, String
@@ -337,6 +337,21 @@ def test_an_existing_run_is_not_overwritten(record, tmp_path):
 
 
 # --- as a process
+
+
+def test_losses_that_cannot_be_counted_are_not_called_none(record, publisher, wait_until):
+    """Some middlewares number no messages; the second one comes as from them."""
+    recorder = record(topics=['chatter'])
+    sender = publisher(String, 'chatter', QoSProfile(depth=10))
+    sender.publish(String(data='numbered'))
+    topic = recorder.resolve_topic_name('chatter')
+    wait_until(lambda: recorder._topics[topic].messages == 1, what='the message')
+    assert 'cannot be counted' not in recorder.summary()
+    times = {'received_timestamp': 1, 'source_timestamp': 1}
+    cdr = serialize_message(String(data='without a number'))
+    recorder._topics[topic]._on_message(cdr, times | {'publication_sequence_number': None})
+    assert '2 messages (losses cannot be counted: ' in recorder.summary()
+    recorder.close()
 
 
 def test_a_run_that_is_taken_away_ends_the_recorder(ros_domain, wait_until, tmp_path):

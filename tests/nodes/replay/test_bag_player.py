@@ -86,7 +86,8 @@ class Listener(Node):
         self.order.append('state')
 
     def report(self) -> None:
-        progress = PoseProgress(poses_received=len(self.poses))
+        reporter = self.get_fully_qualified_name()
+        progress = PoseProgress(reporter=reporter, poses_received=len(self.poses))
         if self.poses:
             progress.header = deserialize_message(self.poses[-1], PoseStamped).header
         self.publisher.publish(progress)

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from paint_deposition.nodes.replay.pose_window import LOST_AFTER_S, PoseWindow
+from paint_deposition.nodes.replay.pose_window import LOST_AFTER_S, UNHEARD_AFTER_S, PoseWindow
 
 
 def published(window: PoseWindow, stamps, now_s: float = 0.0) -> PoseWindow:
@@ -130,3 +130,25 @@ def test_a_silent_node_is_waited_for():
     published(window, range(10), now_s=0.0)
     window.report('simulator', 6, 0.1)
     assert window.ahead(100 * LOST_AFTER_S) == 3
+
+
+def test_who_never_reports_is_given_up_until_it_does():
+    """The others are waited for as before."""
+    window = PoseWindow()
+    window.present(['mute', 'simulator'], 0.0)
+    published(window, range(10), now_s=0.0)
+    window.report('simulator', 7, 0.0)
+    assert window.ahead(UNHEARD_AFTER_S - 0.1) == 10
+    assert window.take_unheard() == []
+    assert window.ahead(UNHEARD_AFTER_S + 0.1) == 2
+    assert window.take_unheard() == ['mute']
+    assert window.slowest() == ['simulator']
+    published(window, range(10, 20), now_s=30.0)
+    window.report('simulator', 19, 30.0)
+    assert window.ahead(30.0) == 0
+    assert window.take_unheard() == []
+    published(window, range(20, 25), now_s=40.0)
+    window.report('simulator', 24, 40.0)
+    window.report('mute', 21, 40.0)
+    published(window, range(25, 26), now_s=40.0)
+    assert window.ahead(40.0) > 0

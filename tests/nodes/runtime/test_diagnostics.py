@@ -28,8 +28,8 @@ def test_every_task_reports_each_period(ros_context, spin, wait_until):
     wait_until(lambda: len(got) >= 3, what='diagnostics')
     first, later = got[0], got[2]
     gun_status, mesh_status = first.status
-    assert gun_status.name == 'painter: gun'
-    assert mesh_status.name == 'painter: mesh'
+    assert gun_status.name == 'cell1/painter: gun'
+    assert mesh_status.name == 'cell1/painter: mesh'
     assert (gun_status.level, mesh_status.level) == (b'\x01', b'\x00')
     assert gun_status.hardware_id == '/cell1/painter'
     assert [(v.key, v.value) for v in gun_status.values] == [('poses', '3'), ('gap s', '0.5')]

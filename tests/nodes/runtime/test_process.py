@@ -4,6 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from nodes.cell import write_panel
 from nodes.processes import NodeProcess
 
 NODE = """
@@ -83,8 +84,13 @@ def worker(ros_domain, tmp_path):
             process.kill()
 
 
+def complaints(text: str) -> list[str]:
+    """What a node says beside that it is ready."""
+    return [line for line in text.strip().splitlines() if not line.endswith(': ready')]
+
+
 def one_line(text: str) -> str:
-    (line,) = text.strip().splitlines()
+    (line,) = complaints(text)
     return line
 
 
@@ -96,7 +102,8 @@ def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
     process.interrupt_as_launch_does()
     assert process.wait() == 0
     assert process.out.split() == ['ready', 'closed']
-    assert process.err == ''
+    assert process.err.strip().endswith('[worker]: ready')
+    assert complaints(process.err) == []
 
 
 def test_terminate_ends_cleanly(worker, wait_until):
@@ -175,4 +182,32 @@ def test_a_node_may_finish_by_itself(worker):
     process = worker('finish')
     assert process.wait() == 3
     assert process.out.split() == ['ready', 'closed']
-    assert process.err == ''
+    assert process.err.strip().endswith('[worker]: ready')
+    assert complaints(process.err) == []
+
+
+INTERRUPTED_IMPORT = """
+import os, signal, sys
+from importlib.abc import MetaPathFinder
+
+
+class Interrupt(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == {module!r}:
+            os.kill(os.getpid(), signal.SIGINT)
+
+
+sys.meta_path.insert(0, Interrupt())
+from paint_deposition.nodes.executables import deposition_simulator
+sys.exit(deposition_simulator())
+"""
+
+
+# trimesh catches whatever is raised where it imports networkx, an interrupt too.
+@pytest.mark.parametrize('module', ['rclpy', 'trimesh', 'networkx'])
+def test_one_ctrl_c_while_libraries_are_imported_ends_the_process(ros_domain, tmp_path, module):
+    code = INTERRUPTED_IMPORT.format(module=module)
+    mesh = write_panel(tmp_path / 'panel.stl')
+    with NodeProcess(tmp_path / 'node', '', code=code, mesh_file=mesh) as process:
+        assert process.wait() == 0, process.err
+        assert 'Traceback' not in process.err

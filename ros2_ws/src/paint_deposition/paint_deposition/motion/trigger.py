@@ -17,6 +17,11 @@ TRIGGER_STATE = np.dtype(
     ]
 )
 
+SPRAYS_NOTHING = (
+    'says spraying with flow 0, which lays no paint: give 1 for the calibrated flow, or NaN where '
+    'it is not measured'
+)
+
 
 def relative_flow(spraying: bool, flow: float = math.nan) -> float:
     """Flow relative to the calibrated one, 0 while the gun is off.

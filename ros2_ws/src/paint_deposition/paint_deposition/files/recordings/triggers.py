@@ -12,7 +12,7 @@ import numpy as np
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # What a state tells of the process while the gun sprays.
@@ -133,6 +133,7 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     """Times and flows of all changes of AtomizerState or Bool."""
     changes: list[tuple[int, float]] = []
     told: dict[str, list[float]] = {}
+    without_flow = 0
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
             changes.append((log_time_ns, relative_flow(bool(message.data))))
@@ -143,17 +144,21 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
                 f'{topic.name} in {bag.path} has a state without a stamp; '
                 'let the publisher stamp each state'
             )
-        changes.append((stamp, relative_flow(message.spraying, message.flow)))
+        flow = relative_flow(message.spraying, message.flow)
+        without_flow += bool(message.spraying) and flow == 0.0
+        changes.append((stamp, flow))
         for name in SETTINGS:
             value = getattr(message, name, np.nan)
             if message.spraying and np.isfinite(value):
                 told.setdefault(name, []).append(value)
     changes.sort(key=lambda change: change[0])
+    notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return Switching(
         np.array([stamp for stamp, _ in changes], dtype=np.int64),
         np.array([flow for _, flow in changes], dtype=float),
         {name: float(np.median(values)) for name, values in told.items()},
         topic.type == BOOL_TYPE,
+        notes if without_flow else (),
     )
 
 

@@ -2,29 +2,49 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
+from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
+from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.qos_watch import endpoint_name
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.painting_node import PaintingNode
 
+POSE_TOPIC = 'atomizer/pose'
+STATE_TOPIC = 'atomizer/state'
+RELIABILITIES = {
+    'as_offered': None,
+    'best_effort': ReliabilityPolicy.BEST_EFFORT,
+    'reliable': ReliabilityPolicy.RELIABLE,
+}
+FOLLOW_PERIOD_S = 0.1
 POSES_A_BATCH = 50
 BATCH_PERIOD_S = 0.05
 PROGRESS_PERIOD_S = 0.2
+
+
+def several_guns(publishers: list[str]) -> str:
+    """What it means that more than one publishes the poses."""
+    return (
+        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as '
+        'the motion of one gun; give each gun a topic or a namespace of its own'
+    )
 
 
 class AtomizerInput:
@@ -38,24 +58,45 @@ class AtomizerInput:
         refused_frames: poses refused for their frame, by frame, since the last reset.
         without_frame: poses that name no frame, since the last reset.
         refusal: why the last refused pose was refused, '' if none was since the last reset.
+        states_received: since the node started.
+        refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
+        sprays: whether the newest state says that the gun sprays; False before any.
         refused_states: states that say no time or no possible flow, since the last reset.
+        states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
+        jumps: steps between poses that no robot makes, since the last reset.
+        pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
     """
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
-        self.poses_received = 0
+        self.poses_received = self.states_received = 0
+        self.refused_s = self.pose_s = -math.inf
+        self.sprays = False
+        self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._stamps: list[int] = []
         self._poses: list[tuple[np.ndarray, np.ndarray]] = []
         self.tf_queue = TfQueue()
         self.reset()
-        # Best effort connects to reliable publishers, too.
-        reliability = ReliabilityPolicy[node.values['pose_reliability'].upper()]
-        profile = QoSProfile(depth=node.values['pose_queue_depth'], reliability=reliability)
-        node.watch.subscription(PoseStamped, 'atomizer/pose', self._take_pose, profile)
-        node.watch.subscription(AtomizerState, 'atomizer/state', self._take_state, profile)
+        self._topics = [
+            AtomizerTopic(
+                node.watch,
+                message,
+                topic,
+                take,
+                depth=node.values['pose_queue_depth'],
+                reliability=RELIABILITIES[node.values['pose_reliability']],
+                # The last state holds until the next one, whenever it was published.
+                latched=message is AtomizerState,
+            )
+            for message, topic, take in (
+                (PoseStamped, POSE_TOPIC, self._take_pose),
+                (AtomizerState, STATE_TOPIC, self._take_state),
+            )
+        ]
+        node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
         self._progress = node.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
         node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -70,8 +111,10 @@ class AtomizerInput:
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
         self.refused_states = 0
+        self.states_without_flow = 0
         self.without_frame = 0
         self.intervals = Intervals()
+        self.jumps = Jumps()
         self.tf_queue.clear()
         self._stamps.clear()
         self._poses.clear()
@@ -86,12 +129,32 @@ class AtomizerInput:
         self._stamps.clear()
         self._poses.clear()
         self.intervals.add(stamps)
+        self._look_for_jumps(stamps, positions)
         self._node.add_poses(PoseBatch(stamps, positions, quaternions))
+
+    def _look_for_jumps(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
+        known = self.jumps.count
+        self.jumps.add(stamps_ns, positions_m)
+        if self.jumps.count and not known:
+            self._node.get_logger().error(
+                f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
+                'between two poses: do two guns publish here, or two clocks stamp the poses?'
+            )
+
+    def _follow_publishers(self) -> None:
+        for topic in self._topics:
+            topic.follow_publishers()
+        publishers = sorted(
+            endpoint_name(info) for info in self._node.watch.publishers_of(POSE_TOPIC)
+        )
+        if len(publishers) > max(1, len(self.pose_publishers)):
+            self._node.get_logger().warning(f'{POSE_TOPIC}: {several_guns(publishers)}')
+        self.pose_publishers = publishers
 
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
         self._newest = message
-        now_s = time.monotonic()
+        now_s = self.pose_s = time.monotonic()
         self.tf_queue.add(message, now_s)
         self.tf_queue.release(now_s, self._place, self._refuse)
         if len(self._stamps) >= POSES_A_BATCH:
@@ -114,6 +177,7 @@ class AtomizerInput:
     def _refuse(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
         self.refusal = str(missing)
+        self.refused_s = time.monotonic()
         if frame_id not in self.refused_frames:
             self._node.get_logger().error(
                 f"poses in frame '{frame_id}' are refused: the mesh is in frame "
@@ -122,6 +186,7 @@ class AtomizerInput:
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 
     def _take_state(self, message: AtomizerState) -> None:
+        self.states_received += 1
         stamp = stamp_ns(message.header)
         try:
             if stamp == 0:
@@ -132,10 +197,17 @@ class AtomizerInput:
                 self._node.get_logger().error(f'atomizer/state refused: {error}')
             self.refused_states += 1
             return
+        if message.spraying and flow == 0.0:
+            if not self.states_without_flow:
+                self._node.get_logger().warning(f'atomizer/state {SPRAYS_NOTHING}')
+            self.states_without_flow += 1
+        self.sprays = flow > 0.0
         self._node.film.add_trigger(TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:
-        message = PoseProgress(poses_received=self.poses_received)
+        message = PoseProgress(
+            reporter=self._node.get_fully_qualified_name(), poses_received=self.poses_received
+        )
         if self._newest is not None:
             message.header = self._newest.header
         self._progress.publish(message)

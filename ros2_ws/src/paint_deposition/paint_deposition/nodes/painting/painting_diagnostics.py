@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import math
+import time
 from collections.abc import Callable, Mapping
 
+from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
 
 # Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
+# So long after it a refusal is no longer what is the matter now.
+RECENT_S = 5.0
+# A gun that sprays is moved; a robot that only slows down still sends poses.
+SILENT_S = 2.0
 # What happened to poses and states, in words, by the name of its count.
 IN_WORDS = {
     'gaps': 'gaps',
@@ -33,13 +40,18 @@ def poses_status(node: PaintingNode) -> Status:
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
+        'steps faster than a robot': source.jumps.count,
+        'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
         'states refused': source.refused_states,
+        'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(node.film.flow),
     }
-    if source.refused_frames:
+    now_s = time.monotonic()
+    if source.refused_frames and now_s - source.refused_s < RECENT_S:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         return Status(
             ERROR,
@@ -47,21 +59,32 @@ def poses_status(node: PaintingNode) -> Status:
             f"'{node.frame.frame_id}' and {source.refusal}",
             values,
         )
+    counted['poses refused for their frame'] = source.poses_refused
     counted['states refused'] = source.refused_states
+    counted['states that spray with flow 0'] = source.states_without_flow
     counted['poses without a frame'] = source.without_frame
+    counted['steps faster than a robot'] = source.jumps.count
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
+    silent_s = now_s - source.pose_s
+    if source.sprays and silent_s > SILENT_S:
+        since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
+        wrong.insert(0, f'the gun sprays, and no pose has come {since}')
+    if len(source.pose_publishers) > 1:
+        wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
-    return Status(OK, 'painting' if counts.received else 'waiting for poses', values)
+    if silent_s > SILENT_S:
+        return Status(OK, 'waiting for poses', values)
+    return Status(OK, 'painting', values)
 
 
 def topics_status(node: PaintingNode) -> Status:
-    """Publishers and subscribers whose quality of service does not fit that of this node."""
-    found = node.watch.incompatible
+    """Publishers and subscribers that are there now and do not fit this node."""
+    found = node.watch.misfits()
     if found:
         listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
-        return Status(ERROR, listed, found)
-    return Status(OK, 'every quality of service fits')
+        return Status(ERROR, f'not heard: {listed}', found)
+    return Status(OK, 'every type and quality of service fits')
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:

@@ -52,10 +52,10 @@ PAINTING = dict(
             (1, 100_000),
         ),
         pose_reliability=NodeParameter(
-            'best_effort',
-            'Reliability asked of the publishers of poses and states; best_effort hears all of '
-            'them, reliable only those that offer it [name]',
-            choices=('best_effort', 'reliable'),
+            'as_offered',
+            'Reliability asked of the publishers of poses and states; as_offered and best_effort '
+            'hear all of them, reliable only those that offer it [name]',
+            choices=('as_offered', 'best_effort', 'reliable'),
         ),
         pose_memory=NodeParameter(
             DEFAULT_LIMIT_POSES,

@@ -28,6 +28,7 @@ class RecordedTopic:
     Attributes:
         messages: that came.
         missed: that never arrived, by the jumps of the publishers' sequence numbers.
+        unnumbered: messages that the middleware gave no number, whose losses nobody can count.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
     """
@@ -36,7 +37,7 @@ class RecordedTopic:
         self, node: Node, name: str, type_name: str, take: TakeMessage, max_gap_ns: int | None
     ):
         self.name = name
-        self.messages = self.missed = self.gaps = 0
+        self.messages = self.missed = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
         self._sequence: dict[bytes, int] = {}
         self.profile: QoSProfile | None = None
@@ -76,6 +77,7 @@ class RecordedTopic:
     def _count_missed(self, info: MessageInfo) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
         if number is None or gid is None:
+            self.unnumbered += 1
             return
         previous = self._sequence.get(gid['data'])
         if previous is not None and number > previous:

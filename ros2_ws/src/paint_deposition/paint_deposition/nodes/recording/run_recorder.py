@@ -33,6 +33,9 @@ DEFAULT_TOPICS = (
     'thickness/stats',
     'comparison/stats',
     'planned_path',
+    # Where the part stood, for poses that are not in its frame.
+    '/tf',
+    '/tf_static',
     '/diagnostics',
     '/parameter_events',
 )
@@ -162,7 +165,8 @@ class RunRecorder(PaintNode):
         topic = self._topics.get(self._pose_topic)
         if topic is None:
             return
-        progress = PoseProgress(poses_received=topic.messages)
+        reporter = self.get_fully_qualified_name()
+        progress = PoseProgress(reporter=reporter, poses_received=topic.messages)
         progress.header = header('', topic.newest_stamp_ns)
         self._progress.publish(progress)
 
@@ -191,6 +195,8 @@ class RunRecorder(PaintNode):
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
+        if any(topic.unnumbered for topic in topics):
+            lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
         return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
 
@@ -214,6 +220,9 @@ class RunRecorder(PaintNode):
             level, message = WARN, 'messages were missed'
         values = {
             'run': self.run.folder,
+            'messages without a number, whose losses cannot be counted': sum(
+                topic.unnumbered for topic in topics
+            ),
             'bytes': size,
             'disk free bytes': free,
             'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,

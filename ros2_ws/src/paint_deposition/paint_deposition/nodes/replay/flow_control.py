@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import threading
 import time
-from typing import TYPE_CHECKING
 
 from paint_msgs.msg import PoseProgress
 from rclpy.duration import Duration
@@ -16,9 +15,6 @@ from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.nodes.replay.pose_window import PoseWindow
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
-
-if TYPE_CHECKING:  # older distributions have no such name
-    from rclpy.subscription import MessageInfo
 
 # Discovery brings a node's subscriptions and its progress publisher one after the other.
 SETTLED_S = 0.5
@@ -88,11 +84,8 @@ class FlowControl:
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
-        names = self._reporters()
-        for gid, count in self._window.take_lost().items():
-            self._node.get_logger().warning(
-                f'{names.get(gid, gid)} never got the last {count} poses'
-            )
+        for name, count in self._window.take_lost().items():
+            self._node.get_logger().warning(f'{name} never got the last {count} poses')
 
     def _wait_until_ahead_is_less_than(self, limit: int) -> None:
         notice_s = time.monotonic()
@@ -100,12 +93,17 @@ class FlowControl:
             now_s = time.monotonic()
             if now_s - self._looked_s > GRAPH_PERIOD_S:
                 self._look_around()
-            if self.poses_ahead < limit:
+            ahead = self.poses_ahead
+            for name in self._window.take_unheard():
+                self._node.get_logger().warning(
+                    f'{name} has never reported its progress: it is no longer waited for, and '
+                    'may lose what its queue does not hold'
+                )
+            if ahead < limit:
                 break
             if now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
-                names = self._reporters()
-                slowest = ' '.join(names.get(gid, gid) for gid in self._window.slowest())
+                slowest = ' '.join(self._window.slowest())
                 self._notice(f'waiting for {slowest}, {self.poses_ahead} poses behind')
             self._stopped.wait(0.001)
         self.doing = 'playing'
@@ -114,27 +112,25 @@ class FlowControl:
         self.doing = doing
         self._node.get_logger().info(doing)
 
-    def _take_report(self, progress: PoseProgress, info: MessageInfo) -> None:
-        gid = info.get('publisher_gid')
-        # Older distributions do not say who published: then every reporter is taken to be there.
-        name = bytes(gid['data']).hex() if gid else None
-        self._window.report(name, stamp_ns(progress.header), time.monotonic())
+    def _take_report(self, progress: PoseProgress) -> None:
+        stamp = stamp_ns(progress.header)
+        self._window.report(progress.reporter or None, stamp, time.monotonic())
 
     def _look_around(self) -> frozenset[str]:
         self._looked_s = time.monotonic()
-        gids = frozenset(self._reporters())
-        self._window.present(gids, time.monotonic())
-        return gids
+        names = self._reporters()
+        self._window.present(names, time.monotonic())
+        return names
 
-    def _reporters(self) -> dict[str, str]:
-        """Nodes that take the poses and report progress, by their progress publisher's id."""
+    def _reporters(self) -> frozenset[str]:
+        """Full names of the nodes that take the poses and can report progress."""
         progress_topic = self._node.resolve_topic_name(PROGRESS_TOPIC)
         subscribers = {
             (info.node_namespace, info.node_name)
             for info in self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
         }
-        return {
-            bytes(info.endpoint_gid).hex(): f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+        return frozenset(
+            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
             for info in self._node.get_publishers_info_by_topic(progress_topic)
             if (info.node_namespace, info.node_name) in subscribers
-        }
+        )

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 # A subscriber that has reported the same pose for so long while none was sent has got all that
 # will ever reach it.
 LOST_AFTER_S = 5.0
+# One that has never reported is given up after so long; nodes report once their mesh is read.
+UNHEARD_AFTER_S = 20.0
 
 
 @dataclass
@@ -18,13 +20,14 @@ class _Subscriber:
     advanced_s: float
     reported_s: float | None = None
     lost: int = 0
+    unheard: bool = False
 
 
 class PoseWindow:
     """Poses that were published, and which of them each reporting subscriber has taken.
 
-    A subscriber is known by the identity of its progress publisher, so a restarted node is a new
-    one, and one that joins late starts with what is published after. Its reports name the newest
+    A subscriber is known by its full name; one that joins late, or again, starts with what is
+    published after. Its reports name the newest
     pose it took by stamp: what was lost before that one does not matter any more. All times are
     monotonic seconds. Safe to use from several threads.
     """
@@ -35,6 +38,7 @@ class PoseWindow:
         self._published_s = 0.0
         self._stamps: deque[int] = deque()  # of the poses that somebody has not taken yet
         self._subscribers: dict[str, _Subscriber] = {}
+        self._unheard: list[str] = []
 
     def publish(self, stamp_ns: int, now_s: float) -> None:
         """Note that the pose of this stamp was sent."""
@@ -65,6 +69,9 @@ class PoseWindow:
                 if name not in (None, known):
                     continue
                 subscriber.reported_s = now_s
+                if subscriber.unheard:  # what was forgotten meanwhile is not waited for
+                    subscriber.unheard = False
+                    subscriber.taken = self._published - len(self._stamps)
                 if taken > subscriber.taken:
                     subscriber.taken = taken
                     subscriber.advanced_s = now_s
@@ -73,7 +80,8 @@ class PoseWindow:
     def ahead(self, now_s: float) -> int:
         """Poses that the slowest subscriber has not taken yet."""
         with self._lock:
-            for subscriber in self._subscribers.values():
+            for name, subscriber in self._subscribers.items():
+                self._give_up_unheard(name, subscriber, now_s)
                 self._give_up_lost(subscriber, now_s)
             self._forget_taken()
             return len(self._stamps)
@@ -81,10 +89,16 @@ class PoseWindow:
     def slowest(self) -> list[str]:
         """The subscribers that are furthest behind."""
         with self._lock:
-            least = min((s.taken for s in self._subscribers.values()), default=self._published)
+            least = self._least_taken()
             if least == self._published:
                 return []
             return [name for name, s in self._subscribers.items() if s.taken == least]
+
+    def take_unheard(self) -> list[str]:
+        """Subscribers given up since the last call because they have never reported."""
+        with self._lock:
+            unheard, self._unheard = self._unheard, []
+            return unheard
 
     def take_lost(self) -> dict[str, int]:
         """Poses that never reached a subscriber, by its name; counted from zero again."""
@@ -101,6 +115,19 @@ class PoseWindow:
                 return self._published - back
         return 0
 
+    def _give_up_unheard(self, name: str, subscriber: _Subscriber, now_s: float) -> None:
+        if subscriber.reported_s is not None or subscriber.unheard:
+            return
+        quiet_since_s = max(self._published_s, subscriber.advanced_s)
+        waited_for = subscriber.taken < self._published
+        if waited_for and now_s - quiet_since_s > UNHEARD_AFTER_S:
+            subscriber.unheard = True
+            self._unheard.append(name)
+
+    def _least_taken(self) -> int:
+        heard = (s.taken for s in self._subscribers.values() if not s.unheard)
+        return min(heard, default=self._published)
+
     def _give_up_lost(self, subscriber: _Subscriber, now_s: float) -> None:
         if subscriber.taken == self._published or subscriber.reported_s is None:
             return
@@ -111,6 +138,6 @@ class PoseWindow:
             subscriber.taken = self._published
 
     def _forget_taken(self) -> None:
-        least = min((s.taken for s in self._subscribers.values()), default=self._published)
+        least = self._least_taken()
         while len(self._stamps) > self._published - least:
             self._stamps.popleft()

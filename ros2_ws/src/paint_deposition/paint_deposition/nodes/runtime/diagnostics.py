@@ -42,15 +42,17 @@ class Diagnostics:
     def publish(self) -> None:
         message = DiagnosticArray()
         message.header.stamp = self._node.get_clock().now().to_msg()
+        full_name = self._node.get_fully_qualified_name()
         for name, task in self._tasks.items():
             status = task()
             values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
             message.status.append(
                 DiagnosticStatus(
                     level=status.level,
-                    name=f'{self._node.get_name()}: {name}',
+                    # With the namespace: an aggregator tells two cells apart by it.
+                    name=f'{full_name.lstrip("/")}: {name}',
                     message=status.message,
-                    hardware_id=self._node.get_fully_qualified_name(),
+                    hardware_id=full_name,
                     values=values,
                 )
             )

@@ -22,15 +22,18 @@ EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
 
 
-def run_node(make_node: Callable[[], PaintNode]) -> int:
+def run_node(
+    make_node: Callable[[], PaintNode], told_to_stop: threading.Event | None = None
+) -> int:
     """Run one node until it finishes or the process is told to stop; return the exit code.
 
     Ctrl-C, twice as `ros2 launch` sends it, and SIGTERM are a request to stop (exit code 0),
     never an exception in the middle of a callback. A PaintError becomes one line on stderr and
     exit code 2, any other exception a traceback and exit code 1; both close the node first.
+    ``told_to_stop`` is set where a signal has come before.
     """
     node: PaintNode | None = None
-    told_to_stop = threading.Event()
+    told_to_stop = told_to_stop or threading.Event()
 
     def stop(_signum: int, _frame: object) -> None:
         told_to_stop.set()
@@ -40,13 +43,17 @@ def run_node(make_node: Callable[[], PaintNode]) -> int:
 
     try:
         _on_signals(stop)
+        if told_to_stop.is_set():
+            return 0
         _init()
         node = make_node()
         exit_code = _spin(node, told_to_stop)
     except KeyboardInterrupt:
         exit_code = 0
     except Exception as error:
-        exit_code = _report(error)
+        # A library that swallows the interrupt of its loading fails in ways of its own.
+        broken_off = node is None and told_to_stop.is_set()
+        exit_code = 0 if broken_off else _report(error)
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
@@ -78,6 +85,8 @@ def _spin(node: PaintNode, told_to_stop: threading.Event) -> int:
     with _signals_finish(node.finished):
         if told_to_stop.is_set():  # while the node was being made
             node.finish()
+        else:
+            node.get_logger().info('ready')
         executor.spin_until_future_complete(node.finished)
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)

@@ -1,4 +1,4 @@
-"""Publishers and subscribers whose quality of service does not fit, noticed and remembered."""
+"""Publishers and subscribers that do not fit a node's own: by type, or quality of service."""
 
 from __future__ import annotations
 
@@ -8,62 +8,112 @@ from typing import Any
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile, qos_policy_name_from_kind
+from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 
 class QosWatch:
     """Makes a node's publishers and subscriptions, and watches who is at their other end.
 
     Attributes:
-        incompatible: by topic, what a publisher offers or a subscriber asks for that does not fit.
         lost_messages: messages that the middleware says it lost.
         newcomers: subscribers that the publishers have found so far, also those that left since.
     """
 
     def __init__(self, node: Node) -> None:
         self._node = node
-        self.incompatible: dict[str, str] = {}
+        self._inputs: dict[str, Subscription] = {}
+        self._outputs: dict[str, Publisher] = {}
+        self._told: dict[str, str] = {}
         self.lost_messages = 0
         self.newcomers = 0
 
     def subscription(
-        self, message: type, topic: str, take: Callable[[Any], None], profile: QoSProfile
+        self, message: type, topic: str, take: Callable[..., None], profile: QoSProfile
     ) -> Subscription:
         """Subscribe, and watch the publishers."""
+        # The graph is asked who does not fit; the middleware's own notices come once and stay.
         callbacks = SubscriptionEventCallbacks(
-            incompatible_qos=lambda event: self._note(
-                topic, f'a publisher offers less {self._policy(event)} than is asked for'
-            ),
-            incompatible_type=lambda _: self._note(topic, 'a publisher has another type'),
-            message_lost=self._count_lost,
+            message_lost=self._count_lost, use_default_callbacks=False
         )
-        return self._node.create_subscription(
+        self._inputs[topic] = self._node.create_subscription(
             message, topic, take, profile, event_callbacks=callbacks
         )
+        return self._inputs[topic]
+
+    def destroy_subscription(self, subscription: Subscription) -> None:
+        """Destroy a subscription whose topic another one follows by now."""
+        self._node.destroy_subscription(subscription)
 
     def publisher(self, message: type, topic: str, profile: QoSProfile) -> Publisher:
         """Make a publisher, and watch its subscribers."""
         callbacks = PublisherEventCallbacks(
-            incompatible_qos=lambda event: self._note(
-                topic, f'a subscriber asks for more {self._policy(event)} than is offered'
-            ),
-            incompatible_type=lambda _: self._note(topic, 'a subscriber has another type'),
-            matched=self._count_newcomers,
+            matched=self._count_newcomers, use_default_callbacks=False
         )
-        return self._node.create_publisher(message, topic, profile, event_callbacks=callbacks)
+        self._outputs[topic] = self._node.create_publisher(
+            message, topic, profile, event_callbacks=callbacks
+        )
+        return self._outputs[topic]
 
-    @staticmethod
-    def _policy(event: Any) -> str:
-        return qos_policy_name_from_kind(event.last_policy_kind).lower()
+    def publishers_of(self, topic: str) -> list[TopicEndpointInfo]:
+        """Who publishes a topic that is subscribed to, with the type that is expected."""
+        expected = _type_name(self._inputs[topic].msg_type) if topic in self._inputs else None
+        return [
+            info
+            for info in self._node.get_publishers_info_by_topic(topic)
+            if expected in (None, info.topic_type)
+        ]
 
-    def _note(self, topic: str, what: str) -> None:
-        if topic not in self.incompatible:
-            self._node.get_logger().error(f'{topic}: {what}; they will not hear each other')
-        self.incompatible[topic] = what
+    def misfits(self) -> dict[str, str]:
+        """By topic, who is there now and cannot be heard, or cannot hear; new ones are logged."""
+        found: dict[str, str] = {}
+        for topic, subscription in self._inputs.items():
+            for info in self._node.get_publishers_info_by_topic(topic):
+                why = _misfit(info, subscription.msg_type, info.qos_profile, self._asked(topic))
+                if why:
+                    found[topic] = f'{endpoint_name(info)} publishes {why}'
+        for topic, publisher in self._outputs.items():
+            for info in self._node.get_subscriptions_info_by_topic(topic):
+                why = _misfit(info, publisher.msg_type, publisher.qos_profile, info.qos_profile)
+                if why:
+                    found[topic] = f'{endpoint_name(info)} asks for {why}'
+        for topic, what in found.items():
+            if self._told.get(topic) != what:
+                self._node.get_logger().error(f'{topic}: {what}; they do not hear each other')
+        self._told = found
+        return found
+
+    def _asked(self, topic: str) -> QoSProfile:
+        return self._inputs[topic].qos_profile
 
     def _count_newcomers(self, event: Any) -> None:
         self.newcomers += event.total_count_change
 
     def _count_lost(self, event: Any) -> None:
         self.lost_messages += event.total_count_change
+
+
+def _misfit(
+    info: TopicEndpointInfo, expected: type, offered: QoSProfile, asked: QoSProfile
+) -> str:
+    """What does not fit, '' if all does."""
+    if info.topic_type != _type_name(expected):
+        return f'the type {info.topic_type}, not {_type_name(expected)}'
+    # The weaker policy is the larger number. Deadline and liveliness are nobody's habit here.
+    policies = [
+        name
+        for name in ('reliability', 'durability')
+        if getattr(offered, name) > getattr(asked, name)
+    ]
+    return f'another {" and ".join(policies)}' if policies else ''
+
+
+def endpoint_name(info: TopicEndpointInfo) -> str:
+    """The full name of the node at a topic's other end."""
+    return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+
+
+def _type_name(message: type) -> str:
+    package, kind = message.__module__.split('.')[:2]
+    return f'{package}/{kind}/{message.__name__}'

@@ -1,0 +1,105 @@
+"""A subscription that takes what its publishers offer, also what they said before it was there."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
+
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.qos_watch import QosWatch
+
+if TYPE_CHECKING:  # older distributions have no such name
+    from rclpy.subscription import MessageInfo
+
+# More than a publisher keeps for those who come late.
+REMEMBERED = 1000
+
+
+class AtomizerTopic:
+    """Subscribes reliably at first, and as the publishers offer once there are any.
+
+    A best-effort publisher makes the subscription best effort for as long as anybody publishes.
+    Where all publishers keep their messages for those who come late, these are heard too, if
+    `latched`. A message that comes twice because the subscription changes counts once.
+
+    Args:
+        watch: makes the subscription.
+        take: gets each message.
+        depth: messages that may wait.
+        reliability: asked for whatever is offered; None: as offered.
+    """
+
+    def __init__(
+        self,
+        watch: QosWatch,
+        message: type,
+        topic: str,
+        take: Callable[[Any], None],
+        *,
+        depth: int,
+        reliability: ReliabilityPolicy | None = None,
+        latched: bool = False,
+    ) -> None:
+        self._watch = watch
+        self._message = message
+        self._topic = topic
+        self._take = take
+        self._reliability = reliability
+        self._latched = latched
+        self._first = QoSProfile(
+            depth=depth, reliability=reliability or ReliabilityPolicy.RELIABLE
+        )
+        self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
+        self._subscription: Subscription | None = None
+        self._subscribe(self._first)
+
+    def follow_publishers(self) -> None:
+        """Look who publishes, and subscribe anew if another quality of service serves better."""
+        profile = self._best()
+        if (profile.reliability, profile.durability) != (
+            self._profile.reliability,
+            self._profile.durability,
+        ):
+            self._subscribe(profile)
+
+    def _best(self) -> QoSProfile:
+        offered = [info.qos_profile for info in self._watch.publishers_of(self._topic)]
+        if not offered:
+            return self._first
+        profile = qos.accepting(offered, self._first.depth)
+        # More reliable in mid-stream would lose what is sent until both ends have met again.
+        if self._reliability is not None or self._profile.reliability > profile.reliability:
+            profile.reliability = self._profile.reliability
+        if not self._latched:
+            profile.durability = DurabilityPolicy.VOLATILE
+        return profile
+
+    def _subscribe(self, profile: QoSProfile) -> None:
+        before, self._profile = self._subscription, profile
+        # The new one is there before the old one goes: nothing is lost between them.
+        self._subscription = self._watch.subscription(
+            self._message, self._topic, self._on_message, profile
+        )
+        if before is not None:
+            self._drain(before)
+            self._watch.destroy_subscription(before)
+
+    def _drain(self, subscription: Subscription) -> None:
+        handle = subscription.handle
+        with handle:
+            while taken := handle.take_message(self._message, False):
+                self._on_message(*taken)
+
+    def _on_message(self, message: Any, info: MessageInfo) -> None:
+        publisher = info.get('publisher_gid') or {'data': b''}
+        # A message is known by who sent it and when.
+        identity = info['source_timestamp'], bytes(publisher['data'])
+        if identity in self._taken:
+            return
+        if self._latched and identity[0]:
+            self._taken.append(identity)
+        self._take(message)

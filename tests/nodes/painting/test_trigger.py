@@ -1,0 +1,97 @@
+"""What the gun's states do to the film while it is painted."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import AtomizerState
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+
+from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes
+
+POSES = 'deposition_simulator: poses'
+UNTRIGGERED = two_passes(trigger=False)
+
+
+def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, painted, onlooker,
+                                                         wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(DIAGNOSTICS)
+    source = robot(node)
+    source.send_fields(UNTRIGGERED.stamps_ns[0], spraying=True)
+    source.send(UNTRIGGERED)
+    film = painted(node)
+    assert film.max() > 5.0
+    assert np.array_equal(film, offline_um(node, UNTRIGGERED))
+    # It says that it sprays, and that no paint flows.
+    source.send_fields(UNTRIGGERED.stamps_ns[-1], spraying=True, flow=0.0)
+
+    def shown():
+        status = viewer.status(POSES)
+        return status and '1 states that spray with flow 0' in status.message and status
+
+    wait_until(shown)
+    assert shown().level == b'\x01'
+
+
+def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, spin, wait_until,
+                                                        painted):  # fmt: skip
+    """The gun was closed before the node was there, and stays closed: no paint."""
+    latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    gun = Node('gun', context=ros_context)
+    states = gun.create_publisher(AtomizerState, 'atomizer/state', latched)
+    closed = AtomizerState(spraying=False)
+    closed.header.stamp.sec = int(UNTRIGGERED.stamps_ns[0] // 10**9) - 60
+    states.publish(closed)
+    node = simulator()
+    source = Robot(ros_context)
+    source.destroy_publisher(source.state_publisher)
+    spin(gun, source)
+    wait_until(lambda: source.pose_publisher.get_subscription_count(), what='discovery')
+    wait_until(lambda: node.film.flow == 0.0, what='the latched state')
+    source.send(UNTRIGGERED)
+    assert painted(node).max() == 0.0
+    # From here on it is heard as before, and nothing counts twice.
+    closed.spraying = True
+    closed.header.stamp.sec += 120
+    states.publish(closed)
+    wait_until(lambda: node.input.states_received == 2, what='the next state')
+
+
+def test_poses_that_stop_while_the_gun_sprays_are_told(simulator, robot, painted, onlooker,
+                                                       wait_until):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(DIAGNOSTICS)
+    source = robot(node)
+
+    def shown(text, level):
+        status = viewer.status(POSES)
+        return status and text in status.message and status.level == level
+
+    motion = two_passes()
+    source.send(motion)
+    painted(node)
+    wait_until(lambda: shown('the gun sprays, and no pose has come for', b'\x01'))
+    source.send_state(motion.stamps_ns[-1] + 1, 0.0)
+    wait_until(lambda: shown('waiting for poses', b'\x00'))
+
+
+def test_poses_of_any_reliability_are_heard(simulator, ros_context, spin, painted, wait_until):
+    """A best-effort robot joins a reliable one, which has been heard from its first pose on."""
+    node = simulator(pose_queue_depth=5000)
+    first = Robot(ros_context)
+    spin(first)
+    wait_until(lambda: first.is_heard_by(node), what='discovery')
+    first.send(UNTRIGGERED, slice(0, 300))
+    assert np.ptp(painted(node, 300)) > 0.0
+    second = Robot(ros_context, reliable=False)
+    spin(second)
+    wait_until(lambda: second.pose_publisher.get_subscription_count(), what='best effort')
+    second.send(UNTRIGGERED, slice(300, 310))
+    wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
+    (pose_input,) = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
+    assert pose_input.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
