@@ -203,11 +203,12 @@ sys.exit(deposition_simulator())
 """
 
 
-# trimesh catches whatever is raised where it imports networkx, an interrupt too.
+# Meshes other than STL are read by trimesh, which catches whatever is raised where it imports
+# networkx, an interrupt too.
 @pytest.mark.parametrize('module', ['rclpy', 'trimesh', 'networkx'])
 def test_one_ctrl_c_while_libraries_are_imported_ends_the_process(ros_domain, tmp_path, module):
     code = INTERRUPTED_IMPORT.format(module=module)
-    mesh = write_panel(tmp_path / 'panel.stl')
+    mesh = write_panel(tmp_path / 'panel.obj')
     with NodeProcess(tmp_path / 'node', '', code=code, mesh_file=mesh) as process:
         assert process.wait() == 0, process.err
         assert 'Traceback' not in process.err
