@@ -15,6 +15,7 @@ from paint_deposition.cli.options import (
     BODY,
     FILE,
     JSON,
+    MESH,
     MESH_SCALE,
     MODEL,
     NOT_NEGATIVE,
@@ -106,9 +107,7 @@ def limits_wanted(command: Callable) -> Callable:
 
 
 @click.command('improve')
-@click.option(
-    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
-)
+@MESH
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',

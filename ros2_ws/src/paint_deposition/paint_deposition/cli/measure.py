@@ -15,6 +15,7 @@ from paint_deposition.cli.options import (
     FILE,
     JSON,
     MAX_POSE_GAP,
+    MESH,
     MESH_SCALE,
     MODEL,
     NUMBER,
@@ -42,9 +43,7 @@ HARDLY = 0.15
 
 
 @click.command('measure')
-@click.option(
-    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
-)
+@MESH
 @click.option(
     '--trajectory', type=FILE,
     help='How it is painted: what `simulate` takes; default: passes as `plan` would lay them, '

@@ -60,6 +60,9 @@ def model_option(text: str) -> Callable:
     return click.option('--model', 'model_file', type=FILE, help=text)
 
 
+MESH = click.option(
+    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
+)
 MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
 
 

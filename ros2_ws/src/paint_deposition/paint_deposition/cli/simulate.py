@@ -16,6 +16,7 @@ from paint_deposition.cli.options import (
     FILE,
     JSON,
     MAX_POSE_GAP,
+    MESH,
     MESH_SCALE,
     MODEL,
     NOT_NEGATIVE,
@@ -36,9 +37,7 @@ if TYPE_CHECKING:
 
 
 @click.command('simulate')
-@click.option(
-    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
-)
+@MESH
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '

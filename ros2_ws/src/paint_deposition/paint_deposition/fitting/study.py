@@ -88,20 +88,14 @@ class Study:
             check_unit(experiment.readings)
         noise = gauge_noise(campaign.readings)
         campaign, noise = campaign.without(noise.gross), noise.without_gross()
-        return Study._with(campaign, Forward(campaign, effects), noise, Texture())
-
-    @staticmethod
-    def _with(
-        campaign: Campaign, forward: Forward, noise: GaugeNoise, texture: Texture
-    ) -> 'Study':
-        means = campaign.means
-        sigma = np.hypot(_of_means(noise, campaign), texture.share * means.mean_um)
-        return Study(campaign, forward, means.mean_um, sigma, noise, texture)
+        mean_um, texture = campaign.means.mean_um, Texture()
+        sigma_um = _sigma_um(campaign, noise, texture, None)
+        return Study(campaign, Forward(campaign, effects), mean_um, sigma_um, noise, texture)
 
     def textured(self, texture: Texture) -> 'Study':
         """The same with another texture."""
-        other = Study._with(self.campaign, self.forward, self.noise, texture)
-        return replace(other, slips=self.slips, facet_um=self.facet_um)
+        sigma_um = _sigma_um(self.campaign, self.noise, texture, self.facet_um)
+        return replace(self, texture=texture, sigma_um=sigma_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
         """The same with what facets cost under a model, if it is worth telling from the noise.
@@ -117,7 +111,7 @@ class Study:
         )
         if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
             return self
-        sigma_um = np.hypot(self.sigma_um, FACETS_OFF * facet_um)
+        sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
         return replace(self, sigma_um=sigma_um, facet_um=facet_um)
 
     def without(self, slips: dict[int, Slip]) -> 'Study':
@@ -136,9 +130,12 @@ class Study:
         left_out = ~kept[self.campaign.means.owner]
         campaign = self.campaign.without(left_out)
         noise = self.noise.select(~left_out)
-        study = Study._with(campaign, self.forward.at(campaign), noise, self.texture)
         facet_um = None if self.facet_um is None else self.facet_um[kept]
-        return replace(study, slips=self.slips, sigma_um=self.sigma_um[kept], facet_um=facet_um)
+        return Study(
+            campaign, self.forward.at(campaign), campaign.means.mean_um,
+            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.slips,
+            facet_um,
+        )  # fmt: skip
 
     @property
     def gauge_um(self) -> np.ndarray:
@@ -285,6 +282,14 @@ class Study:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""
         means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
         return np.round(means).astype(int)
+
+
+def _sigma_um(
+    campaign: Campaign, noise: GaugeNoise, texture: Texture, facet_um: np.ndarray | None
+) -> np.ndarray:
+    """(P,) standard deviation of the points: gauge, texture, and what is not known of facets."""
+    sigma_um = np.hypot(_of_means(noise, campaign), texture.share * campaign.means.mean_um)
+    return sigma_um if facet_um is None else np.hypot(sigma_um, FACETS_OFF * facet_um)
 
 
 def _of_means(noise: GaugeNoise, campaign: Campaign) -> np.ndarray:

@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paint_deposition.film.statistics import film_statistics
 from paint_deposition.planning.improvement.dwell_films import FilmAtPoints
-from paint_deposition.planning.improvement.improve import Retiming, timed_for_evenness
+from paint_deposition.planning.improvement.improve import timed_for_evenness
 from paint_deposition.planning.improvement.limits import Limits, Wish
 from paint_deposition.planning.improvement.moves import moves_of
 from paint_deposition.planning.improvement.programme import Programme
@@ -15,7 +14,7 @@ from paint_deposition.planning.optimised_lines import POINTS, Lines, LineSearch
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.pass_placement import Placing
 from paint_deposition.planning.passes import plan_passes
-from paint_deposition.planning.plan import Plan, evenness, simulated
+from paint_deposition.planning.plan import Plan, evenness, planned_statistics, simulated
 
 # Of the numbers of passes, so many that promise most are followed up.
 FOLLOWED = 2
@@ -26,7 +25,6 @@ FASTER_ENDS = 1.3
 @dataclass(frozen=True)
 class _Candidate:
     plan: Plan
-    retiming: Retiming
     cost: float
 
 
@@ -121,10 +119,7 @@ def _followed(
     )
     area = surface.vertex_areas_m2[plain.painted]
     _, sigma_n = evenness(film[plain.painted], area)
-    statistics = film_statistics(
-        film[plain.painted], area, emitted,
-        target_um=request.target_um or 0.0, target_tolerance_um=0.1 * (request.target_um or 0.0),
-    )  # fmt: skip
+    statistics = planned_statistics(film[plain.painted], area, emitted, request)
     index = float(np.diff(lines.lines_m).mean()) if len(passes) > 1 else 0.0
     placing = Placing(len(passes), index, float(lines.lines_m.mean()), sigma_n)
     found = replace(
@@ -134,4 +129,4 @@ def _followed(
     )  # fmt: skip
     cost = sigma_n**2 + request.paint_weight * emitted / wanted_cm3
     cost += request.time_weight * found.cycle_time_s / plain.cycle_time_s
-    return _Candidate(found, retiming, cost)
+    return _Candidate(found, cost)

@@ -20,8 +20,14 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import Contact, GunEnvelope, contacts
 from paint_deposition.planning.face_order import in_order, motion_over
 from paint_deposition.planning.passes import PlannedPass
-from paint_deposition.planning.plan import PlanRequest, plan, simulated
-from paint_deposition.planning.seams import blend, sigma_n_of
+from paint_deposition.planning.plan import (
+    PlanRequest,
+    evenness,
+    plan,
+    planned_statistics,
+    simulated,
+)
+from paint_deposition.planning.seams import blend
 
 # Faces that turn further from the side of the gun are its back.
 BACK_COSINE = -0.1
@@ -112,7 +118,7 @@ class PartPlan:
             'faces': [
                 {
                     'area_m2': face.surface.area_m2,
-                    'outward': _outward(face.surface).tolist(),
+                    'outward': face.surface.outward.tolist(),
                 }
                 for face in self.faces
             ],
@@ -166,7 +172,7 @@ def plan_faces(
     progress('motion', 0.0)
     motion = motion_over(running, frame_id, lambda way: not contacts(surface, way, envelope))
     film, emitted = simulated(surface, model, motion.trajectory)
-    sigma_n = sigma_n_of(film, area)
+    _, sigma_n = evenness(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
             f'no passes on {len(faces)} face(s) keep sigma_n within {request.tolerance:g}; the '
@@ -174,10 +180,7 @@ def plan_faces(
         )
     progress('one raster', 0.0)
     raster = _one_raster(surface, model, replace(request, tolerance=None), painted, area)
-    statistics = film_statistics(
-        film[painted], area[painted], emitted,
-        target_um=request.target_um or 0.0, target_tolerance_um=0.1 * (request.target_um or 0.0),
-    )  # fmt: skip
+    statistics = planned_statistics(film[painted], area[painted], emitted, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
         surface, request, faces, blended.margin_m, passes, motion.moves, motion.trajectory,
@@ -191,15 +194,10 @@ def _of_the_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ..
     if request.outward is None:
         return faces
     side = np.asarray(request.outward) / np.linalg.norm(request.outward)
-    kept = tuple(face for face in faces if _outward(face.surface) @ side > BACK_COSINE)
+    kept = tuple(face for face in faces if face.surface.outward @ side > BACK_COSINE)
     if not kept:
         raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     return kept
-
-
-def _outward(surface: Surface) -> np.ndarray:
-    mean = surface.vertex_areas_m2 @ surface.normals
-    return mean / np.linalg.norm(mean)
 
 
 def _one_raster(
@@ -215,4 +213,4 @@ def _one_raster(
     except PlanError:
         return math.nan, math.nan
     statistics = film_statistics(film_um[painted], area[painted], 1.0)
-    return sigma_n_of(film_um, area), statistics.coverage
+    return evenness(film_um, area)[1], statistics.coverage

@@ -255,10 +255,7 @@ def plan(
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
-    statistics = film_statistics(
-        film[painted], area, emitted,
-        target_um=request.target_um or 0.0, target_tolerance_um=0.1 * (request.target_um or 0.0),
-    )  # fmt: skip
+    statistics = planned_statistics(film[painted], area, emitted, request)
     return Plan(
         surface, request, style, placing, passes, trajectory, film, painted,
         statistics, sigma_n, plane, on_part, model, films, tuple(planned_moves(passes, style)),
@@ -303,6 +300,16 @@ def simulated(
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.emitted_cm3
+
+
+def planned_statistics(
+    film_um: np.ndarray, area_m2: np.ndarray, emitted_cm3: float, request: PlanRequest
+) -> FilmStatistics:
+    """Of a planned film; within a tenth of the target, if there is one, it is good."""
+    target = request.target_um or 0.0
+    return film_statistics(
+        film_um, area_m2, emitted_cm3, target_um=target, target_tolerance_um=0.1 * target
+    )
 
 
 def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:

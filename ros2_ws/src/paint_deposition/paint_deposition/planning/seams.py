@@ -21,8 +21,8 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.face_order import FacePasses
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.passes import plan_pass
-from paint_deposition.planning.plan import PlanRequest, plan
-from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.plan import PlanRequest, evenness, plan
+from paint_deposition.planning.surface_map import SurfaceMap
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
@@ -80,19 +80,12 @@ def blend(
     target = request.target_um if request.speed_m_per_s is None else None
     dwells = [_dwell(laid, area_m2, target) for laid in tried]
     sigmas = [
-        sigma_n_of(dwell @ laid.films_um, area_m2)
+        evenness(dwell @ laid.films_um, area_m2)[1]
         for dwell, laid in zip(dwells, tried, strict=True)
     ]
     best = int(np.argmin(sigmas))
-    before = sigma_n_of(tried[0].films_um.sum(axis=0), area_m2)
+    _, before = evenness(tried[0].films_um.sum(axis=0), area_m2)
     return Blend(tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before)
-
-
-def sigma_n_of(film_um: np.ndarray, area_m2: np.ndarray) -> float:
-    """Standard deviation over mean of a film (V,), weighted by area."""
-    weight = area_m2 / area_m2.sum()
-    mean = float(weight @ film_um)
-    return math.sqrt(float(weight @ (film_um - mean) ** 2)) / mean
 
 
 def _laid(
@@ -105,11 +98,9 @@ def _laid(
     passes, maps, films = [], [], []
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     for face in faces:
-        own = face.without_margin(margin_m).surface
-        planned = plan(own, model, request)
+        planned = plan(face.without_margin(margin_m).surface, model, request)
         passes.append(FacePasses(planned.passes, planned.style))
-        axes = pass_axes(own, request.direction)
-        maps.append(SurfaceMap(own, axes, request.smoothing_radius_m))
+        maps.append(planned.line_films.surface_map)
         for one in planned.passes:
             path, _ = spray_path(trajectory_of((one,), planned.style), max_step_m=model.max_step_m)
             integrator.reset()

@@ -15,6 +15,7 @@ from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.nodes.replay.pose_window import PoseWindow
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.qos_watch import endpoint_name
 
 # Discovery brings a node's subscriptions and its progress publisher one after the other.
 SETTLED_S = 0.5
@@ -125,12 +126,7 @@ class FlowControl:
     def _reporters(self) -> frozenset[str]:
         """Full names of the nodes that take the poses and can report progress."""
         progress_topic = self._node.resolve_topic_name(PROGRESS_TOPIC)
-        subscribers = {
-            (info.node_namespace, info.node_name)
-            for info in self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        }
-        return frozenset(
-            f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-            for info in self._node.get_publishers_info_by_topic(progress_topic)
-            if (info.node_namespace, info.node_name) in subscribers
-        )
+        node = self._node
+        takers = node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        tellers = node.get_publishers_info_by_topic(progress_topic)
+        return frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, tellers))

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.planning.improvement.programme import BEGIN_NS, Programme, speed_along
+from paint_deposition.planning.improvement.programme import Programme, speed_along
 
 # Speeds that differ by less are told as one; so many stretches at most.
 ALIKE, MOST_STRETCHES = 0.06, 6
@@ -105,10 +105,8 @@ def _turns_m(programme: Programme) -> np.ndarray:
     """Travel at which strokes begin."""
     trajectory = programme.trajectory()
     path, _ = spray_path(trajectory)
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
     turn = 1 + np.flatnonzero(np.diff(path.stroke))
-    behind = np.interp((path.stamp_ns[turn] - BEGIN_NS) * 1e-9, clock, programme.travel_m)
-    return behind - path.from_turn_m[turn]
+    return programme.travel_at_m(path.stamp_ns[turn]) - path.from_turn_m[turn]
 
 
 def _stretches(
@@ -119,8 +117,7 @@ def _stretches(
     speed = speed_along(improved, places)
     cuts = _cuts(speed)
     ends = places[[0, *cuts, SAMPLES]]
-    travel = given.travel_m + 1e-12 * np.arange(len(given.travel_m))
-    at = np.stack([np.interp(ends, travel, given.positions_m[:, k]) for k in range(3)], axis=1)
+    at = given.positions_at_m(ends)
     axis = int(np.abs(at[-1] - at[0]).argmax())
     before, after = speed_along(given, ends), speed_along(improved, ends)
     coordinate = at[:, axis].tolist()

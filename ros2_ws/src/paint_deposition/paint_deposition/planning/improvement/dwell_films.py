@@ -11,7 +11,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement.nodes import Nodes
-from paint_deposition.planning.improvement.programme import BEGIN_NS, Programme
+from paint_deposition.planning.improvement.programme import Programme
 
 # Sub-steps for the films of nodes may be coarser than for a film: 1e-3 of the peak at most.
 STEPS_PER_SIGMA = 6.0
@@ -19,8 +19,7 @@ STEPS_PER_SIGMA = 6.0
 
 def sprayed_travel_m(programme: Programme, path: SprayPath) -> tuple[np.ndarray, np.ndarray]:
     """(M,) travel at each sub-step, and (M,) the opening that it belongs to: the last begun."""
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
-    travel = np.interp((path.stamp_ns - BEGIN_NS) * 1e-9, clock, programme.travel_m)
+    travel = programme.travel_at_m(path.stamp_ns)
     begins = np.array([opening.on_m for opening in programme.openings])
     return travel, np.maximum(np.searchsorted(begins, travel, side='right') - 1, 0)
 

@@ -209,11 +209,9 @@ class _Search:
 
 def _even(given: Programme, nodes: Nodes, level: float, limits: Limits) -> Density:
     """The mean density of each opening as it was given, times a level."""
-    clock = np.concatenate([[0.0], np.cumsum(given.duration_s)])
-    travel = given.travel_m + 1e-12 * np.arange(len(clock))
     flow = np.array([opening.flow for opening in nodes.openings])
     ends = np.array([[o.on_m, o.off_m] for o in given.openings])
-    seconds = np.diff(np.interp(ends, travel, clock), axis=1)[:, 0]
+    seconds = np.diff(given.seconds_at(ends), axis=1)[:, 0]
     slowness = np.clip(
         level * seconds / np.diff(ends, axis=1)[:, 0],
         1.0 / limits.speed_max_m_per_s,
@@ -224,12 +222,9 @@ def _even(given: Programme, nodes: Nodes, level: float, limits: Limits) -> Densi
 
 def _sprayed_s(programme: Programme) -> float:
     """Time sprayed, weighted by the flow [s]."""
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
-    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
-    return sum(
-        opening.flow * float(np.diff(np.interp([opening.on_m, opening.off_m], travel, clock))[0])
-        for opening in programme.openings
-    )
+    ends = np.array([[o.on_m, o.off_m] for o in programme.openings])
+    flow = np.array([o.flow for o in programme.openings])
+    return float(flow @ np.diff(programme.seconds_at(ends), axis=1)[:, 0])
 
 
 def _sigma_n(films_um: Sequence[np.ndarray]) -> float:

@@ -30,7 +30,7 @@ def moves_of(programme: Programme, limits: Limits) -> list[Move]:
     ends = np.array([[o.on_m, o.off_m] for o in programme.openings])
     stops = np.concatenate([_stops(programme, k, limits) for k in range(len(ends))])
     whole = programme.with_poses_at(stops)
-    clock = np.concatenate([[0.0], np.cumsum(whole.duration_s)])
+    clock = whole.clock_s
     rows = _rows_to_stop_at(whole, stops)
     speed = np.append(whole.speed_m_per_s, 0.0)
     moves: list[Move] = []

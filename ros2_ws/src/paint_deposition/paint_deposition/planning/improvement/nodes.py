@@ -156,19 +156,11 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
     In a bend no faster than the acceleration allows, unless it was programmed so; where it opens
     and closes, no faster than can be reached from its way there and slowed down on its way on.
     """
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
-    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
-
-    def at(place_m: np.ndarray) -> np.ndarray:
-        return np.stack(
-            [np.interp(place_m, travel, programme.positions_m[:, k]) for k in range(3)], axis=1
-        )
-
-    places = nodes.travel_m
-    low, high = np.maximum(places - BEND_M, 0.0), np.minimum(places + BEND_M, travel[-1])
-    seconds = np.interp(high, travel, clock) - np.interp(low, travel, clock)
+    places, at, length = nodes.travel_m, programme.positions_at_m, programme.travel_m[-1]
+    low, high = np.maximum(places - BEND_M, 0.0), np.minimum(places + BEND_M, length)
+    seconds = programme.seconds_at(high) - programme.seconds_at(low)
     programmed = (high - low) / np.maximum(seconds, 1e-9)
-    inner = np.clip(places, BEND_M, travel[-1] - BEND_M)
+    inner = np.clip(places, BEND_M, length - BEND_M)
     bend = at(inner + BEND_M) - 2.0 * at(inner) + at(inner - BEND_M)
     curvature = np.linalg.norm(bend, axis=1) / BEND_M**2
     allowed = np.sqrt(limits.acceleration_m_per_s2 / np.maximum(curvature, 1e-9))
@@ -180,7 +172,7 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
     for number, (on, off) in enumerate(ends):
         rows = nodes.rows(number)
         before = ends[number - 1, 1] if number else 0.0
-        after = ends[number + 1, 0] if number + 1 < len(ends) else travel[-1]
+        after = ends[number + 1, 0] if number + 1 < len(ends) else length
         for end, far, node in ((on, before, rows.start), (off, after, rows.stop - 1)):
             fastest = _fastest_m_per_s(programme, end, far, limits)
             if fastest < greatest[node]:
@@ -193,12 +185,10 @@ def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: L
     count = math.ceil(abs(far_m - end_m) / STEADY_M)
     if count < 2:
         return math.inf
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
-    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
     places = np.linspace(end_m, far_m, count + 1)
-    low = np.maximum(places - STEADY_M, travel[0])
-    high = np.minimum(places + STEADY_M, travel[-1])
-    seconds = np.interp(high, travel, clock) - np.interp(low, travel, clock)
+    low = np.maximum(places - STEADY_M, 0.0)
+    high = np.minimum(places + STEADY_M, programme.travel_m[-1])
+    seconds = programme.seconds_at(high) - programme.seconds_at(low)
     speed = (high - low) / np.maximum(seconds, 1e-9)
     if speed.min() > MUCH_SLOWER * speed[0]:
         return math.inf

@@ -1,6 +1,7 @@
 """A given motion as a path and the openings of the gun along it, to be timed anew."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -85,6 +86,29 @@ class Programme:
             raise PlanError(f'{trajectory.source}: the gun never sprays on a move')
         return programme
 
+    @cached_property
+    def clock_s(self) -> np.ndarray:
+        """(N,) time at each pose from the first [s]."""
+        return np.concatenate([[0.0], np.cumsum(self.duration_s)])
+
+    @cached_property
+    def _rising_m(self) -> np.ndarray:
+        """(N,) travel that rises where the gun stands, too: of its stay the last pose counts."""
+        return self.travel_m + 1e-12 * np.arange(len(self.travel_m))
+
+    def seconds_at(self, travel_m: np.ndarray) -> np.ndarray:
+        """(...) time at which lengths of travel (...) are reached [s]."""
+        return np.interp(travel_m, self._rising_m, self.clock_s)
+
+    def travel_at_m(self, stamps_ns: np.ndarray) -> np.ndarray:
+        """(...) travel at stamps (...) of its timed motion, see ``trajectory``."""
+        return np.interp((stamps_ns - BEGIN_NS) * 1e-9, self.clock_s, self.travel_m)
+
+    def positions_at_m(self, travel_m: np.ndarray) -> np.ndarray:
+        """(n, 3) TCP at lengths of travel (n,)."""
+        columns = [np.interp(travel_m, self._rising_m, column) for column in self.positions_m.T]
+        return np.stack(columns, axis=1)
+
     @property
     def speed_m_per_s(self) -> np.ndarray:
         """(N - 1,) speed of the TCP from each pose to the next."""
@@ -105,7 +129,7 @@ class Programme:
         if not len(wanted):
             return self
         share = (wanted - self.travel_m[row]) / (self.travel_m[row + 1] - self.travel_m[row])
-        clock = np.concatenate([[0.0], np.cumsum(self.duration_s)])
+        clock = self.clock_s
         seconds = clock[row] + share * self.duration_s[row]
         between = self.positions_m[row] + share[:, np.newaxis] * (
             self.positions_m[row + 1] - self.positions_m[row]
@@ -134,7 +158,7 @@ class Programme:
     def trajectory(self) -> Trajectory:
         """The timed motion; the gun opens and closes at poses."""
         whole = self.with_poses_at(np.array([[o.on_m, o.off_m] for o in self.openings]).ravel())
-        clock = np.concatenate([[0.0], np.cumsum(whole.duration_s)])
+        clock = whole.clock_s
         stamps = BEGIN_NS + np.round(clock * 1e9).astype(np.int64)
         triggers, flows = [], []
         for opening in self.openings:
@@ -155,9 +179,7 @@ class Programme:
 
 def speed_along(programme: Programme, travel_m: np.ndarray) -> np.ndarray:
     """(N - 1,) mean speed between places (N,) of the path [m/s]."""
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
-    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
-    return np.diff(travel_m) / np.maximum(np.diff(np.interp(travel_m, travel, clock)), 1e-9)
+    return np.diff(travel_m) / np.maximum(np.diff(programme.seconds_at(travel_m)), 1e-9)
 
 
 def _openings(

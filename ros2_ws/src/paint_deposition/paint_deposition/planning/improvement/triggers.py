@@ -17,7 +17,6 @@ CHECKS = 20
 
 def widened(programme: Programme, limits: Limits) -> tuple[Opening, ...]:
     """The openings with all places at which the gun might open earlier or close later."""
-    clock = np.concatenate([[0.0], np.cumsum(programme.duration_s)])
     ends = [(o.on_m, o.off_m) for o in programme.openings]
     found = []
     for number, opening in enumerate(programme.openings):
@@ -30,31 +29,24 @@ def widened(programme: Programme, limits: Limits) -> tuple[Opening, ...]:
         found.append(
             replace(
                 opening,
-                on_m=opening.on_m - _usable(programme, clock, opening.on_m, -1.0, back),
-                off_m=opening.off_m + _usable(programme, clock, opening.off_m, 1.0, ahead),
+                on_m=opening.on_m - _usable(programme, opening.on_m, -1.0, back),
+                off_m=opening.off_m + _usable(programme, opening.off_m, 1.0, ahead),
             )
         )
     return tuple(found)
 
 
-def _usable(
-    programme: Programme, clock: np.ndarray, from_m: float, side: float, most_m: float
-) -> float:
+def _usable(programme: Programme, from_m: float, side: float, most_m: float) -> float:
     """How far the path runs on from an end, straight and steadily."""
     if most_m <= 0.0:
         return 0.0
     way = np.linspace(0.0, most_m, CHECKS + 1)
-    travel = programme.travel_m + 1e-12 * np.arange(len(clock))
     places = from_m + side * way
-    at = np.stack(
-        [np.interp(places, travel, programme.positions_m[:, k]) for k in range(3)], axis=1
-    )
-    seconds = np.abs(np.diff(np.interp(places, travel, clock)))
+    at = programme.positions_at_m(places)
+    seconds = np.abs(np.diff(programme.seconds_at(places)))
     speed = np.diff(way) / np.maximum(seconds, 1e-9)
     inner = from_m - side * way[1]
-    own = way[1] / max(
-        abs(float(np.interp(inner, travel, clock)) - float(np.interp(from_m, travel, clock))), 1e-9
-    )
+    own = way[1] / max(float(np.ptp(programme.seconds_at(np.array([inner, from_m])))), 1e-9)
     good = speed >= STEADY * own
     good &= np.linalg.norm(at[1:] - at[0], axis=1) >= STRAIGHT * way[1:]
     return float(way[np.argmin(good)] if not good.all() else way[-1])
