@@ -8,6 +8,9 @@ from numba.extending import register_jitable
 from paint_deposition.kernel.code_cache import named_for_its_code
 
 Law = Callable[..., float]
+# One call left in the hot loop keeps it from being vectorised: a law of many parameters would be
+# thought too large to inline, and make the loop twenty times as slow.
+_inlined = register_jitable(forceinline=True)
 
 
 def in_precision(law: Law, real: type) -> Law:
@@ -56,11 +59,11 @@ def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law
     variant = [count for _, count in laws], real.__name__, offset
     functions = [law for law, _ in laws]
     # Symbols of compiled code from different processes can share a name: each names its code.
-    head = register_jitable(named_for_its_code(in_precision(law, real), functions[:1], *variant))
+    head = _inlined(named_for_its_code(in_precision(law, real), functions[:1], *variant))
     end = offset + count
     tail = product(rest, real, end)
 
     def both(ray, parameters):
         return head(ray, *parameters[offset:end]) * tail(ray, parameters)
 
-    return register_jitable(named_for_its_code(both, functions, *variant))
+    return _inlined(named_for_its_code(both, functions, *variant))
