@@ -106,7 +106,7 @@ def _turned(world: World) -> dict:
     judged = _on(surface, plan.painted, world.part, *judged)
     spots = scatter(world.part, READINGS, rng, 0.015)
     films, doors, said = [], [], []
-    model, trajectory = calibration.model, given
+    best, trajectory = calibration, given
     for turn in range(TURNS + 1):
         door = world.painted(f'door_{turn}', trajectory, turn)
         films.append(_figures(door.film_um(*judged)))
@@ -116,14 +116,15 @@ def _turned(world: World) -> dict:
         found = pd.diagnose(world.campaign(f'turn_{turn}', *doors))
         said.append({'verdict': found.verdict, 'accepted': list(found.accepted)})
         if found.verdict != 'none_missing':
-            model = found.model
-        trajectory = pd.improve(surface, given, model, target_um=target).trajectory
+            best = found
+        better = pd.improve(surface, given, best.model, posterior=best.posterior, target_um=target)
+        trajectory = better.trajectory
     known = _oracle(world, given, rng)
-    best = pd.improve(surface, given, known, target_um=target).trajectory
+    ideal = pd.improve(surface, given, known, target_um=target).trajectory
     return {
         'said': said,
         'turns': films,
-        'oracle': _figures(world.painted('oracle', best, 9).film_um(*judged)),
+        'oracle': _figures(world.painted('oracle', ideal, 9).film_um(*judged)),
     }
 
 

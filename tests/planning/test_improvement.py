@@ -7,10 +7,11 @@ import pytest
 from scipy.spatial import cKDTree
 
 import paint_deposition as pd
-from paint_deposition.effects.learned.curves import LearnedAcross
+from paint_deposition.effects.learned.curves import CURVES, LearnedAcross
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PlanError
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.fitting.draws import drawn
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.improvement.limits import Limits
@@ -211,22 +212,49 @@ def test_bag_and_robot_program_lay_the_same_film(levelled, panel, tmp_path):
     assert levelled.program_difference < 1e-3
 
 
-@pytest.mark.slow
-def test_an_uncertain_model_has_its_interval(panel, even):
+def _known(**widths):
+    """What is known of the bell: these standard deviations, next to none else."""
     p = SKEWED.planar
     means = {
         'log_K1': np.log(p.K1_cm3_per_s), 'K2': p.K2, 'K3_cos_phi': p.K3 * np.cos(p.phi_rad),
         'K3_sin_phi': p.K3 * np.sin(p.phi_rad), 'r_m': p.r_m,
         'log_sigma1': np.log(p.sigma1_m), 'log_sigma2': np.log(p.sigma2_m),
     }  # fmt: skip
-    widths = np.array([0.05, 0.03, 0.03, 0.03, 0.004, 0.05, 0.05])
-    rows = np.diag(widths**2).tolist()
-    known = Posterior(mean=means, covariance=dict(zip(means, rows, strict=True)))
+    rows = np.diag([widths.get(name, 1e-6) ** 2 for name in means]).tolist()
+    return Posterior(mean=means, covariance=dict(zip(means, rows, strict=True)))
+
+
+@pytest.mark.slow
+def test_an_uncertain_model_has_its_interval(panel, even):
+    known = _known(
+        log_K1=0.05, K2=0.03, K3_cos_phi=0.03, K3_sin_phi=0.03, r_m=0.004, log_sigma1=0.05,
+        log_sigma2=0.05,
+    )  # fmt: skip
     better = pd.improve(panel, even.trajectory, SKEWED, posterior=known)
     (low, high), (new_low, new_high) = better.sigma_n_interval
     assert low < better.before.sigma_n < high
     assert new_low < new_high
     assert new_high < high
+
+
+@pytest.mark.slow
+def test_a_level_that_is_not_known_costs_no_evenness(panel, even, levelled):
+    known = _known(log_K1=0.2)
+    unsure = pd.improve(panel, even.trajectory, SKEWED, posterior=known, paint_weight=0.0)
+    assert unsure.after.sigma_n == pytest.approx(levelled.after.sigma_n, rel=0.02)
+    assert unsure.after.mean_um == pytest.approx(levelled.after.mean_um, rel=2e-3)
+
+
+def test_draws_follow_the_band_of_a_learned_curve():
+    sd = (0.05, 0.1, 0.2, 0.1, 0.05, 0.02, 0.02, 0.1)
+    law = CURVES['spray_pass'](low=0, high=3, learned=(0.1,) * 8, sd=sd)
+    plain = CURVES['speed_m_per_s'](learned=(0.1, 0.2))
+    model = SKEWED.model_copy(update={'effects': (law, plain)})
+    models = drawn(model, _known(), 2000, seed=4)
+    values = np.array([one.effects[0].learned for one in models])
+    np.testing.assert_allclose(values.mean(axis=0), law.learned, atol=4 * max(sd) / 2000**0.5)
+    np.testing.assert_allclose(values.std(axis=0), sd, rtol=0.08)
+    assert all(one.effects[1] == plain for one in models)
 
 
 def test_given_motion_without_a_trigger_or_with_gaps(panel, even):

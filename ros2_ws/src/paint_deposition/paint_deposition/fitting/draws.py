@@ -2,15 +2,22 @@
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.parameters import FreeParameters
+
+# Values of a learned curve so many knots apart are hardly off together.
+KNOTS_TOGETHER = 2.0
 
 
 def drawn(
     model: DepositionModel, posterior: Posterior, count: int, seed: int
 ) -> list[DepositionModel]:
     """So many models from the posterior of a model, values outside their bounds kept at them.
+
+    Learned curves vary within their band, by themselves.
 
     Args:
         model: that the posterior belongs to; it has every effect that the posterior names.
@@ -24,8 +31,22 @@ def drawn(
     parameters = FreeParameters(model, tuple(varied))
     order = [posterior.names.index(name) for name in parameters.coordinates]
     covariance = posterior.matrix[np.ix_(order, order)]
-    values = np.random.default_rng(seed).multivariate_normal(
-        posterior.centre[order], covariance, count, method='cholesky'
-    )
+    rng = np.random.default_rng(seed)
+    values = rng.multivariate_normal(posterior.centre[order], covariance, count, method='cholesky')
     vectors = (values - parameters.offset) / parameters.scale
-    return [parameters.decode(vector) for vector in np.clip(vectors, *parameters.bounds)]
+    models = [parameters.decode(vector) for vector in np.clip(vectors, *parameters.bounds)]
+    return [
+        one.model_copy(update={'effects': tuple(_bent(effect, rng) for effect in one.effects)})
+        for one in models
+    ]
+
+
+def _bent(effect: Effect, rng: np.random.Generator) -> Effect:
+    """A learned curve drawn from its band; any other effect as it is."""
+    if not (isinstance(effect, LearnedCurve) and effect.sd):
+        return effect
+    knots = np.arange(len(effect.sd))
+    apart = np.subtract.outer(knots, knots) / KNOTS_TOGETHER
+    covariance = np.exp(-0.5 * apart**2) * np.outer(effect.sd, effect.sd)
+    learned = rng.multivariate_normal(effect.learned, covariance, method='eigh')
+    return effect.model_copy(update={'learned': tuple(learned.tolist())})

@@ -100,11 +100,11 @@ def timed_for_evenness(
     rows = np.flatnonzero(judged)[spread(surface.vertex_areas_m2[judged])]
     films = [FilmAtPoints(surface, rows, model) for model in models]
     before = [one.film_um(programme) for one in films]
-    target = wish.target_um or float(np.mean([film.mean() for film in before]))
+    mean = float(before[0].mean())
+    target = wish.target_um or mean
     narrow = min(min(m.planar.sigma1_m, m.planar.sigma2_m) for m in models)
     spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
-    level = target / float(np.mean([film.mean() for film in before]))
-    search = _Search(films, target, level, limits, wish, spacing, progress, explained)
+    search = _Search(films, target, target / mean, limits, wish, spacing, progress, explained)
     relaxed = replace(programme, openings=widened(programme, limits))
     shifted = search.openings(programme, relaxed)
     return search.timed(programme, shifted, before)

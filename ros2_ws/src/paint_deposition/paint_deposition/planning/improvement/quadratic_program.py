@@ -21,7 +21,8 @@ from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes
 SETTLED, ROUNDS = 3e-3, 8
 # The film's bounds count this much more than evenness: they are kept where they can be.
 BOUND_WEIGHT = 100.0
-# Least squares alone lay too little, by sigma_n^2: this weight holds the mean at the target.
+# Weight that holds the mean of the best known film at the target. How far the levels of other
+# models lie from it is left alone: even films would be given up for it.
 LEVEL_WEIGHT = 30.0
 # Smoothness is told by changes of slowness over this length [m].
 SLOPE_M = 0.1
@@ -70,7 +71,8 @@ class Problem:
     """What is to be minimised over densities and flows.
 
     Attributes:
-        films: per draw of the model, (n, V) film for a density of 1 s/m at each node [um].
+        films: per draw of the model, the best known first, (n, V) film for a density of 1 s/m at
+            each node [um].
         target_um: film wanted.
         nodes, bounds: of the path.
         limits, wish: of the user.
@@ -146,13 +148,13 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     matrix = np.zeros((problem.size, problem.size))
     linear = np.zeros(problem.size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
+    level = problem.films[0].mean(axis=1) / problem.target_um
+    matrix[:count, :count] += 2.0 * LEVEL_WEIGHT * np.outer(level, level)
+    linear[:count] -= 2.0 * LEVEL_WEIGHT * level
     for films, error in zip(problem.films, problem.errors(now.density), strict=True):
         scaled = films / problem.target_um
-        matrix[:count, :count] += share * scaled @ scaled.T
-        linear[:count] -= share * scaled.sum(axis=1)
-        level = scaled.mean(axis=1)
-        matrix[:count, :count] += 2.0 * LEVEL_WEIGHT / len(problem.films) * np.outer(level, level)
-        linear[:count] -= 2.0 * LEVEL_WEIGHT / len(problem.films) * level
+        uneven = scaled - scaled.mean(axis=1, keepdims=True)
+        matrix[:count, :count] += share * uneven @ uneven.T
         for beyond, edge, weight in _hinges(problem, error):
             some = scaled[:, beyond]
             matrix[:count, :count] += share * weight * some @ some.T
