@@ -38,9 +38,17 @@ def test_a_part_that_is_too_near_is_told_of(faces, mesh, tmp_path):
     assert 'warning: the part is too near before the gun at (' in done.stderr
 
 
-def test_faces_are_not_optimised_besides(mesh, tmp_path):
-    options = ('--faces', 'auto', '--target-um', 20, '--optimise')
-    assert_refused(paint('plan', '--mesh', mesh, *options, '-o', tmp_path / 'plan'), '--optimise')
+@pytest.mark.slow
+def test_speeds_along_the_passes_even_the_seams_further(mesh, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
+    told = []
+    for more in ((), ('--optimise',)):
+        done = paint('plan', '--mesh', mesh, *options, *more, '-o', tmp_path / 'plan')
+        assert done.returncode == 0, done.stderr
+        told.append(json.loads(done.stdout))
+    assert told[1]['sigma_n'] < 0.95 * told[0]['sigma_n']
+    assert told[1]['film']['mean_um'] == pytest.approx(20.0, rel=0.01)
+    assert not told[1]['contacts']
 
 
 def test_an_angle_that_is_none_is_refused(mesh, tmp_path):

@@ -119,6 +119,34 @@ def test_an_optimised_plan_wastes_less_on_a_fender(fender, tmp_path):
     assert told['sigma_n'] < 0.06
 
 
+@pytest.mark.slow
+def test_standoffs_and_leans_of_their_own_waste_less_still(fender, tmp_path):
+    options = ('--target-um', 20, '--optimise', '--max-edge-length-m', 0.06, '--json')
+    free = ('--standoff-min', 0.2, '--standoff-max', 0.3, '--lean-max-deg', 20)
+    told = []
+    for more in ((), free):
+        done = paint('plan', '--mesh', fender, *options, *more, '-o', tmp_path / str(len(more)))
+        assert done.returncode == 0, done.stderr
+        told.append(json.loads(done.stdout))
+    assert set(told[0]['standoffs_m']) == {0.25}
+    assert set(told[0]['leans_deg']) == {0.0}
+    assert all(0.2 <= standoff <= 0.3 for standoff in told[1]['standoffs_m'])
+    assert all(abs(lean) <= 20.0 for lean in told[1]['leans_deg'])
+    # The outermost guns look inwards: coordinates across grow from the first pass to the last.
+    assert told[1]['leans_deg'][0] > 0.0 > told[1]['leans_deg'][-1]
+    film = [plan['film'] for plan in told]
+    assert film[1]['emitted_volume_cm3'] < 0.9 * film[0]['emitted_volume_cm3']
+    assert told[1]['sigma_n'] < 1.1 * told[0]['sigma_n']
+
+
+def test_a_range_of_standoffs_without_the_one_of_the_even_passes_is_refused(fender, tmp_path):
+    done = paint(
+        'plan', '--mesh', fender, '--target-um', 20, '--optimise', '--standoff-min', 0.3,
+        '--max-edge-length-m', 0.06, '-o', tmp_path,
+    )  # fmt: skip
+    assert_refused(done, '0.25 m', 'give a standoff')
+
+
 def test_a_trade_off_needs_an_optimised_plan(fender, tmp_path):
     done = paint('plan', '--mesh', fender, '--speed', 0.3, '--pareto', '-o', tmp_path)
     assert_refused(done, '--pareto', '--optimise')

@@ -17,7 +17,8 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.improvement.limits import Limits
 from paint_deposition.planning.improvement.nodes import Nodes, timed_anew
 from paint_deposition.planning.improvement.programme import Programme
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.plan_request import PlanRequest
 from planning.test_surface_map import sheet
 
 NARROW = pd.DepositionModel(

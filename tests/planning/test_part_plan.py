@@ -17,7 +17,7 @@ from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.face_order import FacePasses, in_order, motion_over
 from paint_deposition.planning.part_plan import plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
-from paint_deposition.planning.plan import PlanRequest
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.results.plan import write_plan
 from surfaces import solid
 
@@ -44,7 +44,7 @@ def level_pass(y_m: float, begin_m: float = 0.0, end_m: float = 1.0) -> PlannedP
     """A straight pass along x."""
     places = np.array([[begin_m, y_m, 0.2], [end_m, y_m, 0.2]])
     turns = np.tile(np.diag([1.0, -1.0, -1.0]), (2, 1, 1))
-    return PlannedPass(y_m, places, turns, np.array([0.0, 1.0]), 0.1, 0.8, 0.3)
+    return PlannedPass(y_m, places, turns, np.array([0.0, 1.0]), 0.1, 0.8, PassStyle(0.25, 0.3))
 
 
 @pytest.mark.slow

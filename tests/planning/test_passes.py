@@ -1,5 +1,7 @@
 """Planned passes and the motion along them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -27,7 +29,7 @@ def bowed():
 
 @pytest.fixture(scope='module')
 def motion(bowed):
-    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part')
+    return trajectory_of(plan_passes(bowed, LINES_M, [STYLE] * 3), STYLE, 'part')
 
 
 def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
@@ -40,6 +42,21 @@ def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
     np.testing.assert_allclose(tool_z, -bowed.normals(u, v), atol=1e-9)
     identity = planned.rotations.transpose(0, 2, 1) @ planned.rotations
     np.testing.assert_allclose(identity, np.broadcast_to(np.eye(3), identity.shape), atol=1e-9)
+    assert np.allclose(np.linalg.det(planned.rotations), 1.0)
+
+
+@pytest.mark.parametrize('backwards', [False, True])
+def test_a_leaning_gun_aims_at_its_line_from_its_standoff(bowed, backwards):
+    lean = np.radians(20.0)
+    planned = plan_pass(bowed, 0.1, replace(STYLE, lean_rad=lean), backwards)
+    tool_z = planned.rotations[:, :, 2]
+    u, v, height = bowed.axes.coordinates_m(planned.positions_m + STYLE.standoff_m * tool_z).T
+    np.testing.assert_allclose(v, 0.1, atol=1e-9)
+    np.testing.assert_allclose(height, bowed.height_m(u, v), atol=1e-9)
+    cosines = np.einsum('ij,ij->i', tool_z, -bowed.normals(u, v))
+    np.testing.assert_allclose(cosines, np.cos(lean), atol=1e-9)
+    upright = plan_pass(bowed, 0.1, STYLE, backwards).rotations[:, :, 2]
+    assert ((tool_z - upright) @ bowed.axes.across > 0.0).all()
     assert np.allclose(np.linalg.det(planned.rotations), 1.0)
 
 
@@ -82,7 +99,7 @@ def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
     tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way), one_way))
+    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, [one_way] * 3), one_way))
     on = path.select(path.flow > 0.0)
     ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
@@ -114,7 +131,7 @@ def test_short_passes_are_triangles_in_speed(bowed):
 
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
-    passes = plan_passes(bowed, LINES_M, STYLE)
+    passes = plan_passes(bowed, LINES_M, [STYLE] * 3)
     moves = planned_moves(passes, STYLE)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])

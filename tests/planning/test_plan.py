@@ -13,7 +13,8 @@ from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.results.plan import write_plan
 from planning.test_surface_map import sheet
 

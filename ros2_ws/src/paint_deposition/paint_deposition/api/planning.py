@@ -14,8 +14,9 @@ from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.optimised_plan import optimised
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
-from paint_deposition.planning.plan import Plan, PlanRequest
+from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.plan import plan as planned
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.recommendation import recommend as recommended
 
@@ -52,8 +53,8 @@ def plan(
         optimise: choose number and place of the passes and the speeds along them for an even film
             and little paint; else even passes at one speed.
         progress: called with what is being done and the share of it that is done, 0 to 1.
-        wanted: the fields of ``planning.plan.PlanRequest``; ``speed_m_per_s`` or ``target_um`` at
-            least.
+        wanted: the fields of ``planning.plan_request.PlanRequest``; ``speed_m_per_s`` or
+            ``target_um`` at least.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
@@ -69,6 +70,7 @@ def plan_faces(
     frame_id: str = 'part',
     face_angle_deg: float = math.degrees(WIDEST_RAD),
     envelope: GunEnvelope | None = None,
+    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> PartPlan:
@@ -79,11 +81,12 @@ def plan_faces(
             back are left out.
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
         envelope: of the gun, for the check that it keeps clear of the part.
+        optimise: choose the speeds along the passes for an even film on all faces together.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
     return planned_faces(
         surface, model or DepositionModel(), PlanRequest(**wanted), frame_id,
-        math.radians(face_angle_deg), envelope, progress,
+        math.radians(face_angle_deg), envelope, optimise, progress,
     )  # fmt: skip

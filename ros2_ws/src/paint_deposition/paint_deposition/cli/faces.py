@@ -59,10 +59,6 @@ def faces_options(command: Callable) -> Callable:
             if own['faces'] == 'one':
                 planned = pd.plan(surface, model, **wanted)
                 return planned, contacts(surface, planned.trajectory, envelope)
-            if wanted.pop('optimise'):
-                raise click.UsageError(
-                    '--faces auto evens the film by the time on each pass; leave --optimise out'
-                )
             angle = own['face_angle_deg']
             found = pd.plan_faces(
                 surface, model, face_angle_deg=angle, envelope=envelope, **wanted

@@ -26,6 +26,7 @@ from paint_deposition.cli.options import (
     PART_POSE,
     PICTURES,
     POSITIVE,
+    FiniteRange,
     direction_option,
     file_lines,
     geometry_lines,
@@ -217,6 +218,18 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     '--speed-max', 'speed_max_m_per_s', type=POSITIVE, default=1.0, show_default=True,
     help='With --optimise: greatest speed while spraying [m/s].',
 )  # fmt: skip
+@click.option(
+    '--standoff-min', 'standoff_min_m', type=POSITIVE,
+    help='With --optimise: each pass may have a standoff of its own, from this one on [m].',
+)  # fmt: skip
+@click.option(
+    '--standoff-max', 'standoff_max_m', type=POSITIVE,
+    help='With --optimise: up to this one [m].',
+)  # fmt: skip
+@click.option(
+    '--lean-max-deg', default=0.0, show_default=True, type=FiniteRange(0.0, 45.0),
+    help='With --optimise: the gun may be turned so far about the line of a pass.',
+)  # fmt: skip
 @PARETO
 @direction_option('--outward', 'From the part to the gun; default: the mean normal of the mesh.')
 @direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
@@ -246,11 +259,13 @@ def plan_command(
     pictures: str,
     as_json: bool,
     lay: Callable[..., tuple[pd.Plan | pd.PartPlan, tuple]],
+    lean_max_deg: float,
     **wanted: Any,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     if pareto and not wanted['optimise']:
         raise click.UsageError('--pareto weighs paint in an optimised plan; add --optimise')
+    wanted |= {'travel_rad': math.radians(travel_deg), 'lean_max_rad': math.radians(lean_max_deg)}
     chosen = chosen_model(model_file)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as tell:
@@ -258,7 +273,7 @@ def plan_command(
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         result, contacts = lay(
             surface, chosen.model, frame_id=frame_id if part_pose is None else 'part',
-            progress=tell, travel_rad=math.radians(travel_deg), **wanted,
+            progress=tell, **wanted,
         )  # fmt: skip
         made_from = {
             'mesh': str(mesh),
@@ -270,8 +285,7 @@ def plan_command(
         if pareto:
             others = [
                 pd.plan(
-                    surface, chosen.model, progress=tell, travel_rad=math.radians(travel_deg),
-                    **wanted | {'paint_weight': weight},
+                    surface, chosen.model, progress=tell, **wanted | {'paint_weight': weight}
                 ).point
                 for weight in PAINT_WEIGHTS
             ]  # fmt: skip
@@ -299,6 +313,12 @@ def _plan_lines(result: pd.Plan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
+    if len({(planned.style.standoff_m, planned.style.lean_rad) for planned in result.passes}) > 1:
+        yield 'standoff and lean, pass by pass: ' + ', '.join(
+            f'{planned.style.standoff_m * 1e3:.0f} mm '
+            f'{math.degrees(planned.style.lean_rad):+.0f} deg'
+            for planned in result.passes
+        )
     if result.plain:
         plain, paint = result.plain, result.plain.statistics
         yield (

@@ -1,12 +1,13 @@
 """Lines for passes that need not be evenly apart: few, where their paint lands, evenly.
 
-Candidates are lines close together. What each node of each of them lays is known; the best
-densities of paint along some of the lines are a quadratic program. Lines are moved one by one,
-and the number is the one whose film and paint cost least.
+Candidates are lines close together, at some standoffs and leans of the gun. What each node of each
+of them lays is computed when it is asked for; the best densities of paint along some of the lines
+are a quadratic program. Lines are moved, and their guns leaned and drawn back, one by one; the
+number of lines is the one whose film and paint cost least.
 """
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.optimize import Bounds, minimize
@@ -25,8 +26,13 @@ from paint_deposition.planning.passes import PassStyle, plan_pass
 LINES_PER_SIGMA, NODES_PER_SIGMA = 3.0, 1.5
 COARSEST_M = 0.06
 POINTS = 500
+# Standoffs and leans that are tried, where they are free.
+STANDOFFS, LEANS = 5, 5
 # Lines are moved by so many candidates at first, then by half of it, down to one.
 FIRST_MOVE = 4
+
+# A candidate: the numbers of its line, standoff and lean.
+Candidate = tuple[int, int, int]
 
 
 @dataclass(frozen=True)
@@ -35,69 +41,81 @@ class Lines:
 
     Attributes:
         lines_m: (n,) coordinates across, increasing [m].
-        speeds_m_per_s: (n,) mean speed along each.
+        styles: (n,) how each is run, at its mean speed.
         cost: mean square of film / target - 1, and what paint and time are worth.
     """
 
     lines_m: np.ndarray
-    speeds_m_per_s: np.ndarray
+    styles: tuple[PassStyle, ...]
     cost: float
 
 
+@dataclass(frozen=True)
+class _Laid:
+    """What the nodes of a candidate lay.
+
+    Attributes:
+        shares: (n, V) film / target for a density of 1 s/m at each node.
+        lengths_m: (n,) travel that each stands for. open_ends: (n,) whether the gun may be closed.
+    """
+
+    shares: np.ndarray
+    lengths_m: np.ndarray
+    open_ends: np.ndarray
+
+
+@dataclass(frozen=True)
 class LineSearch:
     """Chooses lines by the film that the best speeds along them would lay.
 
-    Args:
+    Attributes:
         films: of single passes, with the part's smoothed surface.
         at_points: films at points of the part.
         style: how passes are run. target_um: film wanted.
         limits, wish: of robot and film; the weights are per paint and time of the next two.
         wanted_s, given_s: paint wanted on the part as time sprayed, and a usual cycle time [s].
-        progress: called with the share done.
+        standoffs_m: (S,) to choose from. leans_rad: (L,) to choose from.
     """
 
-    def __init__(
-        self,
-        films: LineFilms,
-        at_points: FilmAtPoints,
-        style: PassStyle,
-        target_um: float,
-        limits: Limits,
-        wish: Wish,
-        wanted_s: float,
-        given_s: float,
-        progress: Callable[[float], None],
-    ) -> None:
-        self._wish, self._limits = wish, limits
-        self._wanted_s, self._given_s = wanted_s, given_s
-        width = min(at_points.model.planar.sigma1_m, at_points.model.planar.sigma2_m)
-        step = min(width / LINES_PER_SIGMA, COARSEST_M)
-        count = int(np.ceil((films.high_m - films.low_m) / step)) + 1
-        self.lines_m = np.linspace(films.low_m, films.high_m, count)
-        self._films, self._lengths, self._open = [], [], []
-        rate = max(style.speed_m_per_s / at_points.step_m, SLOWEST_RATE_HZ)
-        for number, line in enumerate(self.lines_m):
-            progress(number / count)
-            planned = plan_pass(films.surface_map, float(line), style)
-            programme = Programme.of(trajectory_of((planned,), style, rate_hz=rate))
-            nodes = Nodes.of(programme.openings, min(width / NODES_PER_SIGMA, COARSEST_M))
-            even = np.full(len(nodes), 1.0 / style.speed_m_per_s)
-            laid = at_points.of_nodes(programme, nodes, even).per_density_um
-            self._films.append(laid / target_um)
-            self._lengths.append(nodes.weights_m)
-            self._open.append(may_be_closed(nodes, programme.openings, limits))
-        spacing = min(width / NODES_PER_SIGMA, COARSEST_M)
-        self._usual = spacing / SLOPE_M / style.speed_m_per_s
-        # Between passes the robot turns and comes back to speed.
-        self._turn_s = 2.0 * style.speed_m_per_s / style.acceleration_m_per_s2
-        self._known: dict[tuple[int, ...], Lines] = {}
+    films: LineFilms
+    at_points: FilmAtPoints
+    style: PassStyle
+    target_um: float
+    limits: Limits
+    wish: Wish
+    wanted_s: float
+    given_s: float
+    standoffs_m: np.ndarray
+    leans_rad: np.ndarray
+    _laid: dict[Candidate, _Laid] = field(default_factory=dict)
+    _known: dict[tuple[Candidate, ...], Lines] = field(default_factory=dict)
+
+    @cached_property
+    def _width_m(self) -> float:
+        planar = self.at_points.model.planar
+        return min(planar.sigma1_m, planar.sigma2_m)
+
+    @cached_property
+    def _spacing_m(self) -> float:
+        """Of nodes along a pass."""
+        return min(self._width_m / NODES_PER_SIGMA, COARSEST_M)
+
+    @cached_property
+    def lines_m(self) -> np.ndarray:
+        """(K,) coordinates across of the candidates [m]."""
+        low, high = self.films.low_m, self.films.high_m
+        step = min(self._width_m / LINES_PER_SIGMA, COARSEST_M)
+        return np.linspace(low, high, int(np.ceil((high - low) / step)) + 1)
 
     def best(self, passes: int, low_m: float, high_m: float) -> Lines:
         """The best lines for so many passes, from even ones between two ends of the part [m]."""
         even = low_m + (np.arange(passes) + 0.5) / passes * (high_m - low_m)
-        now = tuple(int(np.abs(self.lines_m - line).argmin()) for line in even)
-        if len(set(now)) < passes:
-            return Lines(even, np.ones(passes), np.inf)
+        lines = [int(np.abs(self.lines_m - line).argmin()) for line in even]
+        if len(set(lines)) < passes:
+            return Lines(even, (self.style,) * passes, np.inf)
+        standoff = int(np.abs(self.standoffs_m - self.style.standoff_m).argmin())
+        upright = int(np.abs(self.leans_rad).argmin())
+        now = tuple((line, standoff, upright) for line in lines)
         step = FIRST_MOVE
         while step:
             better = min(self._neighbours(now, step), key=lambda some: self._judged(some).cost)
@@ -107,40 +125,72 @@ class LineSearch:
                 step //= 2
         return self._judged(now)
 
-    def _neighbours(self, now: tuple[int, ...], step: int) -> list[tuple[int, ...]]:
-        """All lines together, each of them, and all apart, moved both ways."""
+    def _neighbours(self, now: tuple[Candidate, ...], step: int) -> list[tuple[Candidate, ...]]:
+        """All passes together, each of them, and all apart, changed both ways in one respect."""
         ways = [np.ones(len(now), int), *np.eye(len(now), dtype=int)]
         if len(now) > 1:
             ways.append(np.rint(np.linspace(-1.0, 1.0, len(now))).astype(int))
-        moved = [np.array(now) + sign * step * way for way in ways for sign in (1, -1)]
-        inside = [
-            tuple(some.tolist())
-            for some in moved
-            if some.min() >= 0 and some.max() < len(self.lines_m) and np.all(np.diff(some) > 0)
-        ]
-        return inside or [now]
+        counts = np.array([len(self.lines_m), len(self.standoffs_m), len(self.leans_rad)])
+        found = []
+        for respect, much in enumerate((step, 1, 1)):
+            for way in ways:
+                for sign in (1, -1):
+                    some = np.array(now)
+                    some[:, respect] += sign * much * way
+                    apart = np.all(np.diff(some[:, 0]) > 0)
+                    if apart and (some >= 0).all() and (some < counts).all():
+                        found.append(tuple(map(tuple, some.tolist())))
+        return found or [now]
 
-    def _judged(self, some: tuple[int, ...]) -> Lines:
+    def _judged(self, some: tuple[Candidate, ...]) -> Lines:
         if some not in self._known:
             self._known[some] = self._solved(some)
         return self._known[some]
 
-    def _solved(self, some: tuple[int, ...]) -> Lines:
-        films = np.concatenate([self._films[k] for k in some])
-        lengths = np.concatenate([self._lengths[k] for k in some])
-        open_ends = np.concatenate([self._open[k] for k in some])
-        number = np.repeat(np.arange(len(some)), [len(self._lengths[k]) for k in some])
+    def _style(self, candidate: Candidate) -> PassStyle:
+        _, standoff, lean = candidate
+        return replace(
+            self.style,
+            standoff_m=float(self.standoffs_m[standoff]),
+            lean_rad=float(self.leans_rad[lean]),
+        )
+
+    def _laid_by(self, candidate: Candidate) -> _Laid:
+        if candidate not in self._laid:
+            style, line = self._style(candidate), float(self.lines_m[candidate[0]])
+            rate = max(style.speed_m_per_s / self.at_points.step_m, SLOWEST_RATE_HZ)
+            planned = plan_pass(self.films.surface_map, line, style)
+            programme = Programme.of(trajectory_of((planned,), style, rate_hz=rate))
+            nodes = Nodes.of(programme.openings, self._spacing_m)
+            even = np.full(len(nodes), 1.0 / style.speed_m_per_s)
+            laid = self.at_points.of_nodes(programme, nodes, even).per_density_um
+            open_ends = may_be_closed(nodes, programme.openings, self.limits)
+            self._laid[candidate] = _Laid(laid / self.target_um, nodes.weights_m, open_ends)
+        return self._laid[candidate]
+
+    def _solved(self, some: tuple[Candidate, ...]) -> Lines:
+        laid = [self._laid_by(candidate) for candidate in some]
+        films = np.concatenate([one.shares for one in laid])
+        lengths = np.concatenate([one.lengths_m for one in laid])
+        open_ends = np.concatenate([one.open_ends for one in laid])
+        number = np.repeat(np.arange(len(some)), [len(one.lengths_m) for one in laid])
         price = lengths * (
-            self._wish.paint_weight / self._wanted_s + self._wish.time_weight / self._given_s
+            self.wish.paint_weight / self.wanted_s + self.wish.time_weight / self.given_s
         )
         density = self._densities(films, number, open_ends, price)
         error = density @ films - 1.0
         seconds = np.bincount(number, lengths * density)
-        metres = np.bincount(number, lengths * (density > 0.5 / self._limits.speed_max_m_per_s))
+        metres = np.bincount(number, lengths * (density > 0.5 / self.limits.speed_max_m_per_s))
         cost = float(np.mean(error**2) + price @ density)
-        cost += self._wish.time_weight * len(some) * self._turn_s / self._given_s
+        # Between passes the robot turns and comes back to speed.
+        turn_s = 2.0 * self.style.speed_m_per_s / self.style.acceleration_m_per_s2
+        cost += self.wish.time_weight * len(some) * turn_s / self.given_s
         speeds = np.maximum(metres, 1e-3) / np.maximum(seconds, 1e-3)
-        return Lines(self.lines_m[list(some)], speeds, cost)
+        styles = tuple(
+            replace(self._style(candidate), speed_m_per_s=float(speed))
+            for candidate, speed in zip(some, speeds, strict=True)
+        )
+        return Lines(self.lines_m[[line for line, _, _ in some]], styles, cost)
 
     def _densities(
         self, films: np.ndarray, number: np.ndarray, open_ends: np.ndarray, price: np.ndarray
@@ -152,19 +202,19 @@ class LineSearch:
             number, open_ends: (n,) its line, and whether the gun may be closed there.
             price: (n,) what a density costs, beside evenness and smoothness.
         """
-        count = len(films)
+        count, usual = len(films), self._spacing_m / SLOPE_M / self.style.speed_m_per_s
         matrix = 2.0 / films.shape[1] * films @ films.T
         linear = price - 2.0 / films.shape[1] * films.sum(axis=1)
         pairs = np.flatnonzero(number[1:] == number[:-1])
         change = np.zeros((len(pairs), count))
-        change[np.arange(len(pairs)), pairs] = -1.0 / self._usual
-        change[np.arange(len(pairs)), pairs + 1] = 1.0 / self._usual
-        matrix += 2.0 * self._wish.smoothness / len(pairs) * change.T @ change
-        least = np.where(open_ends, 0.0, 1.0 / self._limits.speed_max_m_per_s)
+        change[np.arange(len(pairs)), pairs] = -1.0 / usual
+        change[np.arange(len(pairs)), pairs + 1] = 1.0 / usual
+        matrix += 2.0 * self.wish.smoothness / len(pairs) * change.T @ change
+        least = np.where(open_ends, 0.0, 1.0 / self.limits.speed_max_m_per_s)
         # A search among many sets of lines: quick rather than exact.
         answer = minimize(
             lambda y: (0.5 * y @ (found := matrix @ y) + linear @ y, found + linear),
-            np.maximum(least, 2.0 * self._usual), jac=True, method='L-BFGS-B',
-            bounds=Bounds(least, 1.0 / self._limits.speed_min_m_per_s), options={'ftol': 1e-8},
+            np.maximum(least, 2.0 * usual), jac=True, method='L-BFGS-B',
+            bounds=Bounds(least, 1.0 / self.limits.speed_min_m_per_s), options={'ftol': 1e-8},
         )  # fmt: skip
         return answer.x

@@ -19,14 +19,13 @@ from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_fa
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import Contact, GunEnvelope, contacts
 from paint_deposition.planning.face_order import in_order, motion_over
+from paint_deposition.planning.improvement.improve import timed_for_evenness
+from paint_deposition.planning.improvement.limits import Wish
+from paint_deposition.planning.improvement.moves import moves_of
+from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.passes import PlannedPass
-from paint_deposition.planning.plan import (
-    PlanRequest,
-    evenness,
-    plan,
-    planned_statistics,
-    simulated,
-)
+from paint_deposition.planning.plan import evenness, plan, planned_statistics, simulated
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.planning.seams import blend
 
 # Faces that turn further from the side of the gun are its back.
@@ -48,6 +47,7 @@ class PartPlan:
             nan where it has no one side.
         contacts: where gun or spray come too near to the part. envelope: of the gun.
         model: what the gun sprays.
+        optimised: whether the speeds along the passes were chosen, not only one for each.
     """
 
     surface: Surface
@@ -67,6 +67,7 @@ class PartPlan:
     contacts: tuple[Contact, ...]
     envelope: GunEnvelope
     model: DepositionModel
+    optimised: bool = False
 
     @property
     def cycle_time_s(self) -> float:
@@ -81,7 +82,7 @@ class PartPlan:
     @property
     def sentence(self) -> str:
         """The plan in a sentence."""
-        speeds = [planned.speed_m_per_s for planned in self.passes]
+        speeds = [move.speed_m_per_s for move in self.moves if move.spraying]
         return (
             f'{self._faces}, {len(self.passes)} {self.request.direction} passes at '
             f'{min(speeds):.3g} to {max(speeds):.3g} m/s: mean film '
@@ -104,8 +105,9 @@ class PartPlan:
             )
         return (
             f'{raster}; {self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
-            f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with a time for each '
-            f'pass {100 * self.sigma_n:.1f} %'
+            f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with '
+            f'{"speeds along" if self.optimised else "a time for"} each pass '
+            f'{100 * self.sigma_n:.1f} %'
         )
 
     def __repr__(self) -> str:
@@ -145,6 +147,7 @@ def plan_faces(
     frame_id: str = '',
     widest_rad: float = WIDEST_RAD,
     envelope: GunEnvelope | None = None,
+    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
@@ -156,6 +159,8 @@ def plan_faces(
         frame_id: of the poses.
         widest_rad: greatest angle between a normal of a face and its mean.
         envelope: of the gun, for the check that it keeps clear of the part.
+        optimise: choose the speeds along all passes, and where the gun opens and closes, for an
+            even film on all faces together.
         progress: called with what is done and its share, 0 to 1.
 
     Raises:
@@ -171,7 +176,16 @@ def plan_faces(
     running = in_order(blended.faces)
     progress('motion', 0.0)
     motion = motion_over(running, frame_id, lambda way: not contacts(surface, way, envelope))
-    film, emitted = simulated(surface, model, motion.trajectory)
+    trajectory, moves = motion.trajectory, motion.moves
+    if optimise:
+        limits = request.limits(running[0].style.overspray_m)
+        retiming = timed_for_evenness(
+            surface, painted, Programme.of(trajectory), [model], limits,
+            Wish(request.target_um), progress, explained=False,
+        )  # fmt: skip
+        trajectory = retiming.programme.trajectory()
+        moves = tuple(moves_of(retiming.programme, limits))
+    film, emitted = simulated(surface, model, trajectory)
     _, sigma_n = evenness(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
@@ -183,9 +197,10 @@ def plan_faces(
     statistics = planned_statistics(film[painted], area[painted], emitted, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
-        surface, request, faces, blended.margin_m, passes, motion.moves, motion.trajectory,
+        surface, request, faces, blended.margin_m, passes, moves, trajectory,
         film, painted, statistics, sigma_n, blended.sigma_n_before,
-        *raster, contacts(surface, motion.trajectory, envelope), envelope, model,
+        *raster, contacts(surface, trajectory, envelope), envelope, model,
+        optimise,
     )  # fmt: skip
 
 

@@ -1,6 +1,7 @@
 """Planned passes: lines over the smoothed surface, and the tool poses along them."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,13 +19,15 @@ class PassStyle:
     """How passes are run.
 
     Attributes:
-        standoff_m: TCP to smoothed surface [m].
+        standoff_m: TCP to smoothed surface along the gun's axis [m].
         speed_m_per_s: of the TCP while spraying [m/s].
         acceleration_m_per_s2: of the robot [m/s^2].
         overspray_m: the gun opens and closes this far outside the part [m].
         band_m: the part's ends are looked for this far to both sides of a pass [m].
         travel_rad: direction of the first pass in the tool's x-y frame [rad].
         one_way: every pass runs in the direction of the first.
+        lean_rad: of the gun, turned about the line of its pass; above 0 the spray points to
+            greater coordinates across [rad].
     """
 
     standoff_m: float
@@ -34,6 +37,7 @@ class PassStyle:
     band_m: float = 0.15
     travel_rad: float = 0.0
     one_way: bool = False
+    lean_rad: float = 0.0
 
     def __post_init__(self) -> None:
         require_above_zero(
@@ -62,7 +66,7 @@ class PlannedPass:
         rotations: (W, 3, 3) tool axes as columns.
         along_m: (W,) travel of the TCP from the start.
         on_m, off_m: travel at which the gun opens and closes.
-        speed_m_per_s: while spraying.
+        style: how it is run.
     """
 
     across_m: float
@@ -71,7 +75,12 @@ class PlannedPass:
     along_m: np.ndarray
     on_m: float
     off_m: float
-    speed_m_per_s: float
+    style: PassStyle
+
+    @property
+    def speed_m_per_s(self) -> float:
+        """While spraying [m/s]."""
+        return self.style.speed_m_per_s
 
     @property
     def sprayed_m(self) -> float:
@@ -105,14 +114,14 @@ def plan_pass(
         along,
         float(on),
         float(off),
-        style.speed_m_per_s,
+        style,
     )
 
 
 def tool_poses(
     surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
 ) -> tuple[np.ndarray, np.ndarray]:
-    """TCP (N, 3) [m] and tool axes (N, 3, 3), square to the smoothed surface at the standoff."""
+    """TCP (N, 3) [m] and tool axes (N, 3, 3), at standoff and lean over the smoothed surface."""
     axes = surface_map.axes
     normals = surface_map.normals(travel_m, across_m)
     height = surface_map.height_m(travel_m, across_m)
@@ -121,18 +130,23 @@ def tool_poses(
     way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)
+    cos, sin = math.cos(style.lean_rad), math.sin(style.lean_rad)
+    tool_z, side = cos * tool_z + sin * side, cos * side - sin * tool_z
     cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
     rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
-    return on_surface + style.standoff_m * normals, rotations
+    return on_surface - style.standoff_m * tool_z, rotations
 
 
 def plan_passes(
-    surface_map: SurfaceMap, lines_m: np.ndarray, style: PassStyle
+    surface_map: SurfaceMap, lines_m: np.ndarray, styles: Sequence[PassStyle]
 ) -> tuple[PlannedPass, ...]:
-    """Passes along lines in this order; every other one backwards unless all run one way."""
+    """Passes along lines in this order, each in its style.
+
+    Every other one runs backwards, unless all run one way.
+    """
     return tuple(
         plan_pass(
             surface_map, float(across), style, backwards=bool(number % 2) and not style.one_way
         )
-        for number, across in enumerate(lines_m)
+        for number, (across, style) in enumerate(zip(lines_m, styles, strict=True))
     )

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,11 +17,11 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.pass_films import LineFilms
 from paint_deposition.planning.pass_motion import planned_moves, trajectory_of
 from paint_deposition.planning.pass_placement import Placing, centred, place_passes
 from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_passes
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
@@ -31,64 +31,8 @@ from paint_deposition.planning.trade_off import Point
 INDEX_SHARES = (0.75, 1.25)
 # The gun opens where the pattern begins to reach the part with all but this much of its volume.
 OVERSPRAY_SHARE = 0.9
-DEFAULT_SMOOTHING_RADIUS_M = 0.1
 TARGET_ROUNDS = 4
 TARGET_PRECISION = 2e-3
-
-
-@dataclass(frozen=True)
-class PlanRequest:
-    """What passes are asked for; None is not given.
-
-    Attributes:
-        direction: 'horizontal' or 'vertical'.
-        speed_m_per_s: of the passes. target_um: mean film on the painted side that the speed is
-            chosen for if it is not given.
-        index_m: fixes the index; or else index_min_m and index_max_m bound it.
-        tolerance: largest sigma_n on the part accepted.
-        standoff_m: TCP to smoothed surface; default: the surface lies on the model plane.
-        smoothing_radius_m: what is finer on the part is not followed.
-        overspray_m: the gun opens this far before the part; default: where 90 % of the
-            pattern's volume reach it.
-        acceleration_m_per_s2: of the robot.
-        one_way: every pass in the direction of the first; else they alternate. The gun keeps its
-            orientation either way.
-        travel_rad: direction of the first pass in the tool's x-y frame.
-        outward: (3,) from the part to the gun; default: the mean normal.
-        paint_weight, time_weight: what an optimised plan gives, in units of sigma_n squared, for
-            the paint sprayed over that wanted on the part, and for the cycle time over that of the
-            plain plan.
-        speed_min_m_per_s, speed_max_m_per_s: of an optimised plan while spraying.
-    """
-
-    direction: str = 'horizontal'
-    speed_m_per_s: float | None = None
-    target_um: float | None = None
-    index_m: float | None = None
-    index_min_m: float | None = None
-    index_max_m: float | None = None
-    tolerance: float | None = None
-    standoff_m: float | None = None
-    smoothing_radius_m: float = DEFAULT_SMOOTHING_RADIUS_M
-    overspray_m: float | None = None
-    acceleration_m_per_s2: float = 2.0
-    one_way: bool = False
-    travel_rad: float = 0.0
-    outward: tuple[float, float, float] | None = None
-    paint_weight: float = 5e-3
-    time_weight: float = 5e-3
-    speed_min_m_per_s: float = 0.1
-    speed_max_m_per_s: float = 1.0
-
-    def for_plane(self, width_m: float, length_m: float) -> Request:
-        """The same for a plane of the part's size.
-
-        Raises:
-            PlanError: a value is impossible.
-        """
-        shared = {item.name for item in fields(Request)} & vars(self).keys()
-        asked = {name: getattr(self, name) for name in shared}
-        return Request(**asked, width_m=width_m, length_m=length_m)
 
 
 @dataclass(frozen=True)
@@ -188,6 +132,8 @@ class Plan:
             'passes': self.placing.passes,
             'index_m': self.placing.index_m,
             'lines_m': [planned.across_m for planned in self.passes],
+            'standoffs_m': [planned.style.standoff_m for planned in self.passes],
+            'leans_deg': [math.degrees(planned.style.lean_rad) for planned in self.passes],
             'travel': 'one_way' if self.request.one_way else 'alternating',
             'gun_turns': False,
             'speed_m_per_s': self.style.speed_m_per_s,
@@ -245,7 +191,7 @@ def plan(
     lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
     target = None if request.speed_m_per_s else request.target_um
     for round_ in range(TARGET_ROUNDS):
-        passes = plan_passes(surface_map, lines, style)
+        passes = plan_passes(surface_map, lines, [style] * len(lines))
         trajectory = trajectory_of(passes, style, frame_id)
         film, emitted = simulated(
             surface, model, trajectory, lambda share: progress('film', share)

@@ -21,7 +21,8 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.face_order import FacePasses
 from paint_deposition.planning.pass_motion import trajectory_of
 from paint_deposition.planning.passes import plan_pass
-from paint_deposition.planning.plan import PlanRequest, evenness, plan
+from paint_deposition.planning.plan import evenness, plan
+from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
 
 # Margins along the seams that are tried, as shares of the overspray.

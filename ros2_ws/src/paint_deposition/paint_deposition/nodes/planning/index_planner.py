@@ -27,7 +27,8 @@ from paint_deposition.nodes.runtime.parameters import (
     thickness,
 )
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
-from paint_deposition.planning.plan import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest, plan
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.plan_request import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest
 from paint_deposition.planning.recommendation import Recommendation, recommend
 
 SPACING_M = 0.02
