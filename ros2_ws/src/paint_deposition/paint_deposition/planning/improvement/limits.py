@@ -71,8 +71,8 @@ class Limits:
 class Wish:
     """What film is wanted, and what else counts.
 
-    The optimiser minimises the mean square of film / target - 1 on the judged part, which is
-    sigma_n squared where the mean is on target, plus these weights times what they weigh.
+    The optimiser minimises the variance of film / target on the judged part, which is sigma_n
+    squared where the mean is on target, and it is held there; plus these weights times what they weigh.
 
     Attributes:
         target_um: mean film; None keeps the one that the programme lays.
