@@ -72,7 +72,8 @@ class Wish:
     """What film is wanted, and what else counts.
 
     The optimiser minimises the variance of film / target on the judged part, which is sigma_n
-    squared where the mean is on target, and it is held there; plus these weights times what they weigh.
+    squared where the mean is on target, and it is held there; plus these weights times what they
+    weigh.
 
     Attributes:
         target_um: mean film; None keeps the one that the programme lays.
