@@ -56,14 +56,21 @@ class Steps:
         rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
         visible: (S, V) uint8, which points are seen, one row a tracing.
         sight: (M,) row of ``visible`` that holds on each sub-step.
+        brush: (M,) row among the model's patterns of the one that sprays.
     """
 
     rows: np.ndarray
     visible: np.ndarray
     sight: np.ndarray
+    brush: np.ndarray
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def of_brush(self, row: int) -> 'Steps':
+        """Those on which one of the patterns sprays."""
+        chosen = self.brush == row
+        return Steps(self.rows[chosen], self.visible, self.sight[chosen], self.brush[chosen])
 
 
 class FilmIntegrator:
@@ -138,7 +145,7 @@ class FilmIntegrator:
 
     def add_sprayed(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along a path, or a part of one, that the effects on it have been applied to."""
-        self.emitted_cm3 += self.model.planar.K1_cm3_per_s * path.spraying_time_s
+        self.emitted_cm3 += emitted_cm3(self.model, path)
         for start in range(0, len(path), BATCH):
             self.paint(self._steps(path.select(slice(start, start + BATCH))))
             if progress:
@@ -155,15 +162,16 @@ class FilmIntegrator:
         self._done += len(steps)
 
     def terms(self, steps: Steps) -> np.ndarray:
-        """(7, V) what the film of these sub-steps alone is made of; see ``layout.term_weights``.
+        """(7 B, V) what the film of these sub-steps alone is made of, by brush.
 
-        They depend on r, sigma1 and sigma2, and where the asymmetry is spread over the ring, but
-        not on K1 and K2.
+        See ``layout.term_weights``. They depend on r, sigma1 and sigma2, and where the asymmetry
+        is spread over the ring, but not on K1 and K2.
         """
-        terms = np.zeros((TERMS, len(self._film)))
-        none = np.empty(0)
-        self._run(True, steps, term_constants(self.model), none, none, terms)
-        return self._in_order(terms)
+        constants, none = term_constants(self.model), np.empty(0)
+        terms = np.zeros((len(constants), TERMS, len(self._film)))
+        for row, of_brush in enumerate(terms):
+            self._run(True, steps.of_brush(row), constants, none, none, of_brush)
+        return self._in_order(terms.reshape(-1, len(self._film)))
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
         """What is really sprayed of a path, effects on it applied, and the rows that it is."""
@@ -175,7 +183,7 @@ class FilmIntegrator:
     def _steps(self, path: SprayPath) -> Steps:
         visible, sight = self._lines_of_sight(emission_points_m(self.model, path))
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
-        return Steps(rows, visible, sight)
+        return Steps(rows, visible, sight, self.model.pattern_rows(path.brush))
 
     def _run(
         self,
@@ -199,6 +207,7 @@ class FilmIntegrator:
             blocks.bounds,
             steps.rows,
             steps.sight,
+            steps.brush,
             constants.astype(self._real),
             self._parameters,
         )
@@ -257,6 +266,21 @@ class FilmIntegrator:
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
         return shown_um(self.raw_um, self._effects, self.points)
+
+
+def emitted_cm3(model: DepositionModel, path: SprayPath) -> float:
+    """Solids that a part which catches everything would get along a path [cm3]."""
+    K1 = np.array([planar.K1_cm3_per_s for planar in model.patterns])
+    return float(K1 @ seconds_by_pattern(model, path))
+
+
+def seconds_by_pattern(model: DepositionModel, path: SprayPath) -> np.ndarray:
+    """(B,) time sprayed with each of the model's patterns, weighted by the flow [s]."""
+    sprayed = path.select(path.flow > 0.0)
+    rows = model.pattern_rows(sprayed.brush)
+    return np.array([
+        sprayed.select(rows == row).spraying_time_s for row in range(len(model.patterns))
+    ])  # fmt: skip
 
 
 def settled_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:
