@@ -11,9 +11,10 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import ModelError
-from paint_deposition.film.integrator import FilmIntegrator, seconds_by_pattern
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path

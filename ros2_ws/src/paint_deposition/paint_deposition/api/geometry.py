@@ -70,8 +70,9 @@ def look_at(
     Raises:
         RecordingError: the poses make no motion, or the gun never sprays.
     """
+    if model is not None:
+        require_brushes(trajectory, model)
     model = model or DepositionModel()
-    require_brushes(trajectory, model)
     path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
     _require_motion(trajectory.source, path, counts, max_pose_gap_s)
     require_spraying(trajectory, path)

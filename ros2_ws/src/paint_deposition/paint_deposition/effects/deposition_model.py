@@ -51,20 +51,32 @@ class DepositionModel(BaseModel):
         """A copy with other patterns, in the order of ``patterns``."""
         new = tuple(patterns)
         brushes = tuple(
-            brush.model_copy(update={'planar': planar})
+            brush.model_copy(update={'planar': planar, 'interpolated': False})
             for brush, planar in zip(self.brushes, new, strict=False)
         )
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
 
     def with_brush(self, number: int) -> 'DepositionModel':
-        """A copy that paints with one brush, whatever its number; 0 is the only one.
+        """A copy that has one of the brushes only; 0 is the only one.
 
         Raises:
             ModelError: there is none of that number.
         """
+        if number != ONLY_BRUSH and not self.brushes:
+            raise ModelError(
+                f'brush {number} is not in the model: it has one pattern, planar, without a number'
+            )
         row = int(self.pattern_rows(np.array([number]))[0])
-        brushes = self.brushes[row : row + 1]
+        brushes = tuple(
+            brush.model_copy(update={'interpolated': False})
+            for brush in self.brushes[row : row + 1]
+        )
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
+
+    @property
+    def brush(self) -> int:
+        """Number of the first brush; 0 where the only one has none."""
+        return self.brushes[0].number if self.brushes else ONLY_BRUSH
 
     def single(self, purpose: str) -> 'DepositionModel':
         """The model itself, if it has one pattern.
@@ -74,8 +86,8 @@ class DepositionModel(BaseModel):
         """
         if len(self.brushes) > 1:
             raise ModelError(
-                f'{purpose} takes one brush and the model has {listed(self._numbers)}: '
-                'say which with --brush'
+                f'{purpose} is for one brush and the model has {listed(self._numbers)}: say which '
+                '(brush)'
             )
         return self
 

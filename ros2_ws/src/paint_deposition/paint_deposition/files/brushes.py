@@ -6,6 +6,7 @@ from typing import Any
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.refusals import checked
 from paint_deposition.model.brush import MOST, Brush, SetPoints
+from paint_deposition.model.brush_law import BrushLaw
 from paint_deposition.model.pattern import PlanarPattern
 
 PLANAR = 'planar'
@@ -13,7 +14,7 @@ KEYS = (PLANAR, *SetPoints.model_fields)
 
 
 def read_brushes(section: Mapping[Any, Any]) -> list[Brush]:
-    """The brushes of a section, in its order.
+    """The brushes of a section; those without a pattern are interpolated between the others.
 
     Raises:
         ModelError: one line that names the brush, the key, its value and the remedy.
@@ -23,10 +24,23 @@ def read_brushes(section: Mapping[Any, Any]) -> list[Brush]:
     for number in section:
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
             raise ModelError(f'brushes: {number!r} is no number of a brush; give 1, 2 and so on')
-    return [_brush(number, entry) for number, entry in section.items()]
+    read = {number: _read(number, entry) for number, entry in section.items()}
+    calibrated = [_brush(n, planar, at) for n, (planar, at) in read.items() if planar]
+    law = BrushLaw(tuple(calibrated))
+    between = [
+        _brush(n, law.pattern(n, at), at, interpolated=True)
+        for n, (planar, at) in read.items()
+        if planar is None
+    ]
+    return [*calibrated, *between]
 
 
-def _brush(number: int, entry: Any) -> Brush:
+def _brush(number: int, planar: PlanarPattern, at: SetPoints, interpolated: bool = False) -> Brush:
+    return Brush(number=number, planar=planar, interpolated=interpolated, **at.model_dump())
+
+
+def _read(number: int, entry: Any) -> tuple[PlanarPattern | None, SetPoints]:
+    """Pattern, None where it is to be interpolated, and set-points of an entry."""
     where = f'brushes, {number}'
     if not isinstance(entry, dict):
         raise ModelError(f'{where} is {entry!r}; expected a mapping (key: value)')
@@ -35,7 +49,8 @@ def _brush(number: int, entry: Any) -> Brush:
             raise ModelError(f'{where}: unknown key {key!r}; {did_you_mean(key, KEYS)}')
     settings = {key: value for key, value in entry.items() if key != PLANAR}
     set_points = checked(SetPoints, where, settings, ModelError)
-    if not isinstance(entry.get(PLANAR), dict):
-        raise ModelError(f'{where}: planar is {entry.get(PLANAR)!r}; expected a mapping')
-    planar = checked(PlanarPattern, f'{where}: planar', entry[PLANAR], ModelError)
-    return Brush(number=number, planar=planar, **set_points.model_dump())
+    if PLANAR not in entry:
+        return None, set_points
+    if not isinstance(entry[PLANAR], dict):
+        raise ModelError(f'{where}: planar is {entry[PLANAR]!r}; expected a mapping')
+    return checked(PlanarPattern, f'{where}: planar', entry[PLANAR], ModelError), set_points

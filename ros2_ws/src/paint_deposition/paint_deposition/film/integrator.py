@@ -18,6 +18,7 @@ from paint_deposition.film.layout import (
     step_rows,
     term_constants,
 )
+from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.accumulation import TERMS, compile_kernel
 from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.motion.path import SprayPath
@@ -129,7 +130,7 @@ class FilmIntegrator:
         self._film = np.zeros(len(self._blocks.order))
         self._recent = np.zeros(len(self._blocks.order), dtype=self._real)
         self._done = 0
-        self.emitted_cm3 = 0.0
+        self.used = PaintUsed()
         self._traced_from: np.ndarray | None = None
         self._last_seen = np.ones(len(self._blocks.order), dtype=np.uint8)
 
@@ -145,7 +146,7 @@ class FilmIntegrator:
 
     def add_sprayed(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along a path, or a part of one, that the effects on it have been applied to."""
-        self.emitted_cm3 += emitted_cm3(self.model, path)
+        self.used += PaintUsed.of(self.model, path)
         for start in range(0, len(path), BATCH):
             self.paint(self._steps(path.select(slice(start, start + BATCH))))
             if progress:
@@ -253,6 +254,11 @@ class FilmIntegrator:
         return seen, rows
 
     @property
+    def emitted_cm3(self) -> float:
+        """Solids that a part which catches everything would get [cm3]."""
+        return self.used.emitted_cm3
+
+    @property
     def raw_um(self) -> np.ndarray:
         """(V,) film as it arrived, before effects on the film [um]."""
         return self._in_order(self._film + self._recent)
@@ -266,21 +272,6 @@ class FilmIntegrator:
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
         return shown_um(self.raw_um, self._effects, self.points)
-
-
-def emitted_cm3(model: DepositionModel, path: SprayPath) -> float:
-    """Solids that a part which catches everything would get along a path [cm3]."""
-    K1 = np.array([planar.K1_cm3_per_s for planar in model.patterns])
-    return float(K1 @ seconds_by_pattern(model, path))
-
-
-def seconds_by_pattern(model: DepositionModel, path: SprayPath) -> np.ndarray:
-    """(B,) time sprayed with each of the model's patterns, weighted by the flow [s]."""
-    sprayed = path.select(path.flow > 0.0)
-    rows = model.pattern_rows(sprayed.brush)
-    return np.array([
-        sprayed.select(rows == row).spraying_time_s for row in range(len(model.patterns))
-    ])  # fmt: skip
 
 
 def settled_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:

@@ -199,8 +199,7 @@ class LiveFilm:
         away.add_poses([0, 1_000_000], np.full((2, 3), 1e3), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
         unpainted = self._integrator.fork()
         path = away.take(finish=True)
-        brush = self.model.brushes[0].number if self.model.brushes else ONLY_BRUSH
-        unpainted.add(path.with_(brush=np.full(len(path), brush)))
+        unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
 
     def _begin_again(self, first_change: TriggerChange) -> None:

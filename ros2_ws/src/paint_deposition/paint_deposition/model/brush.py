@@ -41,10 +41,13 @@ class Brush(SetPoints):
     Attributes:
         number: by which programmes choose it, 1 to MOST.
         planar: its pattern.
+        interpolated: whether the pattern follows from those of the other brushes, see
+            ``brush_law``.
     """
 
     number: int = Field(ge=1, le=MOST)
     planar: PlanarPattern
+    interpolated: bool = False
 
     @property
     def set_points(self) -> SetPoints:

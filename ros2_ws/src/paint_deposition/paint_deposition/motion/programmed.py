@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
@@ -103,14 +103,13 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     if gun_known or any(flow for _, flow, _ in changes):
         gun = {round(time_s * 1e9): (float(now), brush) for time_s, now, brush in changes}
     stamps_ns = sorted(gun)
-    brushes = np.array([gun[stamp][1] for stamp in stamps_ns], dtype=np.int64)
     return Trajectory(
         np.array([round(time_s * 1e9) for time_s in times_s]),
         np.array(positions),
         np.array(quaternions),
         trigger_stamps_ns=np.array(stamps_ns, dtype=np.int64),
         trigger_flow=np.array([gun[stamp][0] for stamp in stamps_ns]),
-        trigger_brush=brushes if brushes.any() else brushes[:0],
+        trigger_brush=numbered([gun[stamp][1] for stamp in stamps_ns]),
     )
 
 

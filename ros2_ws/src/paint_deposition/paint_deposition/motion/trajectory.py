@@ -1,6 +1,6 @@
 """A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -36,6 +36,12 @@ class PoseCounts:
     def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""
         return asdict(self) | {'rejected': self.rejected}
+
+
+def numbered(brushes: Sequence[int] | np.ndarray) -> np.ndarray:
+    """(M,) int64 numbers of brushes, none of them where all are the only one."""
+    numbers = np.array(brushes, dtype=np.int64)
+    return numbers if np.any(numbers != ONLY_BRUSH) else numbers[:0]
 
 
 @dataclass(frozen=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
+from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -47,7 +48,7 @@ class PartPlan:
         sigma_n_one_raster, coverage_one_raster: of the passes of one raster over the whole part,
             nan where it has no one side.
         contacts: where gun or spray come too near to the part. envelope: of the gun.
-        model: what the gun sprays.
+        model: what the gun sprays. paint: that is sprayed.
     """
 
     surface: Surface
@@ -67,6 +68,7 @@ class PartPlan:
     contacts: tuple[Contact, ...]
     envelope: GunEnvelope
     model: DepositionModel
+    paint: PaintUsed = NO_PAINT
 
     @property
     def cycle_time_s(self) -> float:
@@ -133,6 +135,7 @@ class PartPlan:
                 'sigma_n': self.sigma_n_one_raster, 'coverage': self.coverage_one_raster,
             },
             'film': self.statistics.to_dict(),
+            'paint': paint_figures(self),
             'gun': vars(self.envelope),
             'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
@@ -171,7 +174,7 @@ def plan_faces(
     running = in_order(blended.faces)
     progress('motion', 0.0)
     motion = motion_over(running, frame_id, lambda way: not contacts(surface, way, envelope))
-    film, emitted = simulated(surface, model, motion.trajectory)
+    film, paint = simulated(surface, model, motion.trajectory)
     _, sigma_n = evenness(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
@@ -180,12 +183,13 @@ def plan_faces(
         )
     progress('one raster', 0.0)
     raster = _one_raster(surface, model, replace(request, tolerance=None), painted, area)
-    statistics = planned_statistics(film[painted], area[painted], emitted, request)
+    statistics = planned_statistics(film[painted], area[painted], paint.emitted_cm3, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
         surface, request, faces, blended.margin_m, passes, motion.moves, motion.trajectory,
         film, painted, statistics, sigma_n, blended.sigma_n_before,
         *raster, contacts(surface, motion.trajectory, envelope), envelope, model,
+        paint,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.errors import PlanError, require_above_zero
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
@@ -25,6 +26,7 @@ class PassStyle:
         band_m: the part's ends are looked for this far to both sides of a pass [m].
         travel_rad: direction of the first pass in the tool's x-y frame [rad].
         one_way: every pass runs in the direction of the first.
+        brush: number of the brush that sprays; 0 is the only one.
     """
 
     standoff_m: float
@@ -34,6 +36,7 @@ class PassStyle:
     band_m: float = 0.15
     travel_rad: float = 0.0
     one_way: bool = False
+    brush: int = ONLY_BRUSH
 
     def __post_init__(self) -> None:
         require_above_zero(

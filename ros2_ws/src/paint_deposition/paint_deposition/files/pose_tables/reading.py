@@ -18,7 +18,7 @@ from paint_deposition.files.pose_tables.rotations import read_rotations
 from paint_deposition.files.text import decoded
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
 SUFFIXES = ('.csv', '.tsv', '.txt')
@@ -188,7 +188,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
         return Trajectory(
             stamps, positions, quaternions, trigger_stamps_ns=stamps[on],
             trigger_flow=levels[on], notes=(said,),
-            trigger_brush=brushes[on],
+            trigger_brush=numbered(brushes[on]),
         )  # fmt: skip
     if speed is None:
         raise RecordingError(

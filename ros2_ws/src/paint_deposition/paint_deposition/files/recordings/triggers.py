@@ -12,6 +12,7 @@ import numpy as np
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.motion.trajectory import numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
@@ -22,7 +23,6 @@ SYNTAX = re.compile(
 )
 STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
 MOST_FIELDS = 12
-NO_BRUSH = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -122,7 +122,7 @@ def read_switching(bag: Bag, name: str) -> Switching:
     )
     if not known.all():
         note += f'; {np.count_nonzero(~known)} values that are no number are left out'
-    return Switching(stamps, on.astype(float), NO_BRUSH, {}, not stamped.all(), (note,))
+    return Switching(stamps, on.astype(float), numbered([]), {}, not stamped.all(), (note,))
 
 
 def _level(text: str | None, name: str) -> float:
@@ -162,7 +162,7 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     return Switching(
         np.array([stamp for stamp, *_ in changes], dtype=np.int64),
         np.array([flow for _, flow, _ in changes], dtype=float),
-        np.array([brush for *_, brush in changes], dtype=np.int64),
+        numbered([brush for *_, brush in changes]),
         {name: float(np.median(values)) for name, values in told.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),

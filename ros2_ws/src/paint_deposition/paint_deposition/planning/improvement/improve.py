@@ -101,7 +101,7 @@ def timed_for_evenness(
     films = [FilmAtPoints(surface, rows, model) for model in models]
     before = [one.film_um(programme) for one in films]
     target = wish.target_um or float(np.mean([film.mean() for film in before]))
-    narrow = min(min(m.planar.sigma1_m, m.planar.sigma2_m) for m in models)
+    narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
     level = target / float(np.mean([film.mean() for film in before]))
     search = _Search(films, target, level, limits, wish, spacing, progress, explained)
