@@ -159,7 +159,7 @@ def test_no_block_with_a_lit_point_is_skipped(seed, share):
     model = DepositionModel(
         planar=PlanarPattern(r_m=rng.uniform(0, 0.2), sigma1_m=0.03, sigma2_m=0.04)
     )
-    row, constants = step_rows(model, path, np.zeros(3))[0], model_constants(model)
+    row, constants = step_rows(model, path, np.zeros(3))[0], model_constants(model)[0]
     along = rng.uniform(1.001 * model.projection.nearest_m, 1.0)
     aside = share * model.reach_m * along / model.projection.model_plane_m
     angle = rng.uniform(-np.pi, np.pi)

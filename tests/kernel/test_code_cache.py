@@ -25,7 +25,7 @@ one, many = np.zeros(1, np.float32), np.zeros((3, 1), np.float32)
 run(many, many, np.ones((1, 1), np.uint8), np.zeros(1), one, np.zeros((1, 0)), 0,
     np.zeros((1, 4)), np.array([0, 1]),
     np.zeros((1, kernel.STEP_COLUMNS), np.float32), np.zeros(1, np.int64),
-    np.ones(kernel.MODEL_CONSTANTS, np.float32), one)
+    np.zeros(1, np.int64), np.ones((1, kernel.MODEL_CONSTANTS), np.float32), one)
 print(sum(run.stats.cache_hits.values()))
 """
 

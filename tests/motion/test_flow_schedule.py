@@ -15,7 +15,7 @@ def schedule(changes):
 
 
 def flow_at(flow, stamps):
-    cuts, flows = flow.steps()
+    cuts, flows, _ = flow.steps()
     return flows[np.searchsorted(cuts, stamps, side='right')]
 
 
@@ -38,7 +38,7 @@ def test_a_gun_that_is_only_told_to_be_off_stays_off():
 
 def test_a_state_that_is_repeated_cuts_nothing():
     flow = schedule([(stamp, 1.0 if stamp >= 30 else 0.0) for stamp in range(0, 100, 10)])
-    cuts, flows = flow.steps()
+    cuts, flows, _ = flow.steps()
     assert cuts.tolist() == [30]
     assert flows.tolist() == [0.0, 1.0]
 

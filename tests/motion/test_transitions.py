@@ -173,12 +173,16 @@ def test_the_trigger_is_timed_from_its_changes_and_forgotten_at_a_gap():
     state = first_trigger(0.0)
     flow = np.array([0.0, 0.5, 0.5, 0.0, 0.0, 0.8, 0.8])
     after_gap = np.arange(7) == 6
-    open_flow, since_on, since_off = follow_trigger(state, np.ones(7), flow, after_gap)
+    open_flow, _, since_on, since_off = follow_trigger(
+        state, np.ones(7), flow, np.zeros(7, np.int64), after_gap
+    )
     assert open_flow.tolist() == [1.0, 0.5, 0.5, 0.5, 0.5, 0.8, 0.8]
     assert since_on.tolist() == [np.inf, 0.5, 1.5, 2.5, 3.5, 0.5, 0.5]
     assert since_off.tolist() == [np.inf, np.inf, np.inf, 0.5, 1.5, 2.5, np.inf]
 
 
 def test_a_gun_that_was_open_before_the_first_sub_step_has_not_opened():
-    _, since_on, _ = follow_trigger(first_trigger(1.0), np.ones(2), np.ones(2), np.zeros(2, bool))
+    _, _, since_on, _ = follow_trigger(
+        first_trigger(1.0), np.ones(2), np.ones(2), np.zeros(2, np.int64), np.zeros(2, bool)
+    )
     assert since_on.tolist() == [np.inf, np.inf]

@@ -138,8 +138,8 @@ class Robot(Node):
         q.x, q.y, q.z, q.w = map(float, quaternion)
         self.pose_publisher.publish(message)
 
-    def send_state(self, stamp_ns, flow: float) -> None:
-        self.send_fields(stamp_ns, spraying=bool(flow > 0.0), flow=float(flow))
+    def send_state(self, stamp_ns, flow: float, brush: int = 0) -> None:
+        self.send_fields(stamp_ns, spraying=bool(flow > 0.0), flow=float(flow), brush=brush)
 
     def send_fields(self, stamp_ns, **fields: object) -> None:
         """A state of which only these fields are filled."""
@@ -149,13 +149,12 @@ class Robot(Node):
 
     def send(self, trajectory: Trajectory, rows: slice = slice(None), frame_id='part') -> None:
         """Poses, and each state before the first pose that is newer."""
-        changes = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
         for row in np.arange(len(trajectory))[rows]:
             stamp = trajectory.stamps_ns[row]
             before = trajectory.stamps_ns[row - 1] if row else 0
-            for changed_ns, flow in changes:
+            for changed_ns, flow, brush in trajectory.triggers:
                 if before < changed_ns <= stamp:
-                    self.send_state(changed_ns, flow)
+                    self.send_state(changed_ns, flow, brush)
             self.send_pose(
                 stamp, trajectory.positions_m[row], trajectory.quaternions_xyzw[row], frame_id
             )

@@ -166,6 +166,7 @@ def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, 
     assert stamp_ns(taken.header) == START_NS - 9
     assert (taken.spraying, taken.flow, taken.shaping_air_l_per_min) == (True, 0.7, 250.0)
     assert np.isnan(taken.voltage_kv)
+    assert taken.brush == 0
 
 
 def test_the_player_stays_within_its_window(play, listen, wait_until, still, pass_bag):

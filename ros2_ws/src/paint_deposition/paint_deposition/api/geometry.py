@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
@@ -70,6 +70,8 @@ def look_at(
     Raises:
         RecordingError: the poses make no motion, or the gun never sprays.
     """
+    if model is not None:
+        require_brushes(trajectory, model)
     model = model or DepositionModel()
     path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
     _require_motion(trajectory.source, path, counts, max_pose_gap_s)
@@ -77,6 +79,18 @@ def look_at(
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     geometry = spray_geometry(surface, path, model, trajectory.frame_id)
     return GunOnPart(surface, trajectory, path, counts, geometry)
+
+
+def require_brushes(trajectory: Trajectory, model: DepositionModel) -> None:
+    """Refuse a motion with brushes that the model does not have.
+
+    Raises:
+        ModelError: naming the motion and the brushes there are.
+    """
+    try:
+        model.require_brushes(trajectory.brushes)
+    except ModelError as error:
+        raise ModelError(f'{trajectory.source}: {error}') from None
 
 
 def _require_motion(

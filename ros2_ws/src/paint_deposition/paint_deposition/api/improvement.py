@@ -80,7 +80,7 @@ def improve(
     seen = look_at(surface, trajectory, model)
     surface, given = seen.surface, Programme.of(trajectory)
     progress('the film as it is', 0.0)
-    film_um, emitted = simulated(surface, model, trajectory)
+    film_um, paint = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
         raise RecordingError(f'{trajectory.source}: no paint lands on the part')
     if judged is None:
@@ -93,14 +93,16 @@ def improve(
     progress('the film of the written files', 0.0)
     passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
     improved, program = _read_back(passes)
-    new_um, new_emitted = simulated(surface, model, improved)
+    new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, program)
     tolerance = wish.tolerance or DEFAULT_TOLERANCE
     band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
     path, improved_path = seen.path, spray_path(improved)[0]
-    before = LaidFilm.of(film_um, surface, judged, band, emitted, path, trajectory.duration_s)
+    before = LaidFilm.of(
+        film_um, surface, judged, band, paint.emitted_cm3, path, trajectory.duration_s
+    )
     after = LaidFilm.of(
-        new_um, surface, judged, band, new_emitted, improved_path, improved.duration_s
+        new_um, surface, judged, band, new_paint.emitted_cm3, improved_path, improved.duration_s
     )
     return Improvement(
         surface, judged, model, limits, wish, trajectory, improved, moves, retiming, before, after,

@@ -12,6 +12,7 @@ from paint_deposition.api.geometry import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
+from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.fitting.forward import Forward
@@ -38,6 +39,7 @@ class Film:
         geometry: how the gun ran over the part.
         readings: places where the gauge should be predicted, or None.
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
+        paint: that was sprayed.
     """
 
     surface: Surface
@@ -50,6 +52,7 @@ class Film:
     geometry: SprayGeometry
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
+    paint: PaintUsed = NO_PAINT
 
     def __repr__(self) -> str:
         s = self.statistics
@@ -70,7 +73,8 @@ class Film:
             f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
             f'sprays {self.path.spraying_time_s:.3g} s only'
         )
-        return self.geometry.warnings or ((bare,) if self.statistics.coverage == 0.0 else ())
+        odd = self.geometry.warnings or ((bare,) if self.statistics.coverage == 0.0 else ())
+        return (*odd, *impossible_brushes(self.model))
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the film and of how it was painted, as in ``stats.json``."""
@@ -79,6 +83,7 @@ class Film:
             'down': self.surface.down.tolist(),
             'effects': [effect.id for effect in self.model.effects],
             'spraying_time_s': self.path.spraying_time_s,
+            'paint': paint_figures(self),
             'poses': self.counts.to_dict(),
             'geometry': self.geometry.to_dict(),
             'notes': list(self.notes),
@@ -135,5 +140,5 @@ def simulate(
         predicted_um = Forward(campaign).predict_um(model)
     return Film(
         surface, trajectory, path, seen.counts, model, film_um, statistics, geometry, readings,
-        predicted_um,
+        predicted_um, painted.used,
     )  # fmt: skip

@@ -12,6 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli.model_choice import chosen_model, model_for
 from paint_deposition.cli.options import (
     BODY,
+    BRUSH,
     FILE,
     JSON,
     MAX_POSE_GAP,
@@ -50,6 +51,7 @@ HARDLY = 0.15
     'with --target-um or --speed.',
 )  # fmt: skip
 @MODEL
+@BRUSH
 @click.option('--points', default=60, show_default=True, help='How many points.')
 @click.option(
     '--repeats', default=8, show_default=True,
@@ -77,6 +79,7 @@ def measure_command(
     mesh: Path,
     trajectory: Path | None,
     model_file: Path | None,
+    brush: int,
     target_um: float | None,
     speed_m_per_s: float | None,
     output: Path,
@@ -102,7 +105,11 @@ def measure_command(
         )
     with Progress('measure') as tell:
         tell('reading')
-        chosen = model_for(model_file, trajectory) if trajectory else chosen_model(model_file)
+        chosen = (
+            model_for(model_file, trajectory)
+            if trajectory
+            else chosen_model(model_file, brush=brush)
+        )
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         warnings: tuple[str, ...] = ()
         if trajectory is None:

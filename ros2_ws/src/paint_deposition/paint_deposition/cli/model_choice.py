@@ -23,33 +23,40 @@ class ChosenModel:
         file: the model, None for the default.
         path: its file, None for the default.
         words: the line for the user.
+        brush: the one that was chosen; 0 is none.
     """
 
     file: ModelFile | None
     path: Path | None
     words: str
+    brush: int = 0
 
     @property
     def model(self) -> pd.DepositionModel:
         """The model of the file, else that of a 50 mm bell."""
-        return self.file.model if self.file else pd.DepositionModel()
+        model = self.file.model if self.file else pd.DepositionModel()
+        return model.with_brush(self.brush) if self.brush else model
 
 
 def chosen_model(
-    given: Path | None, otherwise: str = 'default, a 50 mm bell; --model gives another'
+    given: Path | None,
+    otherwise: str = 'default, a 50 mm bell; --model gives another',
+    brush: int = 0,
 ) -> ChosenModel:
     """The model named with --model, else the default.
 
     Args:
         given: the file, or None.
         otherwise: what to say of the default.
+        brush: that of --brush, 0 for none.
     """
     from paint_deposition.files.model_file import read_model_file
 
     if given is None:
-        return ChosenModel(None, None, otherwise)
+        return ChosenModel(None, None, otherwise, brush)
     file = read_model_file(given)
-    return ChosenModel(file, given, _words(given, file))
+    words = f'{_words(given, file)}, brush {brush}' if brush else _words(given, file)
+    return ChosenModel(file, given, words, brush)
 
 
 def model_for(given: Path | None, motion: Path) -> ChosenModel:
@@ -65,7 +72,9 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
     if planned is None:
         return chosen
     if chosen.file is not None:
-        if model_digest(chosen.model) != planned.digest:
+        model = chosen.model
+        alike = [model, *(model.with_brush(brush.number) for brush in model.brushes)]
+        if planned.digest not in map(model_digest, alike):
             say_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
         return chosen
     if planned.file is None:
@@ -96,10 +105,15 @@ def campaign_model_words(
 
 
 def _words(path: Path, file: ModelFile) -> str:
-    """'runs/model.yaml (sha256 1a2b3c4d5e6f), effects: air_drift'."""
+    """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2 (interpolated), effects: air_drift'."""
     from paint_deposition.files.provenance import model_digest
 
     called = f" '{file.name}'" if file.name else ''
     effects = ', '.join(effect.id for effect in file.model.effects) or 'none'
     digest = model_digest(file.model)[:DIGITS]
-    return f'{path}{called} ({digest}), effects: {effects}'
+    brushes = ', '.join(
+        f'{brush.number} (interpolated)' if brush.interpolated else str(brush.number)
+        for brush in file.model.brushes
+    )
+    of_brushes = f', brushes: {brushes}' if brushes else ''
+    return f'{path}{called} ({digest}){of_brushes}, effects: {effects}'

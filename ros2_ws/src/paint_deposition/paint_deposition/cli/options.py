@@ -66,6 +66,12 @@ MESH = click.option(
 MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
 
 
+BRUSH = click.option(
+    '--brush', default=0, type=click.IntRange(min=0), show_default='the only one',
+    help='Number of the brush to work with, of a model with several.',
+)  # fmt: skip
+
+
 def output_option(what: str, default: str | None = None) -> Callable:
     """The folder for a command's results, to be named where there is no default."""
     text = (

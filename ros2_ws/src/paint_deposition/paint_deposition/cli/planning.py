@@ -15,6 +15,7 @@ from paint_deposition.cli.faces import faces_lines, faces_options
 from paint_deposition.cli.model_choice import campaign_model_words, chosen_model
 from paint_deposition.cli.options import (
     BODY,
+    BRUSH,
     CAMPAIGN,
     FILE,
     JSON,
@@ -130,6 +131,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
 
 @click.command('recommend')
 @MODEL
+@BRUSH
 @passes_wanted
 @click.option('--width', 'width_m', type=NUMBER, help='Width to paint across the passes [m].')
 @click.option(
@@ -144,6 +146,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
 @JSON
 def recommend_command(
     model_file: Path | None,
+    brush: int,
     output: Path,
     pictures: str,
     as_json: bool,
@@ -151,7 +154,7 @@ def recommend_command(
     **wanted: Any,
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
-    chosen = chosen_model(model_file)
+    chosen = chosen_model(model_file, brush=brush)
     travel_rad = math.radians(travel_deg)
     answer = pd.recommend(chosen.model, travel_rad=travel_rad, **wanted)
     files = write_results(
@@ -182,6 +185,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @click.command('plan')
 @click.option('--mesh', required=True, type=FILE, help='STL, PLY, OBJ, glTF, 3MF or STEP.')
 @MODEL
+@BRUSH
 @passes_wanted
 @click.option(
     '--direction', default='horizontal', show_default=True,
@@ -247,6 +251,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 def plan_command(
     mesh: Path,
     model_file: Path | None,
+    brush: int,
     output: Path,
     travel_deg: float,
     down: np.ndarray | None,
@@ -266,7 +271,7 @@ def plan_command(
     if pareto and not wanted['optimise']:
         raise click.UsageError('--pareto weighs paint in an optimised plan; add --optimise')
     wanted |= {'travel_rad': math.radians(travel_deg), 'lean_max_rad': math.radians(lean_max_deg)}
-    chosen = chosen_model(model_file)
+    chosen = chosen_model(model_file, brush=brush)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as tell:
         tell('reading the mesh')

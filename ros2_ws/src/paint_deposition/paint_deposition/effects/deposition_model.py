@@ -1,26 +1,133 @@
 """The whole deposition model: planar pattern, projection, and the effects that were added."""
 
 import math
+from collections.abc import Iterable
+from typing import Any
 
+import numpy as np
 from pydantic import BaseModel, ConfigDict, SerializeAsAny
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.errors import ModelError
+from paint_deposition.model.brush import Brush, listed
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Flux below this share of the peak is left out of the film.
 CUT_FLUX = 1e-6
 
 
 class DepositionModel(BaseModel):
-    """Eq. (1) projected by eq. (2), with any number of effects in the order given."""
+    """Eq. (1) projected by eq. (2), with any number of effects in the order given.
+
+    Attributes:
+        planar: the pattern of the only brush; with several it is that of the first.
+        projection: eq. (2), of all brushes.
+        effects: of all brushes.
+        brushes: in the order of their numbers; none where the cell has no numbers.
+    """
 
     model_config = ConfigDict(frozen=True, extra='forbid')
 
     planar: PlanarPattern = PlanarPattern()
     projection: Projection = Projection()
     effects: tuple[SerializeAsAny[Effect], ...] = ()
+    brushes: tuple[Brush, ...] = ()
+
+    @staticmethod
+    def of_brushes(brushes: Iterable[Brush], **rest: Any) -> 'DepositionModel':
+        """The model with these brushes, each number once, and the other fields."""
+        ordered = tuple(sorted(brushes, key=lambda brush: brush.number))
+        return DepositionModel(planar=ordered[0].planar, brushes=ordered, **rest)
+
+    @property
+    def patterns(self) -> tuple[PlanarPattern, ...]:
+        """Of the brushes in the order of their numbers, or the only one."""
+        return tuple(brush.planar for brush in self.brushes) or (self.planar,)
+
+    def with_patterns(self, patterns: Iterable[PlanarPattern]) -> 'DepositionModel':
+        """A copy with other patterns, in the order of ``patterns``."""
+        new = tuple(patterns)
+        brushes = tuple(
+            brush.model_copy(update={'planar': planar, 'interpolated': False})
+            for brush, planar in zip(self.brushes, new, strict=False)
+        )
+        return self.model_copy(update={'planar': new[0], 'brushes': brushes})
+
+    def with_brush(self, number: int) -> 'DepositionModel':
+        """A copy that has one of the brushes only; 0 is the only one.
+
+        Raises:
+            ModelError: there is none of that number.
+        """
+        if number != ONLY_BRUSH and not self.brushes:
+            raise ModelError(
+                f'brush {number} is not in the model: it has one pattern, planar, without a number'
+            )
+        row = int(self.pattern_rows(np.array([number]))[0])
+        brushes = tuple(
+            brush.model_copy(update={'interpolated': False})
+            for brush in self.brushes[row : row + 1]
+        )
+        return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
+
+    @property
+    def brush(self) -> int:
+        """Number of the first brush; 0 where the only one has none."""
+        return self.brushes[0].number if self.brushes else ONLY_BRUSH
+
+    def single(self, purpose: str) -> 'DepositionModel':
+        """The model itself, if it has one pattern.
+
+        Raises:
+            ModelError: it has several brushes; ``purpose`` says what needs one.
+        """
+        if len(self.brushes) > 1:
+            raise ModelError(
+                f'{purpose} is for one brush and the model has {listed(self._numbers)}: say which '
+                '(brush)'
+            )
+        return self
+
+    @property
+    def _numbers(self) -> tuple[int, ...]:
+        return tuple(brush.number for brush in self.brushes)
+
+    def require_brushes(self, numbers: Iterable[int]) -> None:
+        """Refuse a motion that names brushes which the model does not have.
+
+        Without ``brushes`` the pattern is that of one brush, whatever number it has in the cell.
+
+        Raises:
+            ModelError: one line that names the brushes there are.
+        """
+        named = set(map(int, numbers))
+        if not self.brushes and len(named - {ONLY_BRUSH}) > 1:
+            raise ModelError(
+                f'brushes {listed(named - {ONLY_BRUSH})} are used and the model has the pattern '
+                'of one, planar: give brushes, with a pattern for each number'
+            )
+        if self.brushes:
+            self.pattern_rows(np.array(sorted(named), dtype=np.int64))
+
+    def pattern_rows(self, numbers: np.ndarray) -> np.ndarray:
+        """(M,) rows in ``patterns`` of brushes (M,) by number.
+
+        Raises:
+            ModelError: the model does not have one of them.
+        """
+        if not self.brushes:
+            return np.zeros(len(numbers), dtype=np.int64)
+        known = np.array(self._numbers)
+        if len(known) == 1:
+            numbers = np.where(numbers == ONLY_BRUSH, known[0], numbers)
+        strange = np.setdiff1d(numbers, known)
+        if len(strange):
+            what = f'brush {strange[0]} is not in the model' if strange[0] else 'no brush is named'
+            raise ModelError(f'{what}; its brushes: {listed(known)}')
+        return np.searchsorted(known, numbers)
 
     @property
     def needs_whole_strokes(self) -> bool:
@@ -35,7 +142,7 @@ class DepositionModel(BaseModel):
     @property
     def reach_m(self) -> float:
         """Radius on the model plane beyond which the flux is negligible [m]."""
-        return self.planar.radius_of_flux_m(CUT_FLUX) * self.widening
+        return max(planar.radius_of_flux_m(CUT_FLUX) for planar in self.patterns) * self.widening
 
     @property
     def shadow(self) -> float:
@@ -45,7 +152,7 @@ class DepositionModel(BaseModel):
     @property
     def max_step_m(self) -> float:
         """Travel of a sub-step that keeps the integral's error below 0.1 % of the peak [m]."""
-        width = min(self.planar.sigma1_m, self.planar.sigma2_m)
+        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in self.patterns)
         return min(DEFAULT_MAX_STEP_M, 0.1 * width)
 
     def effect(self, effect_id: str) -> Effect | None:

@@ -15,6 +15,7 @@ from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
+from paint_deposition.files.brushes import read_brushes
 from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.files.refusals import Made, checked
@@ -23,7 +24,9 @@ from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 
 WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
-KEYS = ('name', 'planar', 'projection', 'effects', 'uncertainty', 'posterior', 'history')
+KEYS = (
+    'name', 'planar', 'brushes', 'projection', 'effects', 'uncertainty', 'posterior', 'history',
+)  # fmt: skip
 
 LoadEffect = Callable[[Path], type[Effect]]
 
@@ -113,7 +116,7 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
     for key in content:
         if key not in KEYS:
             raise ModelError(f'unknown key {key!r}; {did_you_mean(key, KEYS)}')
-    planar = _section(PlanarPattern, 'planar', content)
+    patterns = _patterns(content)
     projection = _section(ProjectionSection, 'projection', content)
     effects: list[Effect] = []
     for where, entry in _mappings('effects', content).items():
@@ -126,7 +129,7 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
             raise ModelError('occlusion is given in projection and in effects; keep the effect')
         effects.append(Occlusion(strength=1.0))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
-    model = DepositionModel(planar=planar, projection=eq_2, effects=tuple(effects))
+    model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
     return ModelFile(
         model,
         _given(str, 'name', content),
@@ -142,6 +145,16 @@ def _posterior(content: dict[str, Any], model: DepositionModel) -> Posterior | N
     posterior = _section(Posterior, 'posterior', content)
     posterior.check_suits(model)
     return posterior
+
+
+def _patterns(content: dict[str, Any]) -> DepositionModel:
+    """A model with the pattern of the file, or with its brushes."""
+    if content.get('brushes') is None:
+        return DepositionModel(planar=_section(PlanarPattern, 'planar', content))
+    if content.get('planar') is not None:
+        raise ModelError('planar and brushes are both given; keep one of them')
+    brushes = read_brushes(_given(dict, 'brushes', content))
+    return DepositionModel.of_brushes(brushes)
 
 
 def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:

@@ -14,12 +14,14 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.json_files import plain
+from paint_deposition.model.brush import Brush, SetPoints
 
 COMMENT_COLUMN = 33
 # What stands for all learned laws; the covariate says which.
 LEARNED_ID = 'learned'
 COMMENTS = {
     'planar': 'eq. (1): flux on the model plane',
+    'brushes': 'eq. (1) and set-points by number',
     'projection': 'eq. (2): from the model plane to the surface',
     'uncertainty': 'standard deviations',
     'posterior': 'what the fit knows: a prior for the next job',
@@ -46,7 +48,10 @@ def model_text(
     text = CommentedMap({'name': name} if name else {})
     if header_comment:
         text.yaml_set_start_comment(header_comment)
-    text['planar'] = _fields(model.planar)
+    if model.brushes:
+        text['brushes'] = CommentedMap({brush.number: _brush(brush) for brush in model.brushes})
+    else:
+        text['planar'] = _fields(model.planar)
     text['projection'] = _fields(model.projection)
     text['effects'] = [_effect(effect, folder) for effect in model.effects]
     text |= {key: _with_rows(plain(value)) for key, value in extras.items() if value}
@@ -59,6 +64,16 @@ def model_text(
     writer.indent(sequence=4, offset=2)
     writer.dump(text, stream)
     return stream.getvalue()
+
+
+def _brush(brush: Brush) -> CommentedMap:
+    text = CommentedMap({} if brush.interpolated else {'planar': _fields(brush.planar)})
+    known = brush.set_points.model_dump(exclude_none=True)
+    text |= {key: value for key, value in _fields(brush.set_points).items() if key in known}
+    for key in known:
+        description = SetPoints.model_fields[key].description
+        text.yaml_add_eol_comment(description, key, COMMENT_COLUMN)
+    return text
 
 
 def _with_rows(value: Any) -> Any:

@@ -64,8 +64,9 @@ def _in_full(model: DepositionModel) -> dict[str, Any]:
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
+    brushes = {'brushes': [plain(brush.model_dump()) for brush in model.brushes]}
     return {
-        'planar': plain(model.planar.model_dump()),
+        **(brushes if model.brushes else {'planar': plain(model.planar.model_dump())}),
         'projection': plain(model.projection.model_dump()),
         'effects': [{'id': e.id, **plain(e.model_dump())} for e in model.effects],
     }

@@ -9,6 +9,7 @@ from pydantic.fields import FieldInfo
 
 from paint_deposition.errors import PaintError, did_you_mean
 
+NUMBERS = (float, float | None)
 Made = TypeVar('Made', bound=BaseModel)
 
 
@@ -30,7 +31,7 @@ def checked(model: type[Made], where: str, values: Any, refusal: type[PaintError
         raise refusal(_reason(model, where, error)) from None
     for key, value in values.items():
         field = model.model_fields[key]
-        if field.annotation is float and isinstance(value, bool):  # true would pass as 1
+        if field.annotation in NUMBERS and isinstance(value, bool):  # true would pass as 1
             raise refusal(_wrong(where, key, value, field))
     return made
 
@@ -71,7 +72,7 @@ def _wrong(where: str, key: str, value: object, field: FieldInfo) -> str:
 def _expected(field: FieldInfo) -> str:
     if field.annotation is bool:
         return f'true or false: {field.description}'
-    if field.annotation is not float:
+    if field.annotation not in NUMBERS:
         return str(field.description)
     limits: dict[str, float] = {}
     for bound in field.metadata:

@@ -18,6 +18,7 @@ from paint_deposition.film.layout import (
     step_rows,
     term_constants,
 )
+from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.accumulation import TERMS, compile_kernel
 from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.motion.path import SprayPath
@@ -56,14 +57,21 @@ class Steps:
         rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
         visible: (S, V) uint8, which points are seen, one row a tracing.
         sight: (M,) row of ``visible`` that holds on each sub-step.
+        brush: (M,) row among the model's patterns of the one that sprays.
     """
 
     rows: np.ndarray
     visible: np.ndarray
     sight: np.ndarray
+    brush: np.ndarray
 
     def __len__(self) -> int:
         return len(self.rows)
+
+    def of_brush(self, row: int) -> 'Steps':
+        """Those on which one of the patterns sprays."""
+        chosen = self.brush == row
+        return Steps(self.rows[chosen], self.visible, self.sight[chosen], self.brush[chosen])
 
 
 class FilmIntegrator:
@@ -122,7 +130,7 @@ class FilmIntegrator:
         self._film = np.zeros(len(self._blocks.order))
         self._recent = np.zeros(len(self._blocks.order), dtype=self._real)
         self._done = 0
-        self.emitted_cm3 = 0.0
+        self.used = PaintUsed()
         self._traced_from: np.ndarray | None = None
         self._last_seen = np.ones(len(self._blocks.order), dtype=np.uint8)
 
@@ -138,7 +146,7 @@ class FilmIntegrator:
 
     def add_sprayed(self, path: SprayPath, progress: Callable[[int], None] | None = None) -> None:
         """Paint along a path, or a part of one, that the effects on it have been applied to."""
-        self.emitted_cm3 += self.model.planar.K1_cm3_per_s * path.spraying_time_s
+        self.used += PaintUsed.of(self.model, path)
         for start in range(0, len(path), BATCH):
             self.paint(self._steps(path.select(slice(start, start + BATCH))))
             if progress:
@@ -155,15 +163,16 @@ class FilmIntegrator:
         self._done += len(steps)
 
     def terms(self, steps: Steps) -> np.ndarray:
-        """(7, V) what the film of these sub-steps alone is made of; see ``layout.term_weights``.
+        """(7 B, V) what the film of these sub-steps alone is made of, by brush.
 
-        They depend on r, sigma1 and sigma2, and where the asymmetry is spread over the ring, but
-        not on K1 and K2.
+        See ``layout.term_weights``. They depend on r, sigma1 and sigma2, and where the asymmetry
+        is spread over the ring, but not on K1 and K2.
         """
-        terms = np.zeros((TERMS, len(self._film)))
-        none = np.empty(0)
-        self._run(True, steps, term_constants(self.model), none, none, terms)
-        return self._in_order(terms)
+        constants, none = term_constants(self.model), np.empty(0)
+        terms = np.zeros((len(constants), TERMS, len(self._film)))
+        for row, of_brush in enumerate(terms):
+            self._run(True, steps.of_brush(row), constants, none, none, of_brush)
+        return self._in_order(terms.reshape(-1, len(self._film)))
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
         """What is really sprayed of a path, effects on it applied, and the rows that it is."""
@@ -175,7 +184,7 @@ class FilmIntegrator:
     def _steps(self, path: SprayPath) -> Steps:
         visible, sight = self._lines_of_sight(emission_points_m(self.model, path))
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
-        return Steps(rows, visible, sight)
+        return Steps(rows, visible, sight, self.model.pattern_rows(path.brush))
 
     def _run(
         self,
@@ -199,6 +208,7 @@ class FilmIntegrator:
             blocks.bounds,
             steps.rows,
             steps.sight,
+            steps.brush,
             constants.astype(self._real),
             self._parameters,
         )
@@ -242,6 +252,11 @@ class FilmIntegrator:
             seen = np.concatenate([seen, traced.astype(np.uint8)])
         self._last_seen = seen[-1].copy()
         return seen, rows
+
+    @property
+    def emitted_cm3(self) -> float:
+        """Solids that a part which catches everything would get [cm3]."""
+        return self.used.emitted_cm3
 
     @property
     def raw_um(self) -> np.ndarray:

@@ -14,8 +14,12 @@ NO_GAIN_UM_PER_S = 1e-30
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
-    """(11,) constants of eqs. (1) and (2) in the form in which the kernel uses them."""
-    planar, projection = model.planar, model.projection
+    """(B, 11) constants of eqs. (1) and (2), a row a brush, as the kernel uses them."""
+    return np.stack([_constants(model, planar) for planar in model.patterns])
+
+
+def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
+    projection = model.projection
     ring = planar.K1_cm3_per_s * (1.0 - planar.K2) / planar.gamma_m2
     centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
     c = np.empty(kernel.MODEL_CONSTANTS)
@@ -33,15 +37,15 @@ def model_constants(model: DepositionModel) -> np.ndarray:
 
 
 def term_constants(model: DepositionModel) -> np.ndarray:
-    """(11,) constants with which the kernel keeps the film's terms apart, whatever their gains."""
-    even = model.planar.model_copy(update={'K1_cm3_per_s': 1.0, 'K2': 0.5})
-    c = model_constants(model.model_copy(update={'planar': even}))
-    c[[kernel.RING, kernel.CENTRE]] += 1.0
+    """(B, 11) constants with which the film's terms are kept apart, whatever their gains."""
+    even = {'K1_cm3_per_s': 1.0, 'K2': 0.5}
+    c = model_constants(model.with_patterns(p.model_copy(update=even) for p in model.patterns))
+    c[:, [kernel.RING, kernel.CENTRE]] += 1.0
     return c
 
 
 def term_weights(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray]:
-    """How the film's terms add up.
+    """How the terms of a brush's film add up.
 
     Returns:
         (7,) weights of the terms in the film, and (7, 7) in its derivatives by log K1, K2,

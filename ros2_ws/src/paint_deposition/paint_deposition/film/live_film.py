@@ -18,12 +18,15 @@ from paint_deposition.motion.motion_log import (
 )
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.trajectory import PoseCounts
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change so much older than the newest pose is from a stream that begins again [ns].
 ANOTHER_STREAM_NS = 1_000_000_000
+# Earlier than any stamp [ns].
+BEFORE_ALL_NS = -(2**62)
 _STAMP = attrgetter('stamp_ns')
 
 
@@ -36,7 +39,8 @@ class LiveFilm:
     an offline run.
 
     Without any trigger change the gun always sprays; once one was seen, the gun was off before
-    it, as in a recording. What was painted up to then is taken back.
+    it, as in a recording. What was painted up to then is taken back. With a model of several
+    brushes nothing is painted before a change that names one.
 
     Args:
         points: where the film is wanted.
@@ -63,6 +67,8 @@ class LiveFilm:
         self._limit_poses = limit_poses
         self._integrator = FilmIntegrator(points, model, precision, occluder)
         self._carried: list[TriggerChange] = []
+        # Of all changes that were taken, and of those carried over a reset.
+        self._brushes: set[int] = set()
         self._clear()
 
     @property
@@ -88,16 +94,31 @@ class LiveFilm:
     @property
     def flow(self) -> float | None:
         """Relative flow at the newest pose; None: no trigger was ever seen."""
-        changes = self._changes or self._carried
-        if not changes:
+        if not (self._changes or self._carried):
             return None
-        newest = self.newest_ns
+        return self._set_now.flow if self._set_now else 0.0
+
+    @property
+    def brush(self) -> int:
+        """Number of the brush at the newest pose; 0 is the only one."""
+        return self._set_now.brush if self._set_now else ONLY_BRUSH
+
+    @property
+    def _set_now(self) -> TriggerChange | None:
+        """What holds at the newest pose."""
+        changes, newest = self._changes or self._carried, self.newest_ns
         passed = len(changes) if newest is None else bisect_right(changes, newest, key=_STAMP)
-        return changes[passed - 1].flow if passed else 0.0
+        return changes[passed - 1] if passed else None
+
+    @property
+    def _sprays_untold(self) -> bool:
+        """Whether the gun sprays before any trigger: not where nothing says with which brush."""
+        return len(self.model.brushes) <= 1
 
     def reset(self) -> None:
         """Back to bare metal; the gun stays as it is, on or off, if the motion goes on."""
         self._carried = self._changes or self._carried
+        self._brushes = {change.brush for change in self._carried if change.flow > 0.0}
         self._clear()
 
     def _clear(self) -> None:
@@ -105,12 +126,21 @@ class LiveFilm:
         self._builder = PathBuilder(
             self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
         )
+        if not self._sprays_untold:
+            self._builder.add_trigger(BEFORE_ALL_NS, 0.0)
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
         self._now: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:
-        """Take a change of the trigger, early, in time or late."""
+        """Take a change of the trigger, early, in time or late.
+
+        Raises:
+            ModelError: its brush is not in the model; the change is not taken.
+        """
+        if change.flow > 0.0:
+            self.model.require_brushes({*self._brushes, change.brush})
+            self._brushes.add(change.brush)
         self._carry_on(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
             self._begin_again(change)
@@ -149,7 +179,13 @@ class LiveFilm:
         return self._now
 
     def use(self, model: DepositionModel) -> None:
-        """Paint with another model from here on; what was painted before stays."""
+        """Paint with another model from here on; what was painted before stays.
+
+        Raises:
+            ModelError: the model does not have a brush that was used.
+        """
+        untold = self._sprays_untold and not (self._changes or self._carried)
+        model.require_brushes({ONLY_BRUSH} if untold else self._brushes)
         builder = self._builder
         self._integrator.add(builder.take(self._settled_ns, finish=True))
         self._integrator.use(model)
@@ -162,7 +198,8 @@ class LiveFilm:
         away = PathBuilder()
         away.add_poses([0, 1_000_000], np.full((2, 3), 1e3), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
         unpainted = self._integrator.fork()
-        unpainted.add(away.take(finish=True))
+        path = away.take(finish=True)
+        unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
 
     def _begin_again(self, first_change: TriggerChange) -> None:
@@ -180,7 +217,7 @@ class LiveFilm:
 
     def _take_change(self, change: TriggerChange) -> None:
         self.log.add(change)
-        self._builder.add_trigger(change.stamp_ns, change.flow)
+        self._builder.add_trigger(change.stamp_ns, change.flow, change.brush)
         # Kept are the changes that count from the newest pose on.
         insort(self._changes, change, key=_STAMP)
         passed = bisect_right(self._changes, self.newest_ns or 0, key=_STAMP)

@@ -28,7 +28,7 @@ from paint_deposition.kernel.ray import Ray
 # of the pattern on the model plane, dwell times relative flow times Omega^2, speed.
 ORIGIN, AXIS_X, AXIS_Y, AXIS_Z, SHIFT, WEIGHT, SPEED = 0, 3, 6, 9, 12, 14, 15
 STEP_COLUMNS = 16
-# Constants of the model: Omega; logarithms to base 2 of the ring's and the centre's gain; r; the
+# Constants of a brush: Omega; logarithms to base 2 of the ring's and the centre's gain; r; the
 # Gaussians' log2(e) / (2 sigma^2); K3 cos and sin of phi; nearest distance along the axis; reach
 # on the model plane; share stopped by shadows.
 OMEGA, RING, CENTRE, RADIUS, NARROW1, NARROW2, COS, SIN, NEAREST, REACH, SHADOW = range(11)
@@ -70,17 +70,15 @@ parameter_count = 0
 
 
 def paint_block(
-    block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c, parameters
-):
+    block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush,
+    constants, parameters,
+):  # fmt: skip
     """Paint one block; arguments as those of ``accumulate``."""
     sphere, part = spheres[block], slice(bounds[block], bounds[block + 1])
     px, py, pz = p[0, part], p[1, part], p[2, part]
     nx, ny, nz = n[0, part], n[1, part], n[2, part]
     settled, newest = film[part], recent[part]
     sums = np.zeros(TERMS * LARGEST_BLOCK if apart else 0)
-    omega, ring, centre, r = c[OMEGA], c[RING], c[CENTRE], c[RADIUS]
-    narrow1, narrow2, cos, sin = c[NARROW1], c[NARROW2], c[COS], c[SIN]
-    nearest, shadow = c[NEAREST], c[SHADOW]
     one, zero, tiny = real(1.0), real(0.0), real(1e-30)
     law = to_fixed_tuple(parameters, parameter_count)
     for m in range(len(steps)):
@@ -88,9 +86,12 @@ def paint_block(
             for i in range(len(newest)):
                 settled[i] += newest[i]
                 newest[i] = zero
-        step = steps[m]
+        step, c = steps[m], constants[brush[m]]
         if not within_reach(sphere, step, c):
             continue
+        omega, ring, centre, r = c[OMEGA], c[RING], c[CENTRE], c[RADIUS]
+        narrow1, narrow2, cos, sin = c[NARROW1], c[NARROW2], c[COS], c[SIN]
+        nearest, shadow = c[NEAREST], c[SHADOW]
         ox, oy, oz = step[ORIGIN], step[ORIGIN + 1], step[ORIGIN + 2]
         xx, xy, xz = step[AXIS_X], step[AXIS_X + 1], step[AXIS_X + 2]
         yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
@@ -146,8 +147,9 @@ def paint_block(
 
 
 def accumulate(
-    p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c, parameters
-):
+    p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush, constants,
+    parameters,
+):  # fmt: skip
     """Add the path's film to ``film``.
 
     The newest contributions stay in ``recent``, in the points' precision, and move into
@@ -165,13 +167,14 @@ def accumulate(
         bounds: (B + 1,) first point of each block.
         steps: (M, 16) sub-steps, from ``layout.step_rows``.
         sight: (M,) row of ``visible`` for each sub-step.
-        c: (11,) constants, from ``layout.model_constants``.
+        brush: (M,) row of ``constants`` for each sub-step.
+        constants: (B, 11) of each brush, from ``layout.model_constants``.
         parameters: of the laws, or one unused number.
     """
     for block in prange(len(spheres)):
         paint_block(
-            block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, c,
-            parameters,
+            block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush,
+            constants, parameters,
         )  # fmt: skip
 
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.motion.trigger import ONLY_BRUSH
+
 # Two hours at 250 Hz; about 100 bytes a pose as they come.
 DEFAULT_LIMIT_POSES = 2_000_000
 MERGED_POSES = 200
@@ -12,10 +14,11 @@ MERGED_POSES = 200
 
 @dataclass(frozen=True)
 class TriggerChange:
-    """The flow (relative; 0 is gun off) from a time on."""
+    """The flow (relative; 0 is gun off) from a time on, and the number of the brush."""
 
     stamp_ns: int
     flow: float
+    brush: int = ONLY_BRUSH
 
 
 @dataclass(frozen=True)

@@ -26,6 +26,8 @@ class SprayPath:
             [s].
         until_on_s, until_off_s: (M,) time until it next does within the stroke, inf if not.
         from_turn_m, to_turn_m: (M,) distance along the path from the last turn and to the next.
+        brush: (M,) int, number of the brush of the opening that runs or ran last; 0 is the only
+            one, and before the first.
     """
 
     stamp_ns: np.ndarray
@@ -45,6 +47,7 @@ class SprayPath:
     until_off_s: np.ndarray
     from_turn_m: np.ndarray
     to_turn_m: np.ndarray
+    brush: np.ndarray
 
     @staticmethod
     def of(
@@ -60,7 +63,7 @@ class SprayPath:
         return SprayPath(
             stamp_ns, np.full(len(flow), np.nan), dwell_s, flow, position_m, rotation,
             velocity_m_per_s, np.zeros((len(flow), 2)), numbers, numbers, np.ones(len(flow)),
-            *[never] * 6,
+            never, never, never, never, never, never, numbers,
         )  # fmt: skip
 
     def __len__(self) -> int:

@@ -15,7 +15,7 @@ from paint_deposition.motion.spray_pass import first_pass, follow_passes
 from paint_deposition.motion.stroke import first_stroke, follow_strokes
 from paint_deposition.motion.sub_steps import split_segments
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import first_trigger, follow_trigger
+from paint_deposition.motion.trigger import ONLY_BRUSH, first_trigger, follow_trigger
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
@@ -79,15 +79,15 @@ class PathBuilder:
         """Stamp of the newest pose that was kept."""
         return self._screen.newest_ns
 
-    def add_trigger(self, stamp_ns: int, flow: float) -> None:
-        """Change the flow (relative; 0 is gun off) at a time.
+    def add_trigger(self, stamp_ns: int, flow: float, brush: int = ONLY_BRUSH) -> None:
+        """Change the flow (relative; 0 is gun off) and the brush at a time.
 
         Before the first change the gun is off; without any it always sprays. A change that comes
         after the path beyond it was handed out is counted and takes effect from there on.
         """
         late_ns = 0 if self._integrated_ns is None else self._integrated_ns - int(stamp_ns)
         self.counts.late_triggers += late_ns > 0
-        self._flow.add(stamp_ns, flow, another_stream=late_ns > self.max_gap_ns)
+        self._flow.add(stamp_ns, flow, brush, another_stream=late_ns > self.max_gap_ns)
 
     def add_poses(
         self,
@@ -136,7 +136,7 @@ class PathBuilder:
             ready = int(np.searchsorted(poses.stamps_ns, until_ns, side='right'))
         if ready < 2:
             return
-        cuts, flows = self._flow.steps()
+        cuts, flows, brushes = self._flow.steps()
         now = poses.select(slice(0, ready))
         stamp, dwell, position, rotation, velocity, after_gap = split_segments(
             now.stamps_ns,
@@ -149,8 +149,9 @@ class PathBuilder:
         if len(stamp):
             after_gap[0] |= self._gap_before_next
             self._gap_before_next = False
-            flow = flows[np.searchsorted(cuts, stamp, side='right')]
-            path = SprayPath.of(stamp, dwell, flow, position, rotation, velocity)
+            now_set = np.searchsorted(cuts, stamp, side='right')
+            path = SprayPath.of(stamp, dwell, flows[now_set], position, rotation, velocity)
+            path = path.with_(brush=brushes[now_set])
             self._finished.append(self._followed(path, after_gap))
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
@@ -170,8 +171,8 @@ class PathBuilder:
             strokes, position, normal, path.velocity_m_per_s, path.dwell_s, after_gap
         )
         spray_pass = follow_passes(passes, position, normal, heading, step, path.flow, after_gap)
-        open_flow, since_on, since_off = follow_trigger(
-            trigger, path.dwell_s, path.flow, after_gap
+        open_flow, open_brush, since_on, since_off = follow_trigger(
+            trigger, path.dwell_s, path.flow, path.brush, after_gap
         )
         if self._began_ns is None:
             self._began_ns = int(path.stamp_ns[0])
@@ -183,6 +184,7 @@ class PathBuilder:
             since_on_s=since_on,
             since_off_s=since_off,
             from_turn_m=from_turn,
+            brush=open_brush,
         )
 
     def _whole_strokes(self, path: SprayPath, finish: bool) -> SprayPath:
@@ -210,7 +212,7 @@ def spray_path(
 ) -> tuple[SprayPath, PoseCounts]:
     """Screen a whole recording and cut it into sub-steps; also returns what was dropped."""
     builder = PathBuilder(max_pose_gap_s, max_step_m, whole_strokes)
-    for change in zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True):
+    for change in trajectory.triggers:
         builder.add_trigger(*change)
     builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
     return builder.take(finish=True), builder.counts

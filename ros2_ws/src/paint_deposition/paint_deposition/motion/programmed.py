@@ -11,7 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import Trajectory, numbered
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 POSE_PERIOD_S = 0.02
@@ -47,6 +48,7 @@ class Move:
         switches: of the gun during the move, in the order written.
         line: where it stands in its file, 0 for none.
         flow: of the gun while it is on, relative to the calibrated one.
+        brush: its number while it is on; 0 is the only one.
     """
 
     position_m: np.ndarray
@@ -57,6 +59,7 @@ class Move:
     switches: tuple[GunSwitch, ...] = ()
     line: int = 0
     flow: float = 1.0
+    brush: int = ONLY_BRUSH
 
 
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
@@ -73,7 +76,7 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
         raise RecordingError('there is a single move; give a program that travels')
     first = moves[0]
     times_s, positions, quaternions = [0.0], [first.position_m], [first.quaternion_xyzw]
-    changes: list[tuple[float, float]] = []
+    changes: list[tuple[float, float, int]] = []
     for before, move in pairwise(moves):
         if not move.speed_m_per_s > 0.0:
             raise RecordingError(f'line {move.line}: speed {move.speed_m_per_s:g} m/s; give one')
@@ -86,24 +89,27 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
             )
-        changes.append((times_s[-1], move.spraying * move.flow))
+        changes.append((times_s[-1], move.spraying * move.flow, move.brush))
         changes += [
-            (times_s[-1] + at * duration_s, on * move.flow) for at, on in _switches(move, length_m)
+            (times_s[-1] + at * duration_s, on * move.flow, move.brush)
+            for at, on in _switches(move, length_m)
         ]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
         positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []
         times_s += (times_s[-1] + share * duration_s).tolist()
-    flow = {}
-    if gun_known or any(flow for _, flow in changes):
-        flow = {round(time_s * 1e9): float(now) for time_s, now in changes}
+    gun: dict[int, tuple[float, int]] = {}
+    if gun_known or any(flow for _, flow, _ in changes):
+        gun = {round(time_s * 1e9): (float(now), brush) for time_s, now, brush in changes}
+    stamps_ns = sorted(gun)
     return Trajectory(
         np.array([round(time_s * 1e9) for time_s in times_s]),
         np.array(positions),
         np.array(quaternions),
-        trigger_stamps_ns=np.array(sorted(flow), dtype=np.int64),
-        trigger_flow=np.array([flow[stamp] for stamp in sorted(flow)]),
+        trigger_stamps_ns=np.array(stamps_ns, dtype=np.int64),
+        trigger_flow=np.array([gun[stamp][0] for stamp in stamps_ns]),
+        trigger_brush=numbered([gun[stamp][1] for stamp in stamps_ns]),
     )
 
 

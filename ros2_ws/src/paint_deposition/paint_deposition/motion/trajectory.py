@@ -1,11 +1,12 @@
 """A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 
 @dataclass
@@ -37,6 +38,12 @@ class PoseCounts:
         return asdict(self) | {'rejected': self.rejected}
 
 
+def numbered(brushes: Sequence[int] | np.ndarray) -> np.ndarray:
+    """(M,) int64 numbers of brushes, none of them where all are the only one."""
+    numbers = np.array(brushes, dtype=np.int64)
+    return numbers if np.any(numbers != ONLY_BRUSH) else numbers[:0]
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """Atomizer poses as recorded, in the mesh's frame, not yet screened.
@@ -49,6 +56,8 @@ class Trajectory:
         trigger_stamps_ns: (M,) int64 times at which the flow changes; empty: always spraying.
         trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
             Before the first of them the gun is off.
+        trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one,
+            throughout.
         notes: remarks on the recording for the user, a line each.
         warnings: what is likely wrong with it, a line each with the remedy.
         source: the file it came from, for messages.
@@ -68,6 +77,7 @@ class Trajectory:
     warnings: tuple[str, ...] = ()
     source: str = 'trajectory'
     settings: Mapping[str, float] = field(default_factory=dict)
+    trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'
@@ -85,6 +95,26 @@ class Trajectory:
                 f'{len(self.trigger_stamps_ns)} trigger stamps go with '
                 f'{len(self.trigger_flow)} flow values; give one flow a stamp'
             )
+
+        if len(self.trigger_brush) not in (0, len(self.trigger_flow)):
+            raise RecordingError(
+                f'{len(self.trigger_flow)} trigger flows go with {len(self.trigger_brush)} '
+                'brushes; give one brush a flow, or none'
+            )
+
+    @property
+    def triggers(self) -> list[tuple[int, float, int]]:
+        """Time [ns], flow and brush of each change of the trigger."""
+        brush = self.trigger_brush if len(self.trigger_brush) else np.zeros(len(self.trigger_flow))
+        columns = (self.trigger_stamps_ns, self.trigger_flow, brush.astype(np.int64))
+        return list(zip(*(column.tolist() for column in columns), strict=True))
+
+    @property
+    def brushes(self) -> set[int]:
+        """Numbers of the brushes that spray."""
+        if not len(self.trigger_flow):
+            return {ONLY_BRUSH}
+        return {brush for _, flow, brush in self.triggers if flow > 0.0}
 
     def __len__(self) -> int:
         return len(self.stamps_ns)

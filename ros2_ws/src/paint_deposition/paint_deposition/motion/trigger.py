@@ -7,6 +7,8 @@ from numba import njit
 
 from paint_deposition.errors import RecordingError
 
+# The brush of a motion that names none: the only one.
+ONLY_BRUSH = 0
 TRIGGER_STATE = np.dtype(
     [
         ('flow', 'f8'),
@@ -14,6 +16,7 @@ TRIGGER_STATE = np.dtype(
         ('dwell_s', 'f8'),
         ('since_on_s', 'f8'),
         ('since_off_s', 'f8'),
+        ('open_brush', 'i8'),
     ]
 )
 
@@ -44,25 +47,27 @@ def relative_flow(spraying: bool, flow: float = math.nan) -> float:
 
 def first_trigger(flow_before: float) -> np.ndarray:
     """State before the first sub-step: (1,) record, from the flow that was on until then."""
-    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf)], TRIGGER_STATE)
+    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH)], TRIGGER_STATE)
 
 
 @njit(cache=True)
-def follow_trigger(states, dwell, flow, after_gap):
+def follow_trigger(states, dwell, flow, brush, after_gap):
     """Measure back to the last opening and closing of the gun; a gap forgets them.
 
     Args:
         states: (1,) record of dtype TRIGGER_STATE, updated in place.
         dwell: (M,) duration of the sub-steps [s].
         flow: (M,) relative to the calibrated flow; 0 is gun off.
+        brush: (M,) int64 number of the brush; it counts where the gun is on.
         after_gap: (M,) bool, whether poses are missing before the sub-step.
 
     Returns:
-        open_flow (M,) of the opening that runs or ran last; since_on_s and since_off_s (M,) to
-        the middle of the sub-step, inf where there is nothing to measure to.
+        open_flow and open_brush (M,) of the opening that runs or ran last; since_on_s and
+        since_off_s (M,) to the middle of the sub-step, inf where there is nothing to measure to.
     """
     count = len(dwell)
     open_flow, since_on, since_off = np.empty(count), np.empty(count), np.empty(count)
+    open_brush = np.empty(count, np.int64)
     state = states[0]
     for i in range(count):
         if after_gap[i]:
@@ -76,8 +81,8 @@ def follow_trigger(states, dwell, flow, after_gap):
         if flow[i] == 0.0 and state.flow > 0.0:
             state.since_off_s = 0.5 * dwell[i]
         if flow[i] > 0.0:
-            state.open_flow = flow[i]
+            state.open_flow, state.open_brush = flow[i], brush[i]
         state.flow, state.dwell_s = flow[i], dwell[i]
-        open_flow[i] = state.open_flow
+        open_flow[i], open_brush[i] = state.open_flow, state.open_brush
         since_on[i], since_off[i] = state.since_on_s, state.since_off_s
-    return open_flow, since_on, since_off
+    return open_flow, open_brush, since_on, since_off

@@ -131,6 +131,7 @@ def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
             [parts[k].trigger_stamps_ns + shifts[k] for k in numbers]
         ),
         trigger_flow=np.concatenate([part.trigger_flow for part in parts]),
+        trigger_brush=np.concatenate([part.trigger_brush for part in parts]),
     )
 
 

@@ -129,19 +129,19 @@ def _followed(
         explained=False,
     )  # fmt: skip
     trajectory = retiming.programme.trajectory()
-    film, emitted = simulated(
+    film, paint = simulated(
         surface, plain.model, trajectory, lambda share: progress('film', share)
     )
     area = surface.vertex_areas_m2[plain.painted]
     _, sigma_n = evenness(film[plain.painted], area)
-    statistics = planned_statistics(film[plain.painted], area, emitted, request)
+    statistics = planned_statistics(film[plain.painted], area, paint.emitted_cm3, request)
     index = float(np.diff(lines.lines_m).mean()) if len(passes) > 1 else 0.0
     placing = Placing(len(passes), index, float(lines.lines_m.mean()), sigma_n)
     found = replace(
         plain, style=style, placing=placing, passes=passes, trajectory=trajectory, film_um=film,
         statistics=statistics, sigma_n=sigma_n, moves=tuple(moves_of(retiming.programme, limits)),
-        plain=plain,
+        plain=plain, paint=paint,
     )  # fmt: skip
-    cost = sigma_n**2 + request.paint_weight * emitted / wanted_cm3
+    cost = sigma_n**2 + request.paint_weight * paint.emitted_cm3 / wanted_cm3
     cost += request.time_weight * found.cycle_time_s / plain.cycle_time_s
     return _Candidate(found, cost)

@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
+from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -46,7 +47,7 @@ class PartPlan:
         sigma_n_one_raster, coverage_one_raster: of the passes of one raster over the whole part,
             nan where it has no one side.
         contacts: where gun or spray come too near to the part. envelope: of the gun.
-        model: what the gun sprays.
+        model: what the gun sprays. paint: that is sprayed.
         optimised: whether the speeds along the passes were chosen, not only one for each.
     """
 
@@ -67,6 +68,7 @@ class PartPlan:
     contacts: tuple[Contact, ...]
     envelope: GunEnvelope
     model: DepositionModel
+    paint: PaintUsed = NO_PAINT
     optimised: bool = False
 
     @property
@@ -135,6 +137,7 @@ class PartPlan:
                 'sigma_n': self.sigma_n_one_raster, 'coverage': self.coverage_one_raster,
             },
             'film': self.statistics.to_dict(),
+            'paint': paint_figures(self),
             'gun': vars(self.envelope),
             'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
@@ -185,7 +188,7 @@ def plan_faces(
         )  # fmt: skip
         trajectory = retiming.programme.trajectory()
         moves = tuple(moves_of(retiming.programme, limits))
-    film, emitted = simulated(surface, model, trajectory)
+    film, paint = simulated(surface, model, trajectory)
     _, sigma_n = evenness(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
@@ -194,13 +197,13 @@ def plan_faces(
         )
     progress('one raster', 0.0)
     raster = _one_raster(surface, model, replace(request, tolerance=None), painted, area)
-    statistics = planned_statistics(film[painted], area[painted], emitted, request)
+    statistics = planned_statistics(film[painted], area[painted], paint.emitted_cm3, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
         surface, request, faces, blended.margin_m, passes, moves, trajectory,
         film, painted, statistics, sigma_n, blended.sigma_n_before,
         *raster, contacts(surface, trajectory, envelope), envelope, model,
-        optimise,
+        paint, optimise,
     )  # fmt: skip
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
@@ -51,6 +51,7 @@ def trajectory_of(
         frame_id=frame_id,
         trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
+        trigger_brush=numbered([style.brush] * (2 * len(passes))),
     )
 
 
@@ -64,7 +65,8 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
         positions, quaternions = _poses_at(planned, np.array(stops))
         for k, pose in enumerate(zip(positions, quaternions, strict=True)):
             speed = planned.speed_m_per_s if k else _transfer_speed(style)
-            moves.append(Move(*pose, speed, spraying=2 <= k < len(stops) - 1))
+            spraying = 2 <= k < len(stops) - 1
+            moves.append(Move(*pose, speed, spraying, brush=style.brush))
     return moves
 
 

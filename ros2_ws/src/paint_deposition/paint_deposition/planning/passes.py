@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.errors import PlanError, require_above_zero
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
@@ -28,6 +29,7 @@ class PassStyle:
         one_way: every pass runs in the direction of the first.
         lean_rad: of the gun, turned about the line of its pass; above 0 the spray points to
             greater coordinates across [rad].
+        brush: number of the brush that sprays; 0 is the only one.
     """
 
     standoff_m: float
@@ -38,6 +40,7 @@ class PassStyle:
     travel_rad: float = 0.0
     one_way: bool = False
     lean_rad: float = 0.0
+    brush: int = ONLY_BRUSH
 
     def __post_init__(self) -> None:
         require_above_zero(

@@ -11,6 +11,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import require_above_zero
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -53,6 +54,7 @@ class Plan:
         line_films: films of single passes, for other placings.
         moves: of a robot program along the passes.
         plain: of an optimised plan, the one that it began with; else None.
+        paint: that is sprayed.
         cycle_time_s: from the first pose to the last.
     """
 
@@ -72,6 +74,7 @@ class Plan:
     line_films: LineFilms
     moves: tuple[Move, ...]
     plain: 'Plan | None' = None
+    paint: PaintUsed = NO_PAINT
 
     @property
     def mean_um(self) -> float:
@@ -145,6 +148,7 @@ class Plan:
             'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
+            'paint': paint_figures(self),
             'plain': self.plain and self.plain.brief(),
             'plane': {
                 'index_m': self.plane.index_m,
@@ -193,18 +197,17 @@ def plan(
     for round_ in range(TARGET_ROUNDS):
         passes = plan_passes(surface_map, lines, [style] * len(lines))
         trajectory = trajectory_of(passes, style, frame_id)
-        film, emitted = simulated(
-            surface, model, trajectory, lambda share: progress('film', share)
-        )
+        film, paint = simulated(surface, model, trajectory, lambda share: progress('film', share))
         mean, sigma_n = evenness(film[painted], area)
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
-    statistics = planned_statistics(film[painted], area, emitted, request)
+    statistics = planned_statistics(film[painted], area, paint.emitted_cm3, request)
     return Plan(
         surface, request, style, placing, passes, trajectory, film, painted,
         statistics, sigma_n, plane, on_part, model, films, tuple(planned_moves(passes, style)),
+        paint=paint,
     )  # fmt: skip
 
 
@@ -224,6 +227,7 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         band_m=0.25 * plane.half_width_m,
         travel_rad=request.travel_rad,
         one_way=request.one_way,
+        brush=model.brush,
     )
 
 
@@ -240,12 +244,12 @@ def simulated(
     model: DepositionModel,
     trajectory: Trajectory,
     progress: Callable[[float], None] = lambda share: None,
-) -> tuple[np.ndarray, float]:
-    """(V,) film of a motion [um], and what it sprays [cm3]."""
+) -> tuple[np.ndarray, PaintUsed]:
+    """(V,) film of a motion [um], and what it sprays."""
     path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     integrator.add(path, lambda done: progress(done / len(path)))
-    return integrator.film_um, integrator.emitted_cm3
+    return integrator.film_um, integrator.used
 
 
 def planned_statistics(

@@ -124,7 +124,9 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
 
     Raises:
         PlanError: there is no such index or speed; says why and what comes closest.
+        ModelError: the model has several brushes.
     """
+    model = model.single('an index')
     standoff = request.standoff_m or model.projection.nominal_standoff_m
     if not standoff > 0.0:
         raise PlanError(

@@ -23,6 +23,7 @@ from paint_deposition.motion.trajectory import Trajectory
 BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
 COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
+    'brush',
 )  # fmt: skip
 
 
@@ -64,7 +65,7 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
 
 
 def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:
-    """A line a move of the TCP: where it ends, how fast, whether the gun is on, and its flow."""
+    """A line a move of the TCP: where it ends, how fast, and what the gun does."""
     yield COLUMNS
     number, was_spraying = 0, False
     for move in moves:
@@ -79,6 +80,7 @@ def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Se
             f'{move.speed_m_per_s:.6g}',
             int(move.spraying),
             f'{move.flow:.6g}' if move.spraying else 0,
+            move.brush,
         ]
 
 

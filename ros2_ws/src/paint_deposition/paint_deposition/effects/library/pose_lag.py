@@ -27,33 +27,34 @@ class PoseLag(Effect):
     )  # fmt: skip
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
+        on = path.flow > 0.0
         if self.lag_s >= 0.0:
             gained_s, lost_s, side = path.since_off_s, path.since_on_s, -0.5
-            level = path.open_flow
+            level, brush = path.open_flow, path.brush
         else:
             gained_s, lost_s, side = path.until_on_s, path.until_off_s, 0.5
-            level = _flow_ahead(path)
+            ahead = _opening_ahead(path)
+            level, brush = path.flow[ahead], np.where(on, path.brush, path.brush[ahead])
         lag_s = abs(self.lag_s)
         gained = _share_within(gained_s, path.dwell_s, lag_s)
         lost = _share_within(lost_s, path.dwell_s, lag_s)
-        on = path.flow > 0.0
         share = on + gained - lost
         # The sub-step's paint is centred on what is left of it, or the lag would act in jumps.
         moment = side * (gained * (1.0 - gained) - lost * (1.0 - lost))
         shift_s = path.dwell_s * np.divide(moment, share, out=np.zeros(len(path)), where=share > 0)
         return path.with_(
             flow=share * np.where(on, path.flow, level),
+            brush=brush,
             position_m=path.position_m + shift_s[:, np.newaxis] * path.velocity_m_per_s,
         )
 
 
-def _flow_ahead(path: SprayPath) -> np.ndarray:
-    """(M,) flow of the next sub-step with the gun open; of the last one where none comes."""
-    on = np.flatnonzero(path.flow > 0.0)
+def _opening_ahead(path: SprayPath) -> np.ndarray:
+    """(M,) row of the next sub-step with the gun open; of the last one where none comes."""
+    rows, on = np.arange(len(path)), np.flatnonzero(path.flow > 0.0)
     if not len(on):
-        return path.flow
-    ahead = np.searchsorted(on, np.arange(len(path)))
-    return path.flow[on[np.minimum(ahead, len(on) - 1)]]
+        return rows
+    return on[np.minimum(np.searchsorted(on, rows), len(on) - 1)]
 
 
 def _share_within(middle_s: np.ndarray, dwell_s: np.ndarray, lag_s: float) -> np.ndarray:

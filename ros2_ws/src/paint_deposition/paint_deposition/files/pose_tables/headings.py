@@ -16,6 +16,7 @@ TRIGGER = (
     'painton', 'applicator',
 )  # fmt: skip
 FLOW = ('flow', 'relativeflow')
+BRUSH = ('brush', 'brushnumber', 'brushno', 'brushindex')
 SPEED = ('speed', 'velocity', 'v', 'tcpspeed')
 FRAME = ('frame', 'frameid', 'headerframeid')
 POSITION = ('x', 'y', 'z')

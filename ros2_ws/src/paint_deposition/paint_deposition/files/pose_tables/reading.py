@@ -16,9 +16,10 @@ from paint_deposition.files.pose_tables import headings as h
 from paint_deposition.files.pose_tables.headings import Heading, Headings
 from paint_deposition.files.pose_tables.rotations import read_rotations
 from paint_deposition.files.text import decoded
+from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trajectory import Trajectory, numbered
+from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
 SUFFIXES = ('.csv', '.tsv', '.txt')
 SEPARATORS = ';\t,|'
@@ -174,7 +175,10 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
         headings, table.numbers, layout.rotation, layout.angle_unit
     )
     flows, trigger = _flows(table, layout.trigger)
-    said = f'{len(table.rows)} poses: x y z in {unit}; {orientation}; {trigger}'
+    brushes, by_brush = _brushes(table)
+    if flows is None and brushes.any():
+        flows = np.ones(len(brushes))
+    said = f'{len(table.rows)} poses: x y z in {unit}; {orientation}; {trigger}{by_brush}'
     time, speed = headings.find(*h.TIME), headings.find(*h.SPEED)
     if time is not None:
         stamps, time_unit = table.stamps_ns(time)
@@ -184,6 +188,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
         return Trajectory(
             stamps, positions, quaternions, trigger_stamps_ns=stamps[on],
             trigger_flow=levels[on], notes=(said,),
+            trigger_brush=numbered(brushes[on]),
         )  # fmt: skip
     if speed is None:
         raise RecordingError(
@@ -196,9 +201,15 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     speeds = table.numbers([speed])[:, 0] * h.UNITS[speed_unit]
     spraying = np.ones(len(speeds)) if flows is None else flows
     moves = [
-        Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0)
-        for position, quaternion, speed, flow, line in zip(
-            positions, quaternions, speeds.tolist(), spraying.tolist(), table.lines, strict=True
+        Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0, brush=brush)
+        for position, quaternion, speed, flow, line, brush in zip(
+            positions,
+            quaternions,
+            speeds.tolist(),
+            spraying.tolist(),
+            table.lines,
+            brushes.tolist(),
+            strict=True,
         )
     ]
     programmed = timed(moves, flows is not None)
@@ -248,6 +259,21 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
     return np.array(flows), f'gun by {headings.written(used)}'
+
+
+def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
+    """Number of the brush (N,) from each row on, and how it was read."""
+    column = table.headings.find(*h.BRUSH)
+    if column is None:
+        return np.full(len(table.rows), ONLY_BRUSH, np.int64), ''
+    values, written = table.numbers([column])[:, 0], table.headings.written([column])
+    strange = np.flatnonzero(~((values >= 0) & (values <= MOST) & (values == np.round(values))))
+    if len(strange):
+        raise RecordingError(
+            f'line {table.lines[strange[0]]}: {written} is {values[strange[0]]:g}; give the '
+            'number of a brush, 0 for the only one'
+        )
+    return values.astype(np.int64), f', brush by {written}'
 
 
 def _separator(line: str) -> str:

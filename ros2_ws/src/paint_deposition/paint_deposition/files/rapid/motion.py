@@ -47,6 +47,7 @@ def program_as_text(program: RapidProgram) -> str:
         x, y, z = m.position_m
         orientation = ' '.join(f'{value:+.4f}' for value in m.quaternion_xyzw)
         gun = ', '.join(['on' if m.spraying else 'off', *map(str, m.switches)])
+        gun += f', brush {m.brush}' if m.brush else ''
         lines.append(
             f'{m.line:6d}  {m.instruction:8} {x:8.4f} {y:8.4f} {z:8.4f}  {orientation}  '
             f'{m.speed_m_per_s:6.3f}  {m.zone_m:6.4f}  {gun}'

@@ -12,7 +12,9 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.data import RapidData
 from paint_deposition.files.rapid.syntax import Instruction, Module, ModuleParser
 from paint_deposition.files.rapid.values import Reference
+from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import GunSwitch, Move
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
@@ -23,6 +25,8 @@ JOINT_MOVES = ('moveabsj', 'moveextj')
 TRIGGERS = ('triggio', 'triggequip')
 # The analogue output for the flow relative to the calibrated one, as written by `writer`.
 FLOW_SIGNAL = 'aoflow'
+# The group output for the number of the brush, likewise.
+BRUSH_SIGNAL = 'gobrush'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -84,10 +88,12 @@ class _Run:
         self._data = RapidData(module, source)
         self._program = RapidProgram(module.name, self._gun_signal(gun_signal))
         self._gun_on = False
-        self._brush: float | None = None
+        # None: nothing has chosen one yet.
+        self._brush: int | None = None
         self._triggers: dict[str, GunSwitch] = {}
         self._flow = 1.0
         self._flow_triggers: dict[str, float] = {}
+        self._brush_triggers: dict[str, int] = {}
         self._position_m: np.ndarray | None = None
         self._calls: list[str] = []
 
@@ -145,7 +151,12 @@ class _Run:
             target, value = i.values
             self._data.assign(target, self._data.value(value))
         elif i.name == 'setbrush':
-            self._brush = self._number(i, 0)
+            self._brush = self._brush_number(i, 0)
+            if i.options:
+                self._note(
+                    f'line {i.line}: the plane of SetBrush is not followed: the brush changes '
+                    'where the next move begins'
+                )
         elif i.name in TRIGGERS and self._is_gun(i):
             self._triggers[_name(i.values[0])] = self._switch(i)
         elif self._is_gun(i):
@@ -154,6 +165,16 @@ class _Run:
             self._flow_triggers[_name(i.values[0])] = self._number(i, len(i.values) - 1)
         elif i.name == 'setao' and i.values and _name(i.values[0]) == FLOW_SIGNAL:
             self._flow = self._number(i, 1)
+        elif _name(i.options.get('gop') or '') == BRUSH_SIGNAL and i.name in TRIGGERS:
+            self._brush_triggers[_name(i.values[0])] = self._brush_number(i, len(i.values) - 1)
+        elif i.name == 'setgo' and i.values and _name(i.values[0]) == BRUSH_SIGNAL:
+            self._brush = self._brush_number(i, 1)
+
+    def _brush_number(self, i: Instruction, index: int) -> int:
+        number = self._number(i, index)
+        if not (0 <= number <= MOST and number == round(number)):
+            self._data.fail(f'{i.name} takes the number of a brush, not {number:g}')
+        return int(number)
 
     def _is_gun(self, i: Instruction) -> bool:
         return _signal_of(i) == self._program.gun_signal != ''
@@ -190,6 +211,7 @@ class _Run:
         spraying, switches = self._gun(i, values[count + 1 : -2])
         for name in map(_name, i.options.values()):
             self._flow = self._flow_triggers.get(name, self._flow)
+            self._brush = self._brush_triggers.get(name, self._brush)
         self._program.moves.append(
             RapidMove(
                 instruction=i.name,
@@ -204,6 +226,7 @@ class _Run:
                 spraying=spraying,
                 switches=switches,
                 flow=self._flow,
+                brush=self._brush or ONLY_BRUSH,
             )
         )
         self._position_m = position_m
@@ -237,7 +260,7 @@ class _Run:
         if i.name.startswith('paint'):
             if self._brush is None:
                 self._note('no SetBrush: paint moves are taken as spraying')
-            return self._brush != 0.0, ()
+            return self._brush != 0, ()
         names = map(_name, [*between, *i.options.values()])
         switches = [self._triggers[name] for name in names if name in self._triggers]
         at_start = [switch for switch in switches if switch.from_start and not switch.distance_m]

@@ -10,6 +10,7 @@ import numpy as np
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 MODULE = r"""MODULE PaintPasses
   ! Poses of the TCP of tBell in wobjPart, both taught on the robot.
@@ -51,7 +52,8 @@ def module_text(
     The tool and the work object are taught on the robot and not defined here: the module's poses
     are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
     ends with the gun off. Where passes have flows of their own, the analogue output aoFlow is set
-    to them, relative to the calibrated flow, as the gun opens. `read_program` reads it back within
+    to them, relative to the calibrated flow, as the gun opens; where a brush has a number, so is
+    the group output goBrush. `read_program` reads it back within
     0.001 mm.
 
     Args:
@@ -75,12 +77,17 @@ def module_text(
     ]
     levels = sorted({_flow(move) for move in moves if move.spraying})
     flows = {v: f'flow{k}' for k, v in enumerate(levels, start=1)} if levels != [1.0] else {}
+    brushes = sorted({move.brush for move in moves if move.spraying} - {ONLY_BRUSH})
     run = [f'    MoveJ p1,{speeds[_speed(moves[0])]},fine,{FRAMES};']
     for number, (before, move) in enumerate(pairwise(moves), start=2):
         instruction, trigger = 'MoveL', ''
-        if move.spraying != before.spraying:
-            flow = f'\\T2:={flows[_flow(move)]}' if flows and move.spraying else ''
-            instruction, trigger = 'TriggL', f'gunOn{flow},' if move.spraying else 'gunOff,'
+        if _gun(move) != _gun(before):
+            instruction, trigger = 'TriggL', 'gunOff,'
+            if move.spraying:
+                also = [flows[_flow(move)]] if flows else []
+                also += [f'brush{move.brush}'] if move.brush else []
+                events = ''.join(f'\\T{k}:={name}' for k, name in enumerate(also, start=2))
+                trigger = f'gunOn{events},'
         zone = 'fine' if number == len(moves) else 'z10'
         speed_name = speeds[_speed(move)]
         run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
@@ -90,12 +97,24 @@ def module_text(
         about=about,
         data='\n'.join(data),
         moves='\n'.join(run),
-        flow_data=''.join(f'\n  VAR triggdata {name};' for name in flows.values()),
+        flow_data=''.join(
+            f'\n  VAR triggdata {name};'
+            for name in (*flows.values(), *(f'brush{number}' for number in brushes))
+        ),
         flow_events=''.join(
             f'\n    TriggEquip {name},0\\Start,0\\AOp:=aoFlow,{flow:.4f};'
             for flow, name in flows.items()
+        )
+        + ''.join(
+            f'\n    TriggEquip brush{number},0\\Start,0\\GOp:=goBrush,{number};'
+            for number in brushes
         ),
     )
+
+
+def _gun(move: Move) -> tuple[float, int] | None:
+    """Flow and brush, None where the gun is off."""
+    return (_flow(move), move.brush) if move.spraying else None
 
 
 def _speed(move: Move) -> float:

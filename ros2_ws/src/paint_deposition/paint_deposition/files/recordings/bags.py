@@ -80,6 +80,7 @@ def read_trajectory(
         trajectory,
         trigger_stamps_ns=gun.stamps_ns,
         trigger_flow=gun.flow,
+        trigger_brush=gun.brush,
         notes=(*trajectory.notes, *gun.notes),
         settings=gun.settings,
     )
@@ -161,7 +162,7 @@ def write_pose_bag(
     """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and its trigger.
 
     The trigger's messages come before the poses that they hold for. They are Bool, or
-    AtomizerState where there is another flow than 0 or 1.
+    AtomizerState where there is another flow than 0 or 1, or a brush with a number.
 
     Args:
         folder: to make.
@@ -176,10 +177,11 @@ def write_pose_bag(
         )
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    state_type = STATE_TYPE if levels else BOOL_TYPE
-    triggers = zip(trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow, strict=True)
+    state_type = STATE_TYPE if levels or np.any(trajectory.trigger_brush) else BOOL_TYPE
     # Behind the time, what comes first of those at one time.
-    entries: list[tuple[int, int, Any]] = [(time_ns, 0, flow) for time_ns, flow in triggers]
+    entries: list[tuple[int, int, Any]] = [
+        (time_ns, 0, gun) for time_ns, *gun in trajectory.triggers
+    ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
         _add_topic(run, pose_topic, POSE_TYPE)
@@ -196,7 +198,7 @@ def write_pose_bag(
                 pose = _pose(types, time_ns, trajectory.frame_id, poses[content].tolist())
                 cdr = types.serialize_cdr(pose, POSE_TYPE)
             else:
-                state = _state(types, state_type, time_ns, trajectory.frame_id, float(content))
+                state = _state(types, state_type, time_ns, trajectory.frame_id, *content)
                 cdr = types.serialize_cdr(state, state_type)
             run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
     return run.folder
@@ -207,12 +209,14 @@ def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = Fal
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 
-def _state(types: Typestore, kind: str, time_ns: int, frame_id: str, flow: float) -> object:
-    """The gun with a flow relative to the calibrated one; what else it does is not known."""
+def _state(
+    types: Typestore, kind: str, time_ns: int, frame_id: str, flow: float, brush: int
+) -> object:
+    """The gun with flow, relative to the calibrated one, and brush; the rest is not known."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
     header = _header(types, time_ns, frame_id)
-    return types.types[STATE_TYPE](header, flow > 0.0, flow, *[float('nan')] * 3)
+    return types.types[STATE_TYPE](header, flow > 0.0, flow, *[float('nan')] * 3, brush)
 
 
 def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:

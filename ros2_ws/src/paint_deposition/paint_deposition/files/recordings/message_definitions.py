@@ -24,6 +24,7 @@ float64 flow
 float64 shaping_air_l_per_min
 float64 bell_speed_rpm
 float64 voltage_kv
+int32 brush
 """
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
+from paint_deposition.motion.trajectory import numbered
+from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # What a state tells of the process while the gun sprays.
@@ -30,6 +31,7 @@ class Switching:
 
     Attributes:
         stamps_ns: (M,) int64 times at which the flow changes; flow: (M,) from then on.
+        brush: (M,) int64 number of the brush from then on; empty where nothing tells it.
         settings: median of each setting that the states tell.
         by_log_time: whether the times are those at which messages were logged.
         notes: what was understood, a line each.
@@ -37,6 +39,7 @@ class Switching:
 
     stamps_ns: np.ndarray
     flow: np.ndarray
+    brush: np.ndarray
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
     notes: tuple[str, ...] = ()
@@ -119,7 +122,7 @@ def read_switching(bag: Bag, name: str) -> Switching:
     )
     if not known.all():
         note += f'; {np.count_nonzero(~known)} values that are no number are left out'
-    return Switching(stamps, on.astype(float), {}, not stamped.all(), (note,))
+    return Switching(stamps, on.astype(float), numbered([]), {}, not stamped.all(), (note,))
 
 
 def _level(text: str | None, name: str) -> float:
@@ -130,13 +133,16 @@ def _level(text: str | None, name: str) -> float:
 
 
 def _states(bag: Bag, topic: BagTopic) -> Switching:
-    """Times and flows of all changes of AtomizerState or Bool."""
-    changes: list[tuple[int, float]] = []
+    """Times, flows and brushes of all changes of AtomizerState or Bool.
+
+    States recorded before they had a brush are of the only one.
+    """
+    changes: list[tuple[int, float, int]] = []
     told: dict[str, list[float]] = {}
     without_flow = 0
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
-            changes.append((log_time_ns, relative_flow(bool(message.data))))
+            changes.append((log_time_ns, relative_flow(bool(message.data)), ONLY_BRUSH))
             continue
         stamp = stamp_ns(message.header)
         if stamp == 0:
@@ -146,7 +152,7 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
             )
         flow = relative_flow(message.spraying, message.flow)
         without_flow += bool(message.spraying) and flow == 0.0
-        changes.append((stamp, flow))
+        changes.append((stamp, flow, int(getattr(message, 'brush', ONLY_BRUSH))))
         for name in SETTINGS:
             value = getattr(message, name, np.nan)
             if message.spraying and np.isfinite(value):
@@ -154,8 +160,9 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     changes.sort(key=lambda change: change[0])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return Switching(
-        np.array([stamp for stamp, _ in changes], dtype=np.int64),
-        np.array([flow for _, flow in changes], dtype=float),
+        np.array([stamp for stamp, *_ in changes], dtype=np.int64),
+        np.array([flow for _, flow, _ in changes], dtype=float),
+        numbered([brush for *_, brush in changes]),
         {name: float(np.median(values)) for name, values in told.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),

@@ -11,7 +11,7 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import ReliabilityPolicy
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.jumps import Jumps
@@ -61,7 +61,9 @@ class AtomizerInput:
         states_received: since the node started.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
         sprays: whether the newest state says that the gun sprays; False before any.
-        refused_states: states that say no time or no possible flow, since the last reset.
+        refused_states: states that say no time, no possible flow or a brush that the model does
+            not have, since the last reset.
+        refusals_of_states: why, in words, each once.
         states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
         jumps: steps between poses that no robot makes, since the last reset.
@@ -111,6 +113,7 @@ class AtomizerInput:
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
         self.refused_states = 0
+        self.refusals_of_states: set[str] = set()
         self.states_without_flow = 0
         self.without_frame = 0
         self.intervals = Intervals()
@@ -192,9 +195,11 @@ class AtomizerInput:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')
             flow = relative_flow(message.spraying, message.flow)
-        except RecordingError as error:
-            if not self.refused_states:
+            self._node.film.add_trigger(TriggerChange(stamp, flow, message.brush))
+        except PaintError as error:
+            if str(error) not in self.refusals_of_states:
                 self._node.get_logger().error(f'atomizer/state refused: {error}')
+            self.refusals_of_states.add(str(error))
             self.refused_states += 1
             return
         if message.spraying and flow == 0.0:
@@ -202,7 +207,6 @@ class AtomizerInput:
                 self._node.get_logger().warning(f'atomizer/state {SPRAYS_NOTHING}')
             self.states_without_flow += 1
         self.sprays = flow > 0.0
-        self._node.film.add_trigger(TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:
         message = PoseProgress(

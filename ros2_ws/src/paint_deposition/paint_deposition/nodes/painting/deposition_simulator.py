@@ -231,6 +231,7 @@ class DepositionSimulator(PaintingNode):
     def _film_to_save(self, stem: str, film: FilmIntegrator) -> Callable[[], list[Path]]:
         """A function that writes the film as it is now and returns the paths."""
         surface, film_um, values = self.surface, film.film_um, self.values
+        statistics = self.statistics(film_um, film.emitted_cm3)
         details = {
             'mesh_file': values['mesh_file'],
             'mesh_id': self.mesh_id,
@@ -238,6 +239,9 @@ class DepositionSimulator(PaintingNode):
             'down': surface.down,
             'model_file': values['model_file'],
             'effects': [effect.id for effect in self.film.model.effects],
+            'paint': film.used.figures(statistics.mean_um, statistics.painted_volume_cm3)
+            if self.film.model.brushes
+            else None,
             'poses': self.film.counts.to_dict(),
             'poses_in_other_frames': dict(self.input.refused_frames),
         }
@@ -246,7 +250,7 @@ class DepositionSimulator(PaintingNode):
             Path(values['output_directory']),
             surface,
             film_um,
-            self.statistics(film_um, film.emitted_cm3),
+            statistics,
             stem=stem,
             statistics_file=f'{stem}.json',
             details=details,

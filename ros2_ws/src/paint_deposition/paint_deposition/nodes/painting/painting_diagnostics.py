@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
+from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
@@ -16,6 +17,7 @@ BUSY = 0.8
 RECENT_S = 5.0
 # A gun that sprays is moved; a robot that only slows down still sends poses.
 SILENT_S = 2.0
+NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
 # What happened to poses and states, in words, by the name of its count.
 IN_WORDS = {
     'gaps': 'gaps',
@@ -48,7 +50,7 @@ def poses_status(node: PaintingNode) -> Status:
         'states refused': source.refused_states,
         'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
-        'gun': _gun_in_words(node.film.flow),
+        'gun': _gun_in_words(node.film),
     }
     now_s = time.monotonic()
     if source.refused_frames and now_s - source.refused_s < RECENT_S:
@@ -69,6 +71,9 @@ def poses_status(node: PaintingNode) -> Status:
     if source.sprays and silent_s > SILENT_S:
         since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
         wrong.insert(0, f'the gun sprays, and no pose has come {since}')
+    wrong += sorted(source.refusals_of_states)
+    if values['gun'] == NO_BRUSH and counts.received:
+        wrong.insert(0, NO_BRUSH)
     if len(source.pose_publishers) > 1:
         wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
@@ -118,10 +123,11 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     return Status(level, message, values)
 
 
-def _gun_in_words(flow: float | None) -> str:
-    if flow is None:
-        return 'no state seen: always spraying'
-    return f'spraying, flow {flow:g}' if flow else 'off'
+def _gun_in_words(film: LiveFilm) -> str:
+    if film.flow is None:
+        return NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
+    of_brush = f', brush {film.brush}' if film.brush else ''
+    return f'spraying, flow {film.flow:g}{of_brush}' if film.flow else 'off'
 
 
 def painting_tasks(

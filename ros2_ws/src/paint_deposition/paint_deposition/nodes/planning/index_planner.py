@@ -11,8 +11,10 @@ from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.model.brush import MOST
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
@@ -35,6 +37,11 @@ SPACING_M = 0.02
 
 PLANNER = dict(
     **model_parameters(''),
+    brush=NodeParameter(
+        0,
+        'Number of the brush to plan for, of a model with several; 0: the only one [-]',
+        (0, MOST),
+    ),
     width_m=NodeParameter(
         0.0, 'Width to paint where a request gives none; 0: none [m]', (0.0, 100.0)
     ),
@@ -115,13 +122,18 @@ class IndexPlanner(PaintNode):
     ) -> RecommendIndex.Response:
         self._asked += 1
         try:
-            answer = recommend(self._model, self._asked_for(request))
+            answer = recommend(self._of_brush(), self._asked_for(request))
         except PaintError as error:
             self._last = Status(WARN, str(error))
             response.message = str(error)
             return response
         self._last = Status(OK, answer.sentence)
         return _fill(response, answer)
+
+    def _of_brush(self) -> DepositionModel:
+        """The model, or the brush of it that is set."""
+        brush = self.values['brush']
+        return self._model.with_brush(brush) if brush else self._model
 
     def _asked_for(self, request: RecommendIndex.Request) -> Request:
         # In requests and parameters 0 stands for none.
@@ -149,7 +161,7 @@ class IndexPlanner(PaintNode):
         frame_id = values['frame_id'].lstrip('/')
         planned = plan(
             surface,
-            self._model,
+            self._of_brush(),
             PlanRequest(
                 direction=values['direction'],
                 speed_m_per_s=values['speed_m_per_s'] or None,

@@ -15,7 +15,7 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, stamp_ns
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 
@@ -67,5 +67,6 @@ def _state_of(recorded: Any) -> AtomizerState:
     for name, kind in AtomizerState.get_fields_and_field_types().items():
         if kind == 'double':
             setattr(state, name, float(getattr(recorded, name, math.nan)))
+    state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
     state.spraying = bool(recorded.spraying)
     return state

@@ -53,10 +53,8 @@ class FilmAtPoints:
         self._surface, self._rows = surface, rows
         points = surface.points().select(rows)
         self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
-        self.step_m = max(
-            model.max_step_m,
-            min(model.planar.sigma1_m, model.planar.sigma2_m) / STEPS_PER_SIGMA,
-        )
+        narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
+        self.step_m = max(model.max_step_m, narrow / STEPS_PER_SIGMA)
         self._settles = [e for e in model.effects if type(e).on_film is not Effect.on_film]
 
     def film_um(self, programme: Programme) -> np.ndarray:

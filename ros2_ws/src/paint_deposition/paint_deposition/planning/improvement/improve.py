@@ -102,7 +102,7 @@ def timed_for_evenness(
     before = [one.film_um(programme) for one in films]
     mean = float(before[0].mean())
     target = wish.target_um or mean
-    narrow = min(min(m.planar.sigma1_m, m.planar.sigma2_m) for m in models)
+    narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
     search = _Search(films, target, target / mean, limits, wish, spacing, progress, explained)
     relaxed = replace(programme, openings=widened(programme, limits))

@@ -47,10 +47,10 @@ def moves_of(programme: Programme, limits: Limits) -> list[Move]:
         else:
             pace = float(speed[before : max(row, before + 1)].max())
         pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, SLOWEST_M_PER_S)
-        flow = programme.openings[number].flow if spraying else 1.0
-        moves.append(
-            Move(whole.positions_m[row], whole.quaternions_xyzw[row], pace, spraying, flow=flow)
-        )
+        pose = whole.positions_m[row], whole.quaternions_xyzw[row]
+        opening = programme.openings[max(number, 0)]
+        flow = opening.flow if spraying else 1.0
+        moves.append(Move(*pose, pace, spraying, flow=flow, brush=opening.brush))
     return moves
 
 

@@ -10,7 +10,8 @@ from paint_deposition.errors import PlanError
 from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
 from paint_deposition.motion.screening import PoseScreen
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import Trajectory, numbered
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Intervals that travel less have no speed: the gun waits or turns.
 STANDING_M = 1e-6
@@ -29,11 +30,13 @@ class Opening:
     Attributes:
         on_m, off_m: travel of the TCP at which it opens and closes.
         flow: relative to the calibrated one.
+        brush: number of the brush; 0 is the only one.
     """
 
     on_m: float
     off_m: float
     flow: float
+    brush: int = ONLY_BRUSH
 
 
 @dataclass(frozen=True)
@@ -160,13 +163,14 @@ class Programme:
         whole = self.with_poses_at(np.array([[o.on_m, o.off_m] for o in self.openings]).ravel())
         clock = whole.clock_s
         stamps = BEGIN_NS + np.round(clock * 1e9).astype(np.int64)
-        triggers, flows = [], []
+        triggers, flows, brushes = [], [], []
         for opening in self.openings:
             # Standing at either end is outside.
             on = np.interp(opening.on_m + STANDING_M, whole.travel_m, clock)
             off = np.interp(opening.off_m - STANDING_M, whole.travel_m, clock)
             triggers += [BEGIN_NS + round(on * 1e9), BEGIN_NS + round(off * 1e9)]
             flows += [opening.flow, 0.0]
+            brushes += [opening.brush] * 2
         return replace(
             self.given,
             stamps_ns=stamps,
@@ -174,6 +178,7 @@ class Programme:
             quaternions_xyzw=whole.quaternions_xyzw,
             trigger_stamps_ns=np.array(triggers, np.int64),
             trigger_flow=np.array(flows),
+            trigger_brush=numbered(brushes),
         )
 
 
@@ -186,39 +191,38 @@ def _openings(
     trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_gap_ns: int
 ) -> tuple[Opening, ...]:
     """Where the gun is open on the way; gaps between poses close it."""
-    changes = dict(
-        zip(trajectory.trigger_stamps_ns.tolist(), trajectory.trigger_flow, strict=True)
-    )
+    changes = {stamp: (flow, brush) for stamp, flow, brush in trajectory.triggers}
     if not changes:
-        changes = {int(stamps_ns[0]): 1.0}
+        changes = {int(stamps_ns[0]): (1.0, ONLY_BRUSH)}
     first, last = int(stamps_ns[0]), int(stamps_ns[-1])
     times = sorted(changes)
     ends = [*times[1:], last]
-    spans = [
-        (max(begin, first), min(end, last), float(changes[begin]))
+    spans: list[tuple[int, int, float, int]] = [
+        (max(begin, first), min(end, last), *changes[begin])
         for begin, end in zip(times, ends, strict=True)
-        if changes[begin] > 0.0 and min(end, last) > max(begin, first)
+        if changes[begin][0] > 0.0 and min(end, last) > max(begin, first)
     ]
     gaps = np.flatnonzero(np.diff(stamps_ns) > max_gap_ns)
     for gap in gaps.tolist():
         a, b = int(stamps_ns[gap]), int(stamps_ns[gap + 1])
         spans = [
             piece
-            for begin, end, flow in spans
-            for piece in ((begin, min(end, a), flow), (max(begin, b), end, flow))
+            for begin, end, flow, brush in spans
+            for piece in ((begin, min(end, a), flow, brush), (max(begin, b), end, flow, brush))
             if piece[1] > piece[0]
         ]
-    merged: list[list[tuple[int, int, float]]] = []
+    merged: list[list[tuple[int, int, float, int]]] = []
     for span in spans:
-        if merged and merged[-1][-1][1] == span[0]:
+        goes_on = merged and merged[-1][-1][1] == span[0] and merged[-1][-1][3] == span[3]
+        if goes_on:
             merged[-1].append(span)
         else:
             merged.append([span])
     openings = []
     for pieces in merged:
         at = np.interp([pieces[0][0], pieces[-1][1]], stamps_ns, travel_m)
-        seconds = np.array([end - begin for begin, end, _ in pieces], float)
-        flow = float(np.average([flow for *_, flow in pieces], weights=seconds))
+        seconds = np.array([end - begin for begin, end, *_ in pieces], float)
+        flow = float(np.average([flow for *_, flow, _ in pieces], weights=seconds))
         if at[1] - at[0] > STANDING_M:
-            openings.append(Opening(float(at[0]), float(at[1]), flow))
+            openings.append(Opening(float(at[0]), float(at[1]), flow, pieces[0][3]))
     return tuple(openings)

@@ -88,6 +88,7 @@ def chosen(
                 min(_crossing(place, worth, first, first - 1), given[number].on_m + cut),
                 max(_crossing(place, worth, last, last + 1), given[number].off_m - cut),
                 opening.flow,
+                opening.brush,
             )
         )
     return tuple(found)

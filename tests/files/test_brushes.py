@@ -1,0 +1,201 @@
+"""Brushes in files: models, tables, robot programs and bags name them alike."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from brushes import NARROW, SET_POINTS, switched, two_brushes
+from files.recorded import START_NS, Messages, pose_entries, straight_pass, write_bag
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.errors import ModelError, RecordingError
+from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.model.brush import SetPoints
+from paint_deposition.motion.programmed import Move
+
+MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
+HEAD = 'x_m,y_m,z_m,qx,qy,qz,qw'
+POSE = '0,0,0,1,0,0,0'
+
+
+def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    write_model(path, MODEL)
+    assert read_model(path) == MODEL
+    content = yaml.safe_load(path.read_text())
+    assert 'planar' not in content
+    assert content['brushes'] == {
+        brush.number: {'planar': brush.planar.model_dump(), **SET_POINTS[brush.number]}
+        for brush in MODEL.brushes
+    }
+    assert all('#' in line for line in path.read_text().splitlines() if ': ' in line)
+    other = MODEL.of_brushes(
+        [*MODEL.brushes[:1], MODEL.brushes[1].model_copy(update={'solids': 0.5})],
+        effects=MODEL.effects,
+    )
+    assert model_digest(other) != model_digest(MODEL) == model_digest(read_model(path))
+
+
+def test_brushes_come_in_any_order(tmp_path: Path):
+    path = tmp_path / 'model.yaml'
+    path.write_text('brushes: {7: {planar: {r_m: 0.1}}, 2: {planar: {r_m: 0.2}, solids: 0.5}}')
+    brushes = read_model(path).brushes
+    assert [(b.number, b.planar.r_m, b.solids) for b in brushes] == [(2, 0.2, 0.5), (7, 0.1, None)]
+
+
+@pytest.mark.parametrize(
+    ('text', 'message'),
+    [
+        ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
+        ('brushes: 3', 'brushes is 3; expected a mapping (key: value)'),
+        ('brushes: {0: {planar: {}}}', 'brushes: 0 is no number of a brush; give 1, 2 and so on'),
+        ('brushes: {a: {planar: {}}}', "brushes: 'a' is no number of a brush; give 1, 2 and so"),
+        ('brushes: {1: 3}', 'brushes, 1 is 3; expected a mapping (key: value)'),
+        ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
+        (
+            'brushes: {1: {planar: {}, bell_speed: 1}}',
+            "brushes, 1: unknown key 'bell_speed'; did you mean 'bell_speed_rpm'?",
+        ),
+        (
+            'brushes: {4: {planar: {K1: 1}}}',
+            "brushes, 4: planar: unknown key 'K1'; did you mean 'K1_cm3_per_s'?",
+        ),
+        (
+            'brushes: {1: {planar: {}, solids: 45}}',
+            'brushes, 1: solids is 45; expected a number above 0 and up to 1: share of solids in',
+        ),
+        (
+            'brushes: {1: {planar: {}, voltage_kv: true}}',
+            'brushes, 1: voltage_kv is True; expected a number above 0 and up to 200',
+        ),
+        (
+            'planar: {}\nbrushes: {1: {planar: {}}}',
+            'planar and brushes are both given; keep one of them',
+        ),
+        ('brush: {1: {planar: {}}}', "unknown key 'brush'; did you mean 'brushes'?"),
+    ],
+)
+def test_what_is_no_brush_is_refused_in_one_line(tmp_path: Path, text, message):
+    path = tmp_path / 'model.yaml'
+    path.write_text(text)
+    with pytest.raises(ModelError) as refused:
+        read_model(path)
+    assert str(refused.value).startswith(f'{path}: {message}')
+    assert '\n' not in str(refused.value)
+
+
+def test_every_set_point_has_a_range_and_says_what_it_is():
+    for name, info in SetPoints.model_fields.items():
+        assert info.description, name
+        for impossible in (0.0, -1.0, 1e9):
+            with pytest.raises(ValueError, match=name):
+                SetPoints(**{name: impossible})
+
+
+def test_a_table_of_poses_names_the_brush_from_its_row_on(tmp_path: Path):
+    path = tmp_path / 'poses.csv'
+    path.write_text(
+        f't,{HEAD},gun,brush\n0,{POSE},1,2\n0.1,{POSE},1,3\n0.2,{POSE},0,0\n0.3,{POSE},1,2\n'
+    )
+    read = read_recording(path)
+    assert read.trigger_flow.tolist() == [1.0, 1.0, 0.0, 1.0]
+    assert read.trigger_brush.tolist() == [2, 3, 0, 2]
+    assert 'gun by gun, brush by brush' in read.notes[0]
+    # Without a trigger the gun sprays throughout, with these brushes.
+    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},3\n')
+    assert [(flow, brush) for _, flow, brush in read_recording(path).triggers] == [(1, 2), (1, 3)]
+    path.write_text(f't,{HEAD},brush\n0,{POSE},2\n0.1,{POSE},2.5\n')
+    with pytest.raises(RecordingError, match=r'line 3: brush is 2\.5; give the number of a brush'):
+        read_recording(path)
+
+
+def test_a_programmed_table_takes_the_brush_of_each_move(tmp_path: Path):
+    path = tmp_path / 'passes.csv'
+    path.write_text(
+        f'{HEAD},speed_m_per_s,spraying,brush\n'
+        '0,0,0,1,0,0,0,1,0,0\n0.5,0,0,1,0,0,0,1,1,4\n1,0,0,1,0,0,0,1,1,9\n2,0,0,1,0,0,0,1,0,9\n'
+    )
+    assert read_recording(path).triggers == [
+        (0, 1.0, 4), (500_000_000, 1.0, 9), (1_000_000_000, 0.0, 9)
+    ]  # fmt: skip
+
+
+def moves(*guns: tuple[float, float, int]) -> list[Move]:
+    """Steps of 0.1 m along x, each with its flow (0 is off) and brush."""
+    return [
+        Move(np.array([0.1 * k, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), 0.5, flow > 0,
+             flow=flow or 1.0, brush=brush)
+        for k, (flow, brush) in enumerate(guns)
+    ]  # fmt: skip
+
+
+def test_a_written_program_switches_brushes_and_reads_back(tmp_path: Path):
+    path = tmp_path / 'passes.mod'
+    written = moves((0, 0), (1, 2), (1, 2), (0, 0), (0.8, 3), (0, 0), (1, 2))
+    path.write_text(module_text(written))
+    assert path.read_text().count('GOp:=goBrush') == 2
+    read = read_program(path)
+    on = [(m.flow, m.brush) for m in read.moves if m.spraying]
+    assert on == [(1.0, 2), (1.0, 2), (0.8, 3), (1.0, 2)]
+    # A program without numbers does without the output.
+    assert 'goBrush' not in module_text(moves((0, 0), (1, 0)))
+
+
+def test_a_brush_that_changes_while_the_gun_is_open_is_written(tmp_path: Path):
+    path = tmp_path / 'passes.mod'
+    path.write_text(module_text(moves((0, 0), (1, 2), (0.9, 3), (0, 0))))
+    read = read_program(path)
+    assert [(m.flow, m.brush) for m in read.moves if m.spraying] == [(1.0, 2), (0.9, 3)]
+
+
+def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
+    axes = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
+    target = [f'[[{100 * k},0,0],[1,0,0,0],{axes}]' for k in range(6)]
+    path = tmp_path / 'paint.mod'
+    path.write_text(
+        'MODULE Paint\nPROC main()\n'
+        rf"""
+        PaintL {target[0]},v600,z50,tBell;
+        SetBrush 3;
+        PaintL {target[1]},v600,z50,tBell;
+        SetBrush 5\X:=150;
+        PaintL {target[2]},v600,z50,tBell;
+        SetBrush 0;
+        PaintL {target[3]},v600,z50,tBell;
+        SetGO goBrush,7;
+        PaintL {target[4]},v600,z50,tBell;
+        """
+        'ENDPROC\nENDMODULE\n'
+    )
+    program = read_program(path)
+    assert [m.brush for m in program.moves if m.spraying] == [0, 3, 5, 7]
+    assert any('the plane of SetBrush is not followed' in note for note in program.notes)
+    path.write_text(path.read_text().replace('SetBrush 3', 'SetBrush 2.5'))
+    with pytest.raises(RecordingError, match=r'line 5: setbrush takes the number of a brush, not'):
+        read_program(path)
+
+
+def test_a_bag_keeps_brushes(tmp_path: Path):
+    motion = straight_pass(20)
+    stamps = START_NS + np.array([0, 4, 9]) * 1_000_000
+    motion = replace(motion, **switched(stamps, (1.0, 2), (1.0, 3), (0.0, 0)))
+    read = read_trajectory(write_pose_bag(tmp_path / 'bag', motion), None, '/atomizer/state')
+    assert read.triggers == motion.triggers
+
+
+def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: Path):
+    messages = Messages()
+    assert 'brush' not in messages.store.fielddefs['paint_msgs/msg/AtomizerState'][1]
+    entries = pose_entries(straight_pass(triggers=False))
+    entries += [('/state', START_NS + 1, messages.state(START_NS, True, 0.8))]
+    bag = write_bag(tmp_path / 'old', sorted(entries, key=lambda entry: entry[1]))
+    assert read_trajectory(bag, None, '/state').triggers == [(START_NS, 0.8, 0)]
+    assert MODEL.with_brush(1).pattern_rows(np.array([0])).tolist() == [0]
+    assert MODEL.with_brush(1).planar == NARROW

@@ -1,0 +1,169 @@
+"""Brushes: each lays its own paint, and together they lay the sum."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from brushes import NARROW, WIDE, switched, two_brushes
+from paint_deposition.api.geometry import require_brushes
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.pose_lag import PoseLag
+from paint_deposition.effects.library.trigger_lag import TriggerLag
+from paint_deposition.errors import ModelError
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.layout import term_weights
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.paint_used import seconds_by_pattern
+from paint_deposition.model.brush import Brush
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from scenes import lying_plane, stamps_ns, straight_pass, weaving
+
+MODEL = two_brushes()
+TIMES_S = np.arange(0.0, 4.0, 0.004)
+# Closed at first; from brush 1 straight to brush 2; a state that is repeated; off in between.
+CHANGES = switched(
+    stamps_ns([0.2, 0.5013, 1.3, 1.7502, 2.0, 2.2, 2.7, 3.3]),
+    (0.0, 7), (1.0, 1), (0.7, 2), (0.0, 2), (0.0, 1), (0.8, 2), (0.8, 2), (1.2, 1),
+)  # fmt: skip
+
+
+def painted(motion: Trajectory, model: DepositionModel, points=None, precision='single'):
+    path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
+    integrator = FilmIntegrator(points or lying_plane(), model, precision)
+    integrator.add(path)
+    return integrator
+
+
+def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
+    """The same with the gun open while this brush is chosen only."""
+    return replace(
+        motion, trigger_flow=np.where(motion.trigger_brush == number, motion.trigger_flow, 0.0)
+    )
+
+
+@pytest.mark.parametrize(('number', 'planar'), [(1, NARROW), (2, WIDE)])
+def test_what_each_brush_emits_is_on_the_plane(number, planar):
+    """1 um m^2 is 1 cm^3: the film summed over the plane is that brush's K1 times its time."""
+    ends = (-0.3, 0.0, 0.25), (0.3, 0.0, 0.25)
+    trigger = switched(stamps_ns([0.3337, 1.5]), (0.8, number), (0.0, 0))
+    motion = straight_pass(np.arange(0.0, 2.0, 0.02), *ends, **trigger)
+    points = lying_plane(1.2, 161)
+    film = painted(motion, MODEL, points, 'double')
+    emitted = planar.K1_cm3_per_s * 0.8 * (1.5 - 0.3337)
+    assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
+    assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
+
+
+def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
+    motion = replace(weaving(TIMES_S), **CHANGES)
+    both = painted(motion, MODEL, precision='double')
+    apart = [
+        painted(
+            with_one_brush(motion, n),
+            DepositionModel(planar=planar),
+            precision='double',
+        )
+        for n, planar in ((1, NARROW), (2, WIDE))
+    ]
+    total = sum(one.film_um for one in apart)
+    # Sub-steps are cut alike; the sums differ in their order alone.
+    assert np.abs(both.film_um - total).max() < 1e-5 * total.max()
+    assert both.emitted_cm3 == pytest.approx(sum(one.emitted_cm3 for one in apart), rel=1e-12)
+    assert min(one.film_um.max() for one in apart) > 1.0
+
+
+@pytest.mark.parametrize('number', [0, 5])
+def test_one_brush_is_its_pattern_to_the_last_bit(number):
+    brush = {'trigger_brush': np.where(CHANGES['trigger_flow'] > 0.0, number, 0)}
+    motion = replace(weaving(TIMES_S), **{**CHANGES, **brush})
+    plain = painted(replace(motion, trigger_brush=np.empty(0, np.int64)), DepositionModel())
+    one = DepositionModel.of_brushes([Brush(number=5, planar=DepositionModel().planar)])
+    assert np.array_equal(painted(motion, one).film_um, plain.film_um)
+    # A cell that numbers its only brush needs no other model.
+    assert np.array_equal(painted(motion, DepositionModel()).film_um, plain.film_um)
+
+
+@pytest.mark.parametrize('effect', [None, TriggerLag(rise_s=0.05, fall_s=0.08)])
+@pytest.mark.parametrize('batch', [3, 10])
+def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
+    model = MODEL.with_effect(effect) if effect else MODEL
+    motion = replace(weaving(TIMES_S), **CHANGES)
+    columns = motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw
+    events = [
+        (int(motion.stamps_ns[k]), PoseBatch(*(column[k : k + batch] for column in columns)))
+        for k in range(0, len(motion), batch)
+    ]
+    events += [(stamp, TriggerChange(stamp, *gun)) for stamp, *gun in motion.triggers]
+    film, expected = LiveFilm(lying_plane(), model), painted(motion, model)
+    for _, event in sorted(events, key=lambda item: item[0]):
+        film.follow([event])
+    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
+    assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
+    assert (film.flow, film.brush) == (1.2, 1)
+
+
+def test_a_closed_gun_drips_with_the_brush_that_was_open():
+    """Behind a closing the flow falls with a time constant: tau times the flow, of that brush."""
+    motion = replace(straight_pass(TIMES_S), **switched(stamps_ns([0.5, 1.5]), (1.0, 2), (0.0, 1)))
+    model = MODEL.with_effect(TriggerLag(fall_s=0.1))
+    path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
+    sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
+    assert seconds_by_pattern(model, sprayed) == pytest.approx([0.0, 1.1], rel=1e-6)
+
+
+@pytest.mark.parametrize('lag_s', [0.03, -0.03])
+def test_a_lag_takes_the_brush_along(lag_s):
+    motion = replace(
+        straight_pass(TIMES_S),
+        **switched(stamps_ns([0.5, 1.5, 2.5, 3.0]), (1.0, 2), (0.0, 2), (1.0, 1), (0.0, 0)),
+    )
+    model = MODEL.with_effect(PoseLag(lag_s=lag_s))
+    path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
+    sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
+    assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
+
+
+def test_terms_are_kept_apart_by_brush():
+    path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
+    film = FilmIntegrator(lying_plane(), MODEL, 'double')
+    terms = film.terms(film.steps(path))
+    weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
+    film.add(path)
+    assert np.abs(weights @ terms - film.film_um).max() < 1e-9 * film.film_um.max()
+
+
+def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
+    motion = replace(weaving(TIMES_S), **switched(stamps_ns([0.5]), (1.0, 3)), source='run')
+    with pytest.raises(ModelError, match=r'^run: brush 3 is not in the model; its brushes: 1, 2$'):
+        require_brushes(motion, MODEL)
+    film = LiveFilm(lying_plane(), MODEL)
+    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 2))
+    with pytest.raises(ModelError, match=r'^brush 3 is not in the model; its brushes: 1, 2$'):
+        film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0, 3))
+    with pytest.raises(ModelError, match=r'^no brush is named; its brushes: 1, 2$'):
+        film.add_trigger(TriggerChange(int(stamps_ns(0.5)), 1.0))
+    # A closed gun has no brush.
+    film.add_trigger(TriggerChange(int(stamps_ns(0.6)), 0.0, 3))
+    assert [event.brush for event in film.log.events] == [2, 3]
+
+
+def test_one_pattern_does_not_stand_for_several_brushes():
+    motion = replace(weaving(TIMES_S), **CHANGES, source='run')
+    with pytest.raises(ModelError, match='brushes 1, 2 are used and the model has the pattern of'):
+        require_brushes(motion, DepositionModel())
+    film = LiveFilm(lying_plane(), DepositionModel())
+    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 1))
+    with pytest.raises(ModelError, match='brushes 1, 2 are used'):
+        film.add_trigger(TriggerChange(int(stamps_ns(0.2)), 1.0, 2))
+
+
+def test_a_new_model_must_have_the_brushes_in_use():
+    film = LiveFilm(lying_plane(), MODEL)
+    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 2))
+    film.reset()
+    with pytest.raises(ModelError, match='brush 2 is not in the model; its brushes: 4'):
+        film.use(DepositionModel.of_brushes([Brush(number=4, planar=NARROW)]))
+    assert film.model is MODEL
