@@ -142,7 +142,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Experiments under one process setting.
+    """Experiments under one process setting, or with a few brushes.
 
     Arrays over the N readings or the P points of a campaign hold those of the first experiment
     first, then those of the second, and so on.
