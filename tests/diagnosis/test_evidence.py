@@ -21,7 +21,8 @@ from paint_deposition.diagnosis.evidence import (
 from paint_deposition.diagnosis.model_space import SIZES
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.model.coordinates import PATTERN
 
 READINGS = 30
 

@@ -14,9 +14,10 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.fitting.estimates import scaled_covariance
 from paint_deposition.fitting.forward import Forward
 from paint_deposition.fitting.least_squares import derivatives, fit_readings
-from paint_deposition.fitting.parameters import PATTERN, FreeParameters
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.random_effects import LEVEL_SHARE, SESSION_UM
 from paint_deposition.fitting.study import TEXTURE_SHARE, Study
+from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import spray_path

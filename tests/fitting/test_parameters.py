@@ -10,7 +10,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.fitting.parameters import PATTERN, SHAPE_DEVIATIONS, FreeParameters
+from paint_deposition.fitting.parameters import SHAPE_DEVIATIONS, FreeParameters
+from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.pattern import PlanarPattern
 
 PATTERNS = st.builds(

@@ -8,9 +8,9 @@ import pytest
 from diagnosis.linear import fit_linear
 from fitting.panels import painted_by, passes
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.fitting.parameters import PATTERN
 from paint_deposition.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
 from paint_deposition.fitting.study import Study
+from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.readings.campaign import Campaign, Experiment
 
 

@@ -18,6 +18,7 @@ from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
+from paint_deposition.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.fitting.panel_reach import Reach, short_reaches
 from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
@@ -52,7 +53,7 @@ def calibrate(
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
     """
     model = model or _model_of(campaign)
-    require_paint(campaign, model or DepositionModel())
+    require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
     return calibrated(campaign, model, seed, progress)
 
 
@@ -67,11 +68,13 @@ def compare(
         progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
-    require_paint(campaign, model or DepositionModel())
+    bell = with_brushes_of(campaign, DepositionModel())
+    (model or bell).require_brushes(campaign.brushes)
+    require_paint(campaign, model or bell)
     progress('fitting the pattern')
     reaches: tuple[Reach, ...] = ()
     if model is None:
-        study, fit = sifted(campaign, DepositionModel(), starts=STARTS)
+        study, fit = sifted(campaign, bell, starts=STARTS)
         model = fit.model
         reaches = short_reaches(study.campaign, model)
     else:
@@ -97,6 +100,8 @@ def compare_models(
     if not 2 <= len(models) <= MOST_MODELS:
         raise PaintError(f'{len(models)} models to compare; give 2 to {MOST_MODELS}')
     progress('fitting the pattern')
+    for model in models.values():
+        model.require_brushes(campaign.brushes)
     first = next(iter(models.values()))
     study, _ = sifted(campaign, first, first.effects)
     found = {}
@@ -168,9 +173,10 @@ def _start(
     if model is None and campaign.model_file:
         file = read_model_file(campaign.model_file)
         model, posterior = file.model, posterior or file.posterior
-    model = model or DepositionModel()
+    given = model or DepositionModel()
+    model = given.of_numbers(campaign.brushes).single('a diagnosis')
     require_paint(campaign, model)
-    return model, posterior
+    return model, posterior if len(given.brushes) <= 1 else None
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:

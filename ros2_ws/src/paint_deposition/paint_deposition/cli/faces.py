@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import paint_deposition as pd
-from paint_deposition.cli.options import NOT_NEGATIVE, POSITIVE, FiniteRange
+from paint_deposition.cli.options import NOT_NEGATIVE, POSITIVE, FiniteRange, paint_lines
 
 if TYPE_CHECKING:
     from paint_deposition.planning.clearance import Contact
@@ -79,6 +79,7 @@ def faces_lines(result: pd.PartPlan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
+    yield from paint_lines(result)
     if not result.contacts:
         gun = result.envelope
         yield (

@@ -288,6 +288,13 @@ def say_results(files: list[Path], as_json: bool, lines: Iterable[str], *, model
             click.echo(line)
 
 
+def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
+    """Paint sprayed, transfer efficiency and wet film, where the model's brushes tell them."""
+    from paint_deposition.film.paint_used import paint_sentence
+
+    return (line for line in [paint_sentence(result)] if line)
+
+
 def file_lines(files: Iterable[Path]) -> Iterator[str]:
     """The files of a folder of results."""
     return (f'  {file}' for file in files)

@@ -34,6 +34,7 @@ from paint_deposition.cli.options import (
     max_edge_length_option,
     model_option,
     output_option,
+    paint_lines,
     read_inputs,
     say_all,
     say_geometry,
@@ -318,6 +319,7 @@ def _plan_lines(result: pd.Plan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
+    yield from paint_lines(result)
     if len({(planned.style.standoff_m, planned.style.lean_rad) for planned in result.passes}) > 1:
         yield 'standoff and lean, pass by pass: ' + ', '.join(
             f'{planned.style.standoff_m * 1e3:.0f} mm '

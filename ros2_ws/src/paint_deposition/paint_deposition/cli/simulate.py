@@ -26,6 +26,7 @@ from paint_deposition.cli.options import (
     max_edge_length_option,
     motion_options,
     output_option,
+    paint_lines,
     say_all,
     say_results,
     write_results,
@@ -117,8 +118,6 @@ def simulate_command(
 
 
 def _lines(film: pd.Film) -> Iterator[str]:
-    from paint_deposition.film.paint_used import paint_sentence
-
     s, counts = film.statistics, film.counts
     yield film.geometry.sentence
     yield (
@@ -137,8 +136,7 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
-    if used := paint_sentence(film):
-        yield used
+    yield from paint_lines(film)
     yield film.geometry.facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (

@@ -66,12 +66,42 @@ class DepositionModel(BaseModel):
             raise ModelError(
                 f'brush {number} is not in the model: it has one pattern, planar, without a number'
             )
+        return self.painting_with(number)
+
+    def painting_with(self, number: int) -> 'DepositionModel':
+        """The same for what a motion calls its brush: without ``brushes`` any number will do."""
         row = int(self.pattern_rows(np.array([number]))[0])
         brushes = tuple(
             brush.model_copy(update={'interpolated': False})
             for brush in self.brushes[row : row + 1]
         )
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
+
+    def of_numbers(self, numbers: Iterable[int]) -> 'DepositionModel':
+        """A copy with the brushes of a motion only.
+
+        Raises:
+            ModelError: the model does not have one of them.
+        """
+        wanted = set(numbers)
+        self.require_brushes(wanted)
+        if len(self.brushes) <= 1:
+            return self
+        kept = [brush for brush in self.brushes if brush.number in wanted]
+        return DepositionModel.of_brushes(
+            (brush.model_copy(update={'interpolated': False}) for brush in kept),
+            projection=self.projection, effects=self.effects,
+        )  # fmt: skip
+
+    def with_others(self, given: 'DepositionModel') -> 'DepositionModel':
+        """A copy with the brushes of a given model that this one does not have."""
+        own = {brush.number for brush in self.brushes}
+        others = [brush for brush in given.brushes if brush.number not in own]
+        if not others:
+            return self
+        return DepositionModel.of_brushes(
+            (*self.brushes, *others), projection=self.projection, effects=self.effects
+        )
 
     @property
     def brush(self) -> int:

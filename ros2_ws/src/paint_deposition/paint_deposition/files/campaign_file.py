@@ -16,8 +16,11 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.words import UNITS_M, words_of
+from paint_deposition.model.brush import MOST, listed
+from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.readings.campaign import Campaign, Experiment
 
@@ -76,6 +79,9 @@ class _Entry(MotionSource, _Files):
     """An experiment as it is written."""
 
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
+    brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
+        None, description='the number of the brush, where the recording names none'
+    )
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
@@ -154,6 +160,7 @@ def _read_experiment(
     trajectory = read_motion(files['trajectory'], entry.model_copy(update={'urdf': urdf}))
     path, counts = spray_path(trajectory, entry.max_pose_gap_s)
     require_spraying(trajectory, path)
+    path = _with_brush(path, entry.brush)
     surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
     for note in (*surface.notes, *trajectory.notes):
         progress(f'{name}: {note}')
@@ -167,6 +174,18 @@ def _read_experiment(
     return Experiment.of(
         name, surface, path, readings, files, trajectory.settings, off, trajectory.frame_id
     )
+
+
+def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
+    """The path with the brush that the campaign names for it."""
+    if number is None:
+        return path
+    told = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
+    if told:
+        raise ReadingsError(
+            f'brush is {number}, and the recording names {listed(told)}; leave it out'
+        )
+    return path.with_(brush=np.full(len(path), number))
 
 
 def _layout(entry: _Entry) -> Layout:

@@ -12,6 +12,8 @@ from paint_deposition.model.coordinates import PATTERN
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 # Largest relative difference between two entries that should be the same.
 SAME = 1e-6
+# What coordinates of a brush begin with, and its asymmetry over that of the first.
+BRUSH, K3_RATIO = 'brush_', 'log_K3_ratio'
 REMEDY = 'copy the whole section from the file that was written, or take it out'
 
 
@@ -47,7 +49,8 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
     @model_validator(mode='after')
     def _is_a_distribution(self) -> 'Posterior':
         names = self.names
-        for pattern in PATTERN:
+        of_brushes = any(name.startswith(BRUSH) for name in names)
+        for pattern in () if of_brushes else PATTERN:
             if pattern.name not in names:
                 raise ValueError(f'mean has no {pattern.name}; {REMEDY}')
         if tuple(self.covariance) != names:
@@ -89,7 +92,9 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
         Raises:
             ModelError: naming the first one.
         """
-        known = [c.name for c in PATTERN]
+        shared = [c.name for c in PATTERN]
+        known = [f'{BRUSH}{b.number}.{n}' for b in model.brushes for n in (*shared, K3_RATIO)]
+        known += shared if len(model.brushes) <= 1 else []
         known += [f'{e.id}.{name}' for e in model.effects for name in e.coordinates().values()]
         for name in self.names:
             if name not in known:

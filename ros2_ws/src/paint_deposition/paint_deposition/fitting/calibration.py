@@ -14,7 +14,10 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.film.paint_used import impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.fitting.brush_figures import brush_figures
+from paint_deposition.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.fitting.collapse_fit import CollapseFit, fit_collapse
 from paint_deposition.fitting.estimates import Correlation, Estimate, correlations, estimates
 from paint_deposition.fitting.least_squares import Fit
@@ -121,6 +124,7 @@ class Calibration:
                 )
             ],
             'collapse': [None if panel is None else panel.to_dict() for panel in self.panels],
+            'brushes': brush_figures(self.model, self.parameters),
             'points': len(study),
             'readings': len(study.campaign.readings),
             'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
@@ -171,7 +175,7 @@ def calibrate(
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
     """
-    model = start or DepositionModel()
+    model = with_brushes_of(campaign, start or DepositionModel())
     study = Study.of(campaign, model.effects)
     check_enough(len(study))
     owner = study.campaign.experiment_of[study.campaign.means.owner]
@@ -197,7 +201,7 @@ def calibrate(
         'the ends'
         for reach in reaches
     ]
-    warnings += _warnings(study, fit, values, pairs)
+    warnings += [*impossible_brushes(fit.model), *_warnings(study, fit, values, pairs)]
     return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
 
@@ -221,15 +225,26 @@ def _best_fit(
     given: bool,
     seed: int,
 ) -> Fit:
-    """The better of the fits from the given pattern and from the first panel's collapse."""
+    """The better of the fits from the given patterns and from the first panels' collapses."""
     starts = [model] if given else []
-    first = next((panel for panel in panels if panel is not None), None)
-    if first is not None:
-        starts.insert(0, started_from(model, first))
+    guessed = _guessed(model, panels)
+    if guessed is not None:
+        starts.insert(0, guessed)
     fits = [
         study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts or [model]
     ]
     return min(fits, key=lambda fit: fit.objective)
+
+
+def _guessed(
+    model: DepositionModel, panels: tuple[PanelFit | None, ...]
+) -> DepositionModel | None:
+    """Each pattern from the first panel of its brush; None without any panel."""
+    patterns, found = list(model.patterns), [panel for panel in panels if panel]
+    for panel in reversed(found):
+        row = int(model.pattern_rows(np.array([panel.panel.brush]))[0])
+        patterns[row] = started_from(model.painting_with(panel.panel.brush), panel).planar
+    return model.with_patterns(patterns) if found else None
 
 
 def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.fitting.least_squares import STEP, Fit
-from paint_deposition.fitting.parameters import PATTERN_NAMES
+from paint_deposition.fitting.pattern_vector import PATTERN_NAMES, PatternVector
 
 TAILS = (0.025, 0.975)
 DRAWS = 4000
-# Place of phi among the pattern's parameters.
-PHASE = PATTERN_NAMES.index('phi_rad')
+# Places of K3 and phi among the parameters of a pattern.
+K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
 # A parameter whose width has not fallen below this share of its weak prior's was not measured.
 LEARNED = 0.5
 # A standard deviation this large a share of a positive value leaves no digit of it.
@@ -69,13 +69,16 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     learned = np.sqrt(np.diag(covariance)) <= LEARNED * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
-    k3, sigma_k3 = values[2], sigma[2]
-    found = []
+    pattern, found = fit.parameters.pattern, []
     for k, name in enumerate(_names(fit)):
-        if name in PATTERN_NAMES:
-            reason = _pattern_reason(name, values[k], sigma[k], learned, k3, sigma_k3)
+        row, place = divmod(k, len(PATTERN_NAMES))
+        if row < pattern.count:
+            own, first = learned[pattern.entries(row)], k - place
+            k3, sigma_k3 = values[first + K3], sigma[first + K3]
+            reason = _pattern_reason(PATTERN_NAMES[place], values[k], sigma[k], own, k3, sigma_k3)
         else:
-            reason = '' if learned[k] else 'its effect hardly shows at these points'
+            entry = k - len(pattern.names) + len(pattern)
+            reason = '' if learned[entry] else 'its effect hardly shows at these points'
         found.append(
             Estimate(
                 name,
@@ -118,13 +121,15 @@ def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
 
 
 def _names(fit: Fit) -> tuple[str, ...]:
-    return (*PATTERN_NAMES, *(f'{effect}.{name}' for effect, name in fit.parameters.varied))
+    parameters = fit.parameters
+    return (*parameters.pattern.names, *(f'{effect}.{name}' for effect, name in parameters.varied))
 
 
-def _around_phase(values: np.ndarray, centre: np.ndarray) -> np.ndarray:
-    """The phase, which runs in a circle, at most half a turn from its centre."""
+def _around_phase(values: np.ndarray, centre: np.ndarray, pattern: PatternVector) -> np.ndarray:
+    """The phases, which run in a circle, at most half a turn from their centres."""
     away = values - centre
-    away[..., PHASE] = np.remainder(away[..., PHASE] + np.pi, 2.0 * np.pi) - np.pi
+    phases = slice(PHASE, len(pattern.names), len(PATTERN_NAMES))
+    away[..., phases] = np.remainder(away[..., phases] + np.pi, 2.0 * np.pi) - np.pi
     return away
 
 
@@ -133,7 +138,8 @@ def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
     low, high = fit.parameters.bounds
     steps = STEP * np.eye(len(fit.vector))
     up, down = np.minimum(fit.vector + steps, high), np.maximum(fit.vector - steps, low)
-    change = _around_phase(fit.parameters.values(up), fit.parameters.values(down))
+    parameters = fit.parameters
+    change = _around_phase(parameters.values(up), parameters.values(down), parameters.pattern)
     by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
     return by_vector @ covariance @ by_vector.T
 
@@ -145,7 +151,7 @@ def _intervals(
     random = np.random.default_rng(0)
     vectors = random.multivariate_normal(fit.vector, covariance, DRAWS, method='cholesky')
     inside = np.clip(vectors, *fit.parameters.bounds)
-    away = _around_phase(fit.parameters.values(inside), values)
+    away = _around_phase(fit.parameters.values(inside), values, fit.parameters.pattern)
     low, high = np.quantile(away, TAILS, axis=0)
     return values + low, values + high
 

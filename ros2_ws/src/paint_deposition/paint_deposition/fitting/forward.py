@@ -1,12 +1,13 @@
 """The forward model: predictions at a campaign's points, fast enough to fit with."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numba
 import numpy as np
+from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -93,19 +94,21 @@ class Terms:
 
     Attributes:
         model: whose shape and effects they are.
-        predict_um: (P,) gauge readings [um] for (7,) weights of the film's terms.
+        predict_um: (P,) gauge readings [um] for (7 B,) weights of the films' terms, by brush.
     """
 
     model: DepositionModel
     predict_um: Callable[[np.ndarray], np.ndarray]
 
-    def with_gains_um(self, planar: PlanarPattern) -> np.ndarray:
-        """(P,) readings [um] with the gains K1, K2, K3 and phi of a pattern of this shape."""
-        return self.predict_um(term_weights(planar)[0])
+    def with_gains_um(self, patterns: Sequence[PlanarPattern]) -> np.ndarray:
+        """(P,) readings [um] with the gains K1, K2, K3 and phi of patterns of these shapes."""
+        return self.predict_um(np.concatenate([term_weights(p)[0] for p in patterns]))
 
     def derivatives_um(self) -> np.ndarray:
-        """(P, 7) derivatives of the readings by the pattern, as of ``layout.term_weights``."""
-        film, rows = term_weights(self.model.planar)
+        """(P, 7 B) derivatives of the readings by each pattern, as of ``layout.term_weights``."""
+        weights = [term_weights(planar) for planar in self.model.patterns]
+        film = np.concatenate([film for film, _ in weights])
+        rows = block_diag(*(rows for _, rows in weights))
         ends = [(self.predict_um(film + STEP * w), self.predict_um(film - STEP * w)) for w in rows]
         return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
 
@@ -148,7 +151,7 @@ class _Part:
         return self._film_um(stages.arrival, stages.slope)
 
     def terms(self, stages: _Stages) -> np.ndarray:
-        """(7, V) terms of that film."""
+        """(7 B, V) terms of that film."""
         integrator, steps = self._ready(stages.arrival, stages.slope)
         return integrator.terms(steps)[:, : len(self.points(stages.slope))]
 

@@ -11,13 +11,11 @@ from scipy.stats import norm, qmc
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward, Terms
 from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.fitting.pattern_vector import COS, SIN
 from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
-from paint_deposition.model.coordinates import PATTERN
 
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
-# Entries of the vector for the asymmetry.
-ASYMMETRY = slice(2, 4)
 SPREAD_OF_STARTS = 0.8
 # Shapes that are tried for each start that is kept.
 TRIED_A_START = 8
@@ -153,7 +151,10 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
     For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
     so that only these three need be searched (variable projection, Golub and Pereyra 1973).
     """
-    shape = [k for k, c in enumerate(PATTERN) if c.name in ('r_m', 'log_sigma1', 'log_sigma2')]
+    shape = [
+        k for k, name in enumerate(problem.parameters.names[: len(problem.parameters.pattern)])
+        if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
+    ]  # fmt: skip
     width = problem.prior.width
     spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
     tried = []
@@ -180,25 +181,16 @@ def derivatives(
 def _derivatives_um(
     forward: Forward, parameters: FreeParameters, vector: np.ndarray, terms: Terms
 ) -> np.ndarray:
-    by_pattern = terms.derivatives_um()
-    by_pattern[:, ASYMMETRY] = by_pattern[:, ASYMMETRY] @ _slopes_of_asymmetry(vector[ASYMMETRY])
-    columns = [by_pattern]
+    count = len(parameters.pattern)
+    columns = [terms.derivatives_um() @ parameters.pattern.jacobian(vector[:count])]
     _, high = parameters.bounds
-    for k in range(len(PATTERN), len(vector)):
+    for k in range(count, len(vector)):
         step = STEP if vector[k] + STEP <= high[k] else -STEP
         moved = vector.copy()
         moved[k] += step
         change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(terms.model)
         columns.append(change[:, np.newaxis] / step)
     return np.hstack(columns)
-
-
-def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:
-    """(2, 2) derivative of K3 cos(phi) and K3 sin(phi), where K3 <= 1, by the vector's entries."""
-    size = np.hypot(*entries)
-    if size <= 1.0:
-        return np.eye(2)
-    return (np.eye(2) - np.outer(entries, entries) / size**2) / size
 
 
 class _Problem:
@@ -230,7 +222,7 @@ class _Problem:
         """(P,) readings [um]; ``terms`` are those of a vector that differs in gains only."""
         if terms is None:
             terms = self.terms(vector)
-        return terms.with_gains_um(self.parameters.decode(vector).planar)
+        return terms.with_gains_um(self.parameters.decode(vector).patterns)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
         if self.lower is None:
@@ -247,33 +239,47 @@ class _Problem:
         return np.vstack([data, self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
-        """The same with K1 such that the mean film is right: the rest is then close enough."""
+        """The same with K1s such that the mean film is right: the rest is then close enough."""
         predicted = self.predict(vector)
         weights = self.sigma**-2.0
         most = float(np.sum(weights * predicted**2))
         ratio = float(np.sum(weights * predicted * self.measured)) / most if most > 0 else 1.0
         scaled = vector.copy()
-        scaled[0] += np.log(max(ratio, 1e-3))
+        pattern = self.parameters.pattern
+        scaled[[pattern.entries(row)[0] for row in range(pattern.count)]] += np.log(
+            max(ratio, 1e-3)
+        )
         return np.clip(scaled, self.low, self.high)
 
     def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
-        """The same with the best K1, K2, K3 and phi, as far as other effects are linear."""
-        # Ring alone, centre alone, and the ring lopsided along x and along y.
-        parts = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
-        parts[2:] += parts[0]
+        """The same with the best K1, K2, K3 and phi, as far as other effects are linear.
+
+        Of several brushes K3 and phi are those that are best for the first.
+        """
+        pattern = self.parameters.pattern
+        # For each brush: ring alone, centre alone, and the ring lopsided along x and along y.
+        one = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
+        one[2:] += one[0]
+        parts = np.kron(np.eye(pattern.count), one)
         films = np.stack([self.terms(vector).predict_um(part) for part in parts]) / self.sigma
-        films[2:] -= films[0]
-        even = EVENNESS * np.linalg.norm(films[0])
+        films = films.reshape(pattern.count, len(one), -1)
+        films[:, 2:] -= films[:, :1]
+        even = EVENNESS * np.linalg.norm(films[:, 0], axis=1)
+        evenness = np.kron(np.diag(even), np.eye(len(one))[2:])
         solved = lsq_linear(
-            np.vstack([films.T, np.diag([0.0, 0.0, even, even])[2:]]),
-            np.concatenate([self.measured / self.sigma, np.zeros(2)]),
-            bounds=([0.0, 0.0, -np.inf, -np.inf], np.inf),
-        ).x
-        ring, centre, *lopsided = solved
-        if ring <= LEAST_RING * (ring + centre):
+            np.vstack([films.reshape(len(parts), -1).T, evenness]),
+            np.concatenate([self.measured / self.sigma, np.zeros(len(evenness))]),
+            bounds=([0.0, 0.0, -np.inf, -np.inf] * pattern.count, np.inf),
+        ).x.reshape(pattern.count, len(one))
+        ring, centre = solved[:, 0], solved[:, 1]
+        if np.any(ring <= LEAST_RING * (ring + centre)):
             return self.scaled_to_mean(vector)
-        gains = [np.log(ring + centre), centre / (ring + centre), *np.divide(lopsided, ring)]
-        return np.clip([*gains, *vector[4:]], self.low, self.high)
+        found = vector.copy()
+        for row, (log_k1, k2, *_) in enumerate(map(pattern.entries, range(pattern.count))):
+            found[log_k1] = np.log(ring[row] + centre[row])
+            found[k2] = centre[row] / (ring[row] + centre[row])
+        found[[COS, SIN]] = solved[0, 2:] / ring[0]
+        return np.clip(found, self.low, self.high)
 
     def cost(self, vector: np.ndarray, terms: Terms) -> float:
         return float(np.sum(self.residuals(vector, terms) ** 2))

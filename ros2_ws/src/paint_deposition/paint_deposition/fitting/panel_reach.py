@@ -62,15 +62,22 @@ class Reach:
 def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[Reach, ...]:
     """The panels of a campaign on which no pass was measured to both edges of its pattern.
 
-    There are none if one panel shows both edges, or where no part is a flat panel.
+    Of a brush there are none if one of its panels shows both edges, or where no part is a flat
+    panel.
     """
     panels = [(k, Panel.of(one)) for k, one in enumerate(campaign.experiments)]
-    found = [
-        _reach(k, campaign.experiments[k].name, panel, model)
-        for k, panel in panels
-        if panel is not None
-    ]
-    return () if any(reach.is_enough for reach in found) else tuple(found)
+    by_brush: dict[int, list[Reach]] = {}
+    for k, panel in panels:
+        if panel is not None:
+            of_brush = model.painting_with(panel.brush)
+            reach = _reach(k, campaign.experiments[k].name, panel, of_brush)
+            by_brush.setdefault(panel.brush, []).append(reach)
+    return tuple(
+        reach
+        for found in by_brush.values()
+        if not any(reach.is_enough for reach in found)
+        for reach in found
+    )
 
 
 def shifts(

@@ -1,6 +1,6 @@
 """The free parameters of a fit as one vector, and the model that a vector stands for.
 
-The vector holds the coordinates of the pattern, see ``model/coordinates.py``. Amplitudes of
+The vector holds the coordinates of the patterns, see ``pattern_vector``. Amplitudes of
 effects are in units of their typical size, shapes logarithms of the ratio to their default.
 """
 
@@ -12,15 +12,12 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
+from paint_deposition.fitting.pattern_vector import PatternVector
 from paint_deposition.fitting.prior import Prior
-from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
 
 # The range that is physical for a shape parameter is this many standard deviations of its prior.
 SHAPE_DEVIATIONS = 4.0
-
-
-PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigma2_m')
 
 
 @dataclass(frozen=True)
@@ -103,29 +100,35 @@ class FreeParameters:
         varied = [(e.id, name) for e in effects for name in e.parameters()]
         return FreeParameters(start, tuple(varied), known)
 
+    @cached_property
+    def pattern(self) -> PatternVector:
+        """The entries for the patterns; they come first."""
+        return PatternVector(tuple(brush.number for brush in self.start.brushes))
+
     @property
     def names(self) -> tuple[str, ...]:
         """Name of each entry."""
-        return tuple(c.name for c in PATTERN) + tuple(f'{e}.{n}' for e, n in self.varied)
+        of_effects = (f'{e}.{n}' for e, n in self.varied)
+        return (*(c.name for c in self.pattern.coordinates), *of_effects)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
         """Names of the entries in a posterior: there it is ``offset`` + ``scale`` times one."""
         effects = (f'{e.effect}.{e.coordinate}' for e in self.of_effects)
-        return (*(c.name for c in PATTERN), *effects)
+        return (*(c.name for c in self.pattern.coordinates), *effects)
 
     @property
     def offset(self) -> np.ndarray:
         """(k,) values of a posterior's coordinates where the entries are zero."""
-        return np.array([0.0] * len(PATTERN) + [e.offset for e in self.of_effects])
+        return np.array([0.0] * len(self.pattern) + [e.offset for e in self.of_effects])
 
     @property
     def scale(self) -> np.ndarray:
         """(k,) changes of a posterior's coordinates for one unit of the entries."""
-        return np.array([1.0] * len(PATTERN) + [e.unit for e in self.of_effects])
+        return np.array([1.0] * len(self.pattern) + [e.unit for e in self.of_effects])
 
     def __len__(self) -> int:
-        return len(PATTERN) + len(self.varied)
+        return len(self.pattern) + len(self.varied)
 
     @cached_property
     def of_effects(self) -> tuple[EffectParameter, ...]:
@@ -136,7 +139,7 @@ class FreeParameters:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of the vector."""
-        ends = [(c.low, c.high) for c in PATTERN]
+        ends = [(c.low, c.high) for c in self.pattern.coordinates]
         for entry in self.of_effects:
             first, second = sorted((entry.encode(entry.low), entry.encode(entry.high)))
             ends.append((first, second))
@@ -146,8 +149,8 @@ class FreeParameters:
     @property
     def weak_prior(self) -> Prior:
         """Of the vector where nothing is known of this bell."""
-        centre = [c.centre for c in PATTERN] + [0.0] * len(self.varied)
-        width = [c.width for c in PATTERN] + [1.0] * len(self.varied)
+        centre = [c.centre for c in self.pattern.coordinates] + [0.0] * len(self.varied)
+        width = [c.width for c in self.pattern.coordinates] + [1.0] * len(self.varied)
         return Prior(np.array(centre), np.diag(width))
 
     @cached_property
@@ -172,51 +175,35 @@ class FreeParameters:
     def _between_jobs(self) -> np.ndarray:
         """(k,) standard deviations of the entries between jobs."""
         return np.array(
-            [c.between_jobs for c in PATTERN] + [EFFECT_BETWEEN_JOBS] * len(self.varied)
+            [c.between_jobs for c in self.pattern.coordinates]
+            + [EFFECT_BETWEEN_JOBS] * len(self.varied)
         )
 
     def encode(self, model: DepositionModel) -> np.ndarray:
         """The vector of a model that has the varied effects, kept inside the bounds."""
-        p = model.planar
-        entries = [
-            np.log(p.K1_cm3_per_s),
-            p.K2,
-            p.K3 * np.cos(p.phi_rad),
-            p.K3 * np.sin(p.phi_rad),
-            p.r_m,
-            np.log(p.sigma1_m),
-            np.log(p.sigma2_m),
-        ]
+        entries = self.pattern.encode(model.patterns)
         entries += [e.encode(getattr(model.effect(e.effect), e.name)) for e in self.of_effects]
         return np.clip(np.array(entries), *self.bounds)
 
     def values(self, vectors: np.ndarray) -> np.ndarray:
         """(n, k) parameters in the model's units, pattern first, for vectors (n, k)."""
-        log_k1, k2, k3_cos, k3_sin, r, log_sigma1, log_sigma2 = vectors[:, : len(PATTERN)].T
-        pattern = [
-            np.exp(log_k1),
-            k2,
-            np.minimum(np.hypot(k3_cos, k3_sin), 1.0),
-            np.arctan2(k3_sin, k3_cos),
-            r,
-            np.exp(log_sigma1),
-            np.exp(log_sigma2),
-        ]
+        count = len(self.pattern)
         amounts = [
             entry.decode(column)
-            for entry, column in zip(self.of_effects, vectors[:, len(PATTERN) :].T, strict=True)
+            for entry, column in zip(self.of_effects, vectors[:, count:].T, strict=True)
         ]
-        return np.column_stack([*pattern, *amounts])
+        return np.column_stack([self.pattern.values(vectors[:, :count]), *amounts])
 
     def decode(self, vector: np.ndarray) -> DepositionModel:
         """The model of a vector."""
         values = [float(value) for value in self.values(vector[np.newaxis])[0]]
-        planar = PlanarPattern(**dict(zip(PATTERN_NAMES, values, strict=False)))
+        count = len(self.pattern.names)
         changed: dict[str, dict[str, float]] = {}
-        for entry, value in zip(self.of_effects, values[len(PATTERN) :], strict=True):
+        for entry, value in zip(self.of_effects, values[count:], strict=True):
             changed.setdefault(entry.effect, {})[entry.name] = value
         effects = tuple(
             e.model_copy(update=changed[e.id]) if e.id in changed else e
             for e in self.start.effects
         )
-        return self.start.model_copy(update={'planar': planar, 'effects': effects})
+        found = self.start.with_patterns(self.pattern.patterns(values[:count]))
+        return found.model_copy(update={'effects': effects})

@@ -259,7 +259,7 @@ class Study:
 
     def rays(self, model: DepositionModel) -> list[Rays]:
         """The rays of each experiment for a model's pattern and projection."""
-        key = (model.planar, model.projection)
+        key = (model.patterns, model.projection)
         if key not in self._rays:
             self._rays.clear()
             self._rays[key] = [Rays.of(e, model) for e in self.campaign.experiments]

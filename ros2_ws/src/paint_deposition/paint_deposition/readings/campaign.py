@@ -112,6 +112,11 @@ class Experiment:
         return len(self.means.mean_um)
 
     @cached_property
+    def brushes(self) -> frozenset[int]:
+        """Numbers of the brushes that painted the part."""
+        return frozenset(np.unique(self.path.brush[self.path.flow > 0.0]).tolist())
+
+    @cached_property
     def measured_points(self) -> SurfacePoints:
         """The P measured points without the stencils."""
         return self.points.select(slice(0, len(self)))
@@ -137,7 +142,7 @@ class Experiment:
 
 @dataclass(frozen=True)
 class Campaign:
-    """Experiments under one process setting.
+    """Experiments under one process setting, or with a few brushes.
 
     Arrays over the N readings or the P points of a campaign hold those of the first experiment
     first, then those of the second, and so on.
@@ -192,6 +197,11 @@ class Campaign:
     def positions_m(self) -> np.ndarray:
         """(P, 3) measured points on the surfaces [m]."""
         return np.concatenate([e.measured_points.positions_m for e in self.experiments])
+
+    @property
+    def brushes(self) -> frozenset[int]:
+        """Numbers of the brushes that painted its parts."""
+        return frozenset[int]().union(*(e.brushes for e in self.experiments))
 
     @property
     def settings(self) -> dict[str, float]:

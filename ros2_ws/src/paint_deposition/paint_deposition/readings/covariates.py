@@ -71,7 +71,12 @@ class Rays:
         lit = (along > max(offset, 1e-3)) & (facing > 0.0)
         depth = np.where(lit, along, 1.0)
         x, y = (omega * local[:, :, k] / depth for k in (0, 1))
-        flux = model.planar.flux_um_per_s(x, y) * (omega / depth) ** 2 * facing / depth
+        flux = np.empty(x.shape)
+        brush = model.pattern_rows(path.brush[rows])
+        for number, planar in enumerate(model.patterns):
+            own = brush == number
+            flux[own] = planar.flux_um_per_s(x[own], y[own])
+        flux *= (omega / depth) ** 2 * facing / depth
         weight = (path.flow * path.dwell_s)[rows] * stride
         share = np.where(lit, flux, 0.0) * weight[:, np.newaxis]
         cos_incidence = facing / np.maximum(distance, 1e-9)

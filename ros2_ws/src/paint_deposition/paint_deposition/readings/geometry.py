@@ -3,7 +3,7 @@
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ReadingsError
+from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.readings.campaign import Campaign
@@ -26,9 +26,14 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> None:
 
     Raises:
         ReadingsError: one line with the likely cause.
+        ModelError: a brush that painted it is not in the model.
     """
     plain = model.model_copy(update={'effects': ()})
     for one in campaign.experiments:
+        try:
+            plain.require_brushes(one.brushes)
+        except ModelError as error:
+            raise ModelError(f"experiment '{one.name}': {error}") from None
         painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:

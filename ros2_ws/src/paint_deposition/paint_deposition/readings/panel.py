@@ -6,6 +6,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import collapse_um
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.readings.campaign import Experiment
 
 # Cosines of the largest angles: between normals of a flat panel, between parallel passes, and
@@ -29,6 +30,7 @@ class Panel:
         mirrored: (n,) bool, passes on which the gun was turned by half a turn against the first.
         distance_m: mean distance of the TCP from the surface, the standoff [m].
         travel_rad: direction of the first pass in the tool's x-y frame [rad].
+        brush: number of the brush of all passes.
     """
 
     across_m: np.ndarray
@@ -37,6 +39,7 @@ class Panel:
     mirrored: np.ndarray
     distance_m: float
     travel_rad: float
+    brush: int = ONLY_BRUSH
 
     @staticmethod
     def of(experiment: Experiment) -> 'Panel | None':
@@ -46,6 +49,8 @@ class Panel:
         outward = normals.mean(axis=0)
         outward /= np.linalg.norm(outward)
         if (normals @ outward).min() < FLAT_COSINE:
+            return None
+        if len(experiment.brushes) != 1:
             return None
         path = experiment.path.select(experiment.path.flow > 0.0)
         passes = [path.select(path.spray_pass == n) for n in np.unique(path.spray_pass)]
@@ -76,6 +81,7 @@ class Panel:
             mirrored=turned < 0.0,
             distance_m=float(height - (positions @ outward).mean()),
             travel_rad=float(np.arctan2(travel @ axes[0, :, 1], travel @ axes[0, :, 0])),
+            brush=min(experiment.brushes),
         )
 
     @property
@@ -90,12 +96,12 @@ class Panel:
 
         Passes count as endless; effects on the finished film are left out.
         """
-        film = np.zeros(len(across_m))
+        film, of_brush = np.zeros(len(across_m)), model.painting_with(self.brush)
         for line, speed, mirrored in zip(
             self.passes_m, self.speed_m_per_s, self.mirrored, strict=True
         ):
             film += collapse_um(
-                model, across_m - line, speed, self.distance_m, self.travel_rad, turned=mirrored
+                of_brush, across_m - line, speed, self.distance_m, self.travel_rad, turned=mirrored
             )
         return film
 

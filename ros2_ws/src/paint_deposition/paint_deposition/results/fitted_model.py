@@ -15,7 +15,7 @@ from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.estimates import estimates
 from paint_deposition.fitting.least_squares import Fit
-from paint_deposition.fitting.parameters import PATTERN_NAMES
+from paint_deposition.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.fitting.posterior import posterior_of
 from paint_deposition.fitting.study import Study
 
@@ -49,7 +49,11 @@ def write_fitted(
     history = history_as_list(study, steps, start.history)
     uncertainty = _uncertainty(fit, start.uncertainty)
     fitted = _rounded(fit, steps[0].model.effects)
-    posterior = _short(posterior_of(fit, study.campaign))
+    posterior: Posterior | None = _short(posterior_of(fit, study.campaign))
+    whole = fitted.with_others(start.model)
+    if whole is not fitted:
+        # It is that of some brushes only and would be taken for that of all.
+        fitted, posterior = whole, None
     write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
 
 
@@ -91,8 +95,10 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
 
     Learned laws among the ``given`` effects were not learned here and stay as they are.
     """
-    pattern = {name: _few_digits(getattr(fit.model.planar, name)) for name in PATTERN_NAMES}
-    model = fit.model.model_copy(update={'planar': fit.model.planar.model_copy(update=pattern)})
+    model = fit.model.with_patterns(
+        p.model_copy(update={name: _few_digits(getattr(p, name)) for name in PATTERN_NAMES})
+        for p in fit.model.patterns
+    )
     for effect in model.effects:
         values: dict[str, Any] = {
             name: _few_digits(getattr(effect, name), info['low'], info['high'])

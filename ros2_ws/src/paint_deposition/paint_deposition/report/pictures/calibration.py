@@ -48,7 +48,7 @@ def draw_collapse(axes: Axes, calibration: Calibration, one: PanelFit) -> None:
         axes.plot(MM * x, part, color=colour, linewidth=1.3, linestyle='--', label=name)
     axes.plot(MM * x, fitted.thickness_um(x), color=INK, linewidth=2.0, label='sum of the three')
     own = sampled_collapse(
-        calibration.model,
+        calibration.model.painting_with(panel.brush),
         float(panel.speed_m_per_s[0]),
         standoff_m=panel.distance_m,
         travel_rad=panel.travel_rad,

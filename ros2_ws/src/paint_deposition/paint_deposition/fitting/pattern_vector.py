@@ -1,0 +1,134 @@
+"""The entries of a fit's vector for the patterns of a model.
+
+One pattern has the coordinates of ``model/coordinates.py``. Of several brushes the first has them
+all. Each other has its own too, but the phase of the asymmetry is the bell's and shared: in its
+place stands the logarithm of its K3 over that of the first.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from paint_deposition.model.coordinates import PATTERN, Coordinate
+from paint_deposition.model.pattern import PlanarPattern
+
+PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigma2_m')
+COS, SIN = 2, 3
+# Weak: between brushes the asymmetry keeps its order of magnitude.
+RATIO = Coordinate('log_K3_ratio', 0.0, 0.5, -2.0, 2.0, 0.06)
+# A ratio has no value where the first brush has less asymmetry.
+LEAST_K3 = 1e-3
+
+
+@dataclass(frozen=True)
+class PatternVector:
+    """Where which pattern stands in the vector.
+
+    Attributes:
+        brushes: their numbers; a single pattern needs none.
+    """
+
+    brushes: tuple[int, ...] = ()
+
+    @property
+    def count(self) -> int:
+        """Number of patterns, B."""
+        return max(len(self.brushes), 1)
+
+    @cached_property
+    def coordinates(self) -> tuple[Coordinate, ...]:
+        """Of each entry; those of several brushes are named 'brush_2.K2' say."""
+        if self.count == 1:
+            return PATTERN
+        own = (*PATTERN[:COS], RATIO, *PATTERN[SIN + 1 :])
+        return tuple(
+            replace(coordinate, name=f'{self._prefix(row)}{coordinate.name}')
+            for row in range(self.count)
+            for coordinate in (own if row else PATTERN)
+        )
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Of the 7 B parameters in the model's units."""
+        return tuple(f'{self._prefix(row)}{n}' for row in range(self.count) for n in PATTERN_NAMES)
+
+    def _prefix(self, row: int) -> str:
+        return f'brush_{self.brushes[row]}.' if self.count > 1 else ''
+
+    def __len__(self) -> int:
+        return len(self.coordinates)
+
+    def entries(self, row: int) -> np.ndarray:
+        """(7,) entries on which the coordinates of a pattern rest; the asymmetry's are shared."""
+        if row == 0:
+            return np.arange(len(PATTERN))
+        begin = len(PATTERN) + (row - 1) * (len(PATTERN) - 1)
+        return np.array([begin, begin + 1, COS, SIN, begin + 3, begin + 4, begin + 5])
+
+    def _ratio(self, row: int) -> int:
+        """Entry of the ratio of a pattern that is not the first."""
+        return int(self.entries(row)[1]) + 1
+
+    def of_patterns(self, vectors: np.ndarray) -> np.ndarray:
+        """(n, B, 7) coordinates of each pattern for vectors (n, k); K3 may exceed 1."""
+        found = np.stack([vectors[:, self.entries(row)] for row in range(self.count)], axis=1)
+        for row in range(1, self.count):
+            found[:, row, [COS, SIN]] *= np.exp(vectors[:, [self._ratio(row)]])
+        return found
+
+    def jacobian(self, vector: np.ndarray) -> np.ndarray:
+        """(7 B, k) derivative of the patterns' coordinates, where K3 <= 1, by the entries (k,)."""
+        size = len(PATTERN)
+        found = np.zeros((size * self.count, len(self)))
+        for row, own in enumerate(self.of_patterns(vector[np.newaxis])[0]):
+            block = found[size * row : size * (row + 1)]
+            block[np.arange(size), self.entries(row)] = 1.0
+            asymmetry = block[[COS, SIN]]
+            if row:
+                asymmetry[:, [COS, SIN]] *= np.exp(vector[self._ratio(row)])
+                asymmetry[:, self._ratio(row)] = own[[COS, SIN]]
+            block[[COS, SIN]] = _slopes_of_asymmetry(own[[COS, SIN]]) @ asymmetry
+        return found
+
+    def encode(self, patterns: Sequence[PlanarPattern]) -> list[float]:
+        """The entries of these patterns."""
+        found: list[float] = []
+        first = patterns[0]
+        for row, p in enumerate(patterns):
+            asymmetry = [p.K3 * np.cos(p.phi_rad), p.K3 * np.sin(p.phi_rad)]
+            if row:
+                asymmetry = [np.log(max(p.K3, LEAST_K3) / max(first.K3, LEAST_K3))]
+            found += [
+                np.log(p.K1_cm3_per_s), p.K2, *asymmetry, p.r_m, np.log(p.sigma1_m),
+                np.log(p.sigma2_m),
+            ]  # fmt: skip
+        return found
+
+    def values(self, vectors: np.ndarray) -> np.ndarray:
+        """(n, 7 B) parameters in the model's units, see ``names``, for vectors (n, k)."""
+        log_k1, k2, cos, sin, r, log_sigma1, log_sigma2 = np.moveaxis(
+            self.of_patterns(vectors), 2, 0
+        )
+        k3, phi = np.minimum(np.hypot(cos, sin), 1.0), np.arctan2(sin, cos)
+        columns = [np.exp(log_k1), k2, k3, phi, r, np.exp(log_sigma1), np.exp(log_sigma2)]
+        return np.stack(columns, axis=2).reshape(len(vectors), -1)
+
+    def patterns(self, values: Sequence[float]) -> list[PlanarPattern]:
+        """The patterns of parameters (7 B,)."""
+        size = len(PATTERN_NAMES)
+        return [
+            PlanarPattern(
+                **dict(zip(PATTERN_NAMES, values[size * k : size * (k + 1)], strict=True))
+            )
+            for k in range(self.count)
+        ]
+
+
+def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:
+    """(2, 2) derivative of K3 cos(phi) and K3 sin(phi), where K3 <= 1, by free ones (2,)."""
+    size = np.hypot(*entries)
+    if size <= 1.0:
+        return np.eye(2)
+    return (np.eye(2) - np.outer(entries, entries) / size**2) / size
