@@ -1,6 +1,6 @@
 """A recorded motion of the atomizer: poses, trigger, and what was wrong with the recording."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
@@ -31,6 +31,13 @@ class PoseCounts:
             + self.not_finite
             + self.not_unit_quaternions
         )
+
+    @staticmethod
+    def of_guns(counts: Sequence['PoseCounts']) -> 'PoseCounts':
+        """The counts of several guns together, and the longest of their gaps."""
+        total = {name: sum(vars(each)[name] for each in counts) for name in vars(counts[0])}
+        total['longest_gap_ns'] = max(each.longest_gap_ns for each in counts)
+        return PoseCounts(**total)
 
     def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from array import array
+from collections.abc import Mapping
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
@@ -12,6 +13,12 @@ from sensor_msgs.msg import PointCloud2, PointField
 
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.nodes.runtime.messages import header
+
+
+def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
+    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
+    total = sum(laid_cm3.values())
+    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
 class FilmCloud:
@@ -63,9 +70,18 @@ class FilmField:
         return self._message
 
 
-def stats_message(frame_id: str, stamp_ns: int, figures: FilmStatistics) -> ThicknessStats:
-    """The film's figures; counts of poses are the caller's to add."""
+def stats_message(
+    frame_id: str, stamp_ns: int, figures: FilmStatistics, laid_cm3: Mapping[str, float]
+) -> ThicknessStats:
+    """The film's figures; counts of poses are the caller's to add.
+
+    Args:
+        laid_cm3: solids on the part by the name of the gun that laid them [cm3].
+    """
     message = ThicknessStats(header=header(frame_id, stamp_ns))
+    message.atomizers = list(laid_cm3)
+    message.atomizer_volume_cm3 = list(laid_cm3.values())
+    message.atomizer_share = list(shares(laid_cm3).values())
     for name in (
         'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
         'painted_volume_cm3', 'capture_fraction',

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,13 +15,14 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
-from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
 from paint_deposition.part.facing import facing, toward_the_gun
@@ -42,33 +44,36 @@ class PaintingNode(PaintNode, ABC):
     Attributes:
         surface: the refined part.
         points: where it is painted.
-        film: what is painted so far.
-        input: what comes from the cell.
+        film: what is painted so far, by one gun or several.
+        inputs: what comes from the cell, one for each gun.
         watch: publishers and subscribers whose quality of service does not fit.
-        real_time_factor: how long painting takes beside the motion.
-        repainting: the changed model that is being prepared, if one is.
-        model_problem: why the last model that was set is not used, '' if it is.
+        real_time_factors: how long painting takes beside the motion, one for each gun.
+        repainting: the changed models that are being prepared, if any are.
+        model_problem: why the last models that were set are not used, '' if they are.
     """
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
-        self.input = AtomizerInput(self)
+        names = self.values['atomizers'] or ['']
+        self.inputs = [AtomizerInput(self, number, name) for number, name in enumerate(names)]
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
     def _prepare(self) -> None:
-        self.real_time_factor = RealTimeFactor()
+        guns = range(len(self.values['atomizers'] or ['']))
+        self.real_time_factors = [RealTimeFactor() for _ in guns]
         self.model_problem = ''
         self.repainting: Repainting | None = None
-        self._facing_settled = False
+        # The guns, in order, that may still say which side of the part is outward.
+        self._may_face = list(guns)
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
-        self._model = read_chosen_model(self.values)
+        self._models = read_chosen_models(self.values)
         self._read_part()
         self._take_surface(self._read_surface())
-        self.film = self._make_film(self._model)
+        self.film = self._make_film(self._models)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
         self.film.warm_up()
 
@@ -95,35 +100,42 @@ class PaintingNode(PaintNode, ABC):
 
     # --- motion
 
-    def add_poses(self, batch: PoseBatch) -> None:
+    def add_poses(self, gun: int, batch: PoseBatch) -> None:
+        """Paint poses of a gun, by its number."""
         began_s = time.monotonic()
-        self.film.add_poses(batch)
-        self.real_time_factor.note(time.monotonic() - began_s, batch.stamps_ns)
+        self.film.guns[gun].add_poses(batch)
+        self.real_time_factors[gun].note(time.monotonic() - began_s, batch.stamps_ns)
 
     def reset(self) -> None:
         """Back to bare metal, all counts to zero."""
-        self.input.reset()
+        for source in self.inputs:
+            source.reset()
         self.film.reset()
         if self.repainting is not None:
             self._repaint()
 
     def up_to_date(self) -> None:
-        """Paint all poses that have come, and take over a film that has been prepared."""
-        self.input.hand_on()
+        """Paint all poses that have come, and take over films that have been prepared."""
+        for source in self.inputs:
+            source.hand_on()
         self._tend()
 
     # --- the part and the model
 
-    def _make_film(self, model: DepositionModel) -> LiveFilm:
-        return LiveFilm(
-            self.points,
-            model,
-            precision=self.values.get('precision', 'double'),
-            occluder=self.surface.occluder,
-            max_pose_gap_s=self.values['max_pose_gap_s'],
-            trigger_latency_s=self.values['trigger_latency_s'],
-            limit_poses=self.values['pose_memory'],
+    def _make_film(self, models: Iterable[DepositionModel]) -> LiveFilms:
+        films = (
+            LiveFilm(
+                self.points,
+                model,
+                precision=self.values.get('precision', 'double'),
+                occluder=self.surface.occluder,
+                max_pose_gap_s=self.values['max_pose_gap_s'],
+                trigger_latency_s=self.values['trigger_latency_s'],
+                limit_poses=self.values['pose_memory'],
+            )
+            for model in models
         )
+        return LiveFilms(tuple(films))
 
     def _read_surface(self) -> Surface:
         values = self.values
@@ -139,23 +151,24 @@ class PaintingNode(PaintNode, ABC):
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
 
     def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'max_pose_gap_s' in names and not self.film.log.complete:
+        if 'max_pose_gap_s' in names and not self.film.complete:
             raise PaintError(
                 f'max_pose_gap_s: the motion is longer than pose_memory '
-                f'({self.film.log.limit_poses} poses) and cannot be painted again; reset first'
+                f'({self.values["pose_memory"]} poses) and cannot be painted again; reset first'
             )
-        if 'model_file' in names:
-            # Its effect files are tried out in the thread that repaints: poses must not wait.
-            self._next_model = read_chosen_model(values, read_effect_file)
+        if names & {'model_file', 'model_files'}:
+            # Their effect files are tried out in the thread that repaints: poses must not wait.
+            self._next_models = read_chosen_models(values, read_effect_file)
 
     def _changed(self, names: set[str]) -> None:
         if names & {'part_pose', 'part_parent_frame'}:
             self._place_part()
         if 'trigger_latency_s' in names:
-            self.film.trigger_latency_s = self.values['trigger_latency_s']
-        if 'model_file' in names:
-            self._model = self._next_model
-        if names & {'model_file', 'max_pose_gap_s'}:
+            for gun in self.film.guns:
+                gun.trigger_latency_s = self.values['trigger_latency_s']
+        if names & {'model_file', 'model_files'}:
+            self._models = self._next_models
+        if names & {'model_file', 'model_files', 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
             self.destroy_timer(self._show_timer)
@@ -168,23 +181,23 @@ class PaintingNode(PaintNode, ABC):
         self.frame.place(self.values['part_parent_frame'], self.values['part_pose'])
 
     def _repaint(self, from_start: bool = True) -> None:
-        """Prepare a film, in a thread, with the model and the values as they are now."""
+        """Prepare films, in a thread, with the models and the values as they are now."""
         self._give_up_repainting()
-        model = self._model
+        models = self._models
 
-        def make() -> LiveFilm:
-            for effect in model.effects:
+        def make() -> LiveFilms:
+            for effect in itertools.chain.from_iterable(model.effects for model in models):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return self._make_film(model)
+            return self._make_film(models)
 
         self.repainting = Repainting(self.film, make, from_start)
 
     def _tend(self) -> None:
-        """Take over a film that is ready, and settle which side of the part is outward."""
+        """Take over films that are ready, and settle which side of the part is outward."""
         if self.repainting is not None and self.repainting.done:
             self._take_over(self.repainting)
-        if not self._facing_settled:
+        if self._may_face:
             self._face_the_gun()
 
     def _take_over(self, repainting: Repainting) -> None:
@@ -195,7 +208,7 @@ class PaintingNode(PaintNode, ABC):
         except (Exception, SystemExit) as error:  # of a user's effect; the old model goes on
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
-            self._model = self.film.model
+            self._models = tuple(gun.model for gun in self.film.guns)
             return
         if film is None:
             self._repaint()
@@ -203,28 +216,39 @@ class PaintingNode(PaintNode, ABC):
         self.film = film
 
     def _face_the_gun(self) -> None:
-        poses = self.film.log.first_poses(POSES_CONSIDERED)
-        if poses is None:
+        """Turn the part as the first gun wants it whose poses look at it.
+
+        As long as an earlier gun has not settled it, it may still decide otherwise: which side is
+        outward does not depend on whose poses came first.
+        """
+        for number in tuple(self._may_face):
+            poses = self.film.guns[number].log.first_poses(POSES_CONSIDERED)
+            if poses is None:
+                continue
+            positions, axes = poses.finite_axes()
+            seen = facing(self.surface, positions, axes)
+            looking = seen.front + seen.back
+            settled = looking >= POSES_FACING or len(poses) >= POSES_CONSIDERED
+            if settled:
+                self._may_face.remove(number)
+            if not looking:
+                continue
+            if settled:
+                self._may_face = [earlier for earlier in self._may_face if earlier < number]
+            self._turn(toward_the_gun(self.surface, positions, axes))
             return
-        finite = np.isfinite(poses.quaternions_xyzw).all(axis=1)
-        finite &= np.isfinite(poses.positions_m).all(axis=1)
-        x, y, z, w = poses.quaternions_xyzw[finite].T
-        axes = np.stack(
-            [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1
-        )
-        positions = poses.positions_m[finite]
-        seen = facing(self.surface, positions, axes)
-        faced = toward_the_gun(self.surface, positions, axes)
-        if faced is not self.surface:
-            self._take_surface(faced)
-            turned = self._make_film(self.film.model)
-            turned.follow(self.film.log.events)
-            self.film = turned
-            if self.repainting is not None:
-                self._repaint()
-        self._facing_settled = (
-            seen.front + seen.back >= POSES_FACING or len(poses) >= POSES_CONSIDERED
-        )
+
+    def _turn(self, faced: Surface) -> None:
+        """Paint the motion so far on the part as it is turned now."""
+        if faced is self.surface:
+            return
+        self._take_surface(faced)
+        turned = self._make_film(gun.model for gun in self.film.guns)
+        for new, old in zip(turned.guns, self.film.guns, strict=True):
+            new.follow(old.log.events)
+        self.film = turned
+        if self.repainting is not None:
+            self._repaint()
 
     def _give_up_repainting(self) -> None:
         if self.repainting is not None:

@@ -20,14 +20,15 @@ from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, R
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, header
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, header, of_gun
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
 
+POSES = 'atomizer/pose'
+# Of each gun.
+GUN_TOPICS = (POSES, 'atomizer/state')
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
-    'atomizer/pose',
-    'atomizer/state',
     'thickness/cloud',
     'thickness/field',
     'thickness/stats',
@@ -54,6 +55,7 @@ RECORDER = fixed(
         'Topics to record; empty: motion, film, plan, diagnostics and parameter changes [topics]',
         element=str,
     ),
+    atomizers=atomizer_names('whose run is recorded'),
     output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
     name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
     compression=NodeParameter(
@@ -79,13 +81,21 @@ class RunRecorder(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
-        wanted = self.values['topics'] or DEFAULT_TOPICS
+        guns = self.values['atomizers'] or ['']
+        # Of several guns the film of each, too.
+        shares = [of_gun(gun, 'thickness/field') for gun in guns if len(guns) > 1]
+        motion = [of_gun(gun, topic) for gun in guns for topic in GUN_TOPICS]
+        wanted = self.values['topics'] or [*motion, *shares, *DEFAULT_TOPICS]
         self._wanted = [self.resolve_topic_name(name) for name in wanted]
         self._topics: dict[str, RecordedTopic] = {}
         self._refused: set[str] = set()
         self._error: RecordingError | None = None
-        self._pose_topic = self.resolve_topic_name('atomizer/pose')
-        self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
+        self._progress = {
+            self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
+                PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
+            )
+            for gun in guns
+        }
         self.offer('~/stop', self._stop)
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
@@ -140,7 +150,7 @@ class RunRecorder(PaintNode):
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
         self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
-        if name == self._pose_topic and self._topics[name].messages % POSES_A_REPORT == 0:
+        if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 
     def _flush(self) -> None:
@@ -162,13 +172,14 @@ class RunRecorder(PaintNode):
         self.fail(error)
 
     def _report_progress(self) -> None:
-        topic = self._topics.get(self._pose_topic)
-        if topic is None:
-            return
-        reporter = self.get_fully_qualified_name()
-        progress = PoseProgress(reporter=reporter, poses_received=topic.messages)
-        progress.header = header('', topic.newest_stamp_ns)
-        self._progress.publish(progress)
+        for name, publisher in self._progress.items():
+            topic = self._topics.get(name)
+            if topic is not None:
+                report = PoseProgress(
+                    reporter=self.get_fully_qualified_name(), poses_received=topic.messages
+                )
+                report.header = header('', topic.newest_stamp_ns)
+                publisher.publish(report)
 
     # --- ending
 

@@ -26,6 +26,11 @@ SAMPLE_COLOURS = np.array(
 )
 
 
+def of_gun(name: str, topic: str) -> str:
+    """A topic of the gun of this name; '' is the only gun of a cell."""
+    return f'{name}/{topic}' if name else topic
+
+
 def header(frame_id: str, stamp_ns: int) -> Header:
     return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
 
