@@ -69,6 +69,9 @@ class _Files(BaseModel):
     """The files of an experiment; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
+    trajectory: Text | None = Field(
+        None, description='the name of a recording, RAPID module or table'
+    )
     measurements: Text = Field(description='the name of a file of gauge readings')
 
 
@@ -81,10 +84,7 @@ class _Gun(MotionSource):
 class _Entry(MotionSource, _Files):
     """An experiment as it is written."""
 
-    trajectory: Text | None = Field(
-        None, description='the name of a recording, RAPID module or table'
-    )
-    guns: list[_Gun] = Field(
+    guns: list[Any] = Field(
         [], description='a list of guns that painted the part together, each with its motion'
     )
 
@@ -197,11 +197,15 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource]]:
     """
     own = {key: getattr(entry, key) for key in MotionSource.model_fields}
     motions = []
-    for gun in entry.guns or [_Gun()]:
+    for number, written in enumerate(entry.guns or [{}], start=1):
+        gun = checked(_Gun, f'gun {number}', written, ReadingsError)
         said = {key: value for key in own if (value := getattr(gun, key)) is not None}
         file = gun.trajectory or entry.trajectory
         if file is None:
-            raise ReadingsError("the key 'trajectory' is missing: give the name of a recording")
+            of = f'gun {number}' if entry.guns else 'it'
+            raise ReadingsError(
+                f"{of} has no 'trajectory'; give the name of a recording, RAPID module or table"
+            )
         source = MotionSource(**(own | said))
         if source.urdf:
             source = source.model_copy(update={'urdf': str(folder / source.urdf)})

@@ -53,16 +53,17 @@ def read_gun_motions(
             'an atomizer is given by its name and by topics: leave out --atomizer, or '
             '--pose-topic and --state-topic'
         )
-    each = list(files) * (len(atomizers) if len(files) == 1 else 1)
+    names = [name.strip('/') for name in atomizers]
+    each = list(files) * (len(names) if len(files) == 1 else 1)
     return [
         GunMotion(name, read_motion(file, _named(file, source, name)))
-        for name, file in zip(atomizers, each, strict=True)
+        for name, file in zip(names, each, strict=True)
     ]
 
 
 def _named(file: Path, source: MotionSource, name: str) -> MotionSource:
     """The same for the gun of this name in a bag of the cell's recorder."""
-    before = f'/{name.strip("/")}'
+    before = f'/{name}'
     with open_bag(file) as bag:
         state = bag.find(before + STATE_TOPIC)
     topics = {'pose_topic': before + POSE_TOPIC, 'state_topic': state and state.name}
