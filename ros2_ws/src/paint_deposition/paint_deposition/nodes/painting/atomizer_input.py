@@ -121,6 +121,13 @@ class AtomizerInput:
 
     def reset(self) -> None:
         """Count from zero; poses that were not handed on yet are dropped."""
+        self.count_from_zero()
+        self.tf_queue.clear()
+        self._stamps.clear()
+        self._poses.clear()
+
+    def count_from_zero(self) -> None:
+        """Forget what was wrong so far."""
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
         self.refused_states = 0
@@ -128,9 +135,6 @@ class AtomizerInput:
         self.without_frame = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
-        self.tf_queue.clear()
-        self._stamps.clear()
-        self._poses.clear()
 
     def hand_on(self) -> None:
         """Give the receiver what has come, except poses that wait for their transform."""
@@ -215,7 +219,7 @@ class AtomizerInput:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
             self.states_without_flow += 1
         self.sprays = flow > 0.0
-        self._node.film.guns[self.number].add_trigger(TriggerChange(stamp, flow))
+        self._node.add_trigger(self.number, TriggerChange(stamp, flow))
 
     def _report_progress(self) -> None:
         message = PoseProgress(

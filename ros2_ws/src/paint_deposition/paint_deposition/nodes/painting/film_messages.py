@@ -12,7 +12,22 @@ from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.part.surface import Surface
+
+
+class ShownFilm:
+    """A part as the simulator shows it: mesh, cloud and field, ready to be filled.
+
+    Attributes:
+        mesh_id: digest of the refined mesh.
+    """
+
+    def __init__(self, surface: Surface, frame_id: str) -> None:
+        self.mesh_id = surface.mesh_id
+        self.mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+        self.cloud = FilmCloud(surface.vertices_m, frame_id)
+        self.field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
 
 
 def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:

@@ -97,7 +97,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
-        'mesh': node.values['mesh_file'],
+        'mesh': node.mesh_file,
         'triangles': len(node.surface.faces),
         'down': ' '.join(f'{value:g}' for value in node.surface.down),
         'model': ' '.join(files),

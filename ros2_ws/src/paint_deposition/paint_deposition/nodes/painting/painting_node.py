@@ -17,23 +17,19 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import PoseBatch
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
+from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
-from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 TEND_PERIOD_S = 0.1
-# So many poses that look at the part settle which side of an open surface is outward; after
-# so many poses in all it stays as it is.
-POSES_FACING = 50
-POSES_CONSIDERED = 2000
 
 
 class PaintingNode(PaintNode, ABC):
@@ -42,7 +38,8 @@ class PaintingNode(PaintNode, ABC):
     A subclass says which points, with ``_points_on``, and shows the film.
 
     Attributes:
-        surface: the refined part.
+        gun_names: of the guns, one empty name for the only one.
+        mesh_file: the part's mesh; surface: the same refined.
         points: where it is painted.
         film: what is painted so far, by one gun or several.
         inputs: what comes from the cell, one for each gun.
@@ -55,25 +52,28 @@ class PaintingNode(PaintNode, ABC):
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
-        names = self.values['atomizers'] or ['']
-        self.inputs = [AtomizerInput(self, number, name) for number, name in enumerate(names)]
+        self.inputs = [
+            AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
+        ]
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
     def _prepare(self) -> None:
-        guns = range(len(self.values['atomizers'] or ['']))
-        self.real_time_factors = [RealTimeFactor() for _ in guns]
+        self.gun_names: list[str] = self.values['atomizers'] or ['']
+        self.mesh_file: str = self.values['mesh_file']
+        self.real_time_factors = [RealTimeFactor() for _ in self.gun_names]
+        # What comes while a part is changed waits for the next one.
+        self._held: list[tuple[int, PoseBatch | TriggerChange]] | None = None
         self.model_problem = ''
         self.repainting: Repainting | None = None
-        # The guns, in order, that may still say which side of the part is outward.
-        self._may_face = list(guns)
+        self._outward = OutwardSide(len(self.gun_names))
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
         self._models = read_chosen_models(self.values)
         self._read_part()
-        self._take_surface(self._read_surface())
-        self.film = self._make_film(self._models)
+        self._take_surface(self._read_surface(self.mesh_file))
+        self.film = self._film_on(self.surface, self.points, self._models)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
         self.film.warm_up()
 
@@ -102,9 +102,19 @@ class PaintingNode(PaintNode, ABC):
 
     def add_poses(self, gun: int, batch: PoseBatch) -> None:
         """Paint poses of a gun, by its number."""
+        if self._held is not None:
+            self._held.append((gun, batch))
+            return
         began_s = time.monotonic()
         self.film.guns[gun].add_poses(batch)
         self.real_time_factors[gun].note(time.monotonic() - began_s, batch.stamps_ns)
+
+    def add_trigger(self, gun: int, change: TriggerChange) -> None:
+        """Switch a gun, by its number."""
+        if self._held is not None:
+            self._held.append((gun, change))
+            return
+        self.film.guns[gun].add_trigger(change)
 
     def reset(self) -> None:
         """Back to bare metal, all counts to zero."""
@@ -114,6 +124,36 @@ class PaintingNode(PaintNode, ABC):
         if self.repainting is not None:
             self._repaint()
 
+    def hold(self) -> None:
+        """Keep what comes from now on for the next part."""
+        self._held = []
+
+    def take_part(self, mesh_file: str, surface: Surface, points: SurfacePoints,
+                  film: LiveFilms) -> None:  # fmt: skip
+        """Paint another part from bare metal on, as the guns are now; the counts begin anew."""
+        if any(new.model != now for new, now in zip(film.guns, self._models, strict=True)):
+            film = self._film_on(surface, points, self._models)
+        for new, old in zip(film.guns, self.film.guns, strict=True):
+            new.max_pose_gap_s = self.values['max_pose_gap_s']
+            new.trigger_latency_s = self.values['trigger_latency_s']
+            new.carry_on(old)
+        for source in self.inputs:
+            source.count_from_zero()
+        self.mesh_file, self.surface, self.points, self.film = mesh_file, surface, points, film
+        self._notes_told = len(surface.notes)
+        self._outward = OutwardSide(len(self.gun_names))
+        if self.repainting is not None:
+            self._repaint()
+
+    def release(self) -> None:
+        """Paint what was kept, on the part that is there now."""
+        held, self._held = self._held or [], None
+        for gun, event in held:
+            if isinstance(event, PoseBatch):
+                self.add_poses(gun, event)
+            else:
+                self.add_trigger(gun, event)
+
     def up_to_date(self) -> None:
         """Paint all poses that have come, and take over films that have been prepared."""
         for source in self.inputs:
@@ -122,13 +162,16 @@ class PaintingNode(PaintNode, ABC):
 
     # --- the part and the model
 
-    def _make_film(self, models: Iterable[DepositionModel]) -> LiveFilms:
+    def _film_on(
+        self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
+    ) -> LiveFilms:
+        """Bare films of a model for each gun."""
         films = (
             LiveFilm(
-                self.points,
+                points,
                 model,
                 precision=self.values.get('precision', 'double'),
-                occluder=self.surface.occluder,
+                occluder=surface.occluder,
                 max_pose_gap_s=self.values['max_pose_gap_s'],
                 trigger_latency_s=self.values['trigger_latency_s'],
                 limit_poses=self.values['pose_memory'],
@@ -137,14 +180,12 @@ class PaintingNode(PaintNode, ABC):
         )
         return LiveFilms(tuple(films))
 
-    def _read_surface(self) -> Surface:
+    def _read_surface(self, mesh_file: str) -> Surface:
         values = self.values
-        if not values['mesh_file']:
+        if not mesh_file:
             raise PaintError(f"{self.get_name()}: mesh_file is empty: give the part's mesh")
         down = np.array(values['down']) if values['down'] else None
-        return read_mesh(
-            values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'], down
-        )
+        return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
 
     def _check(self, values: Mapping[str, Any]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
@@ -183,13 +224,13 @@ class PaintingNode(PaintNode, ABC):
     def _repaint(self, from_start: bool = True) -> None:
         """Prepare films, in a thread, with the models and the values as they are now."""
         self._give_up_repainting()
-        models = self._models
+        surface, points, models = self.surface, self.points, self._models
 
         def make() -> LiveFilms:
             for effect in itertools.chain.from_iterable(model.effects for model in models):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return self._make_film(models)
+            return self._film_on(surface, points, models)
 
         self.repainting = Repainting(self.film, make, from_start)
 
@@ -197,8 +238,8 @@ class PaintingNode(PaintNode, ABC):
         """Take over films that are ready, and settle which side of the part is outward."""
         if self.repainting is not None and self.repainting.done:
             self._take_over(self.repainting)
-        if self._may_face:
-            self._face_the_gun()
+        if not self._outward.settled:
+            self._turn(self._outward.turned(self.surface, self.film))
 
     def _take_over(self, repainting: Repainting) -> None:
         self.repainting = None
@@ -215,35 +256,13 @@ class PaintingNode(PaintNode, ABC):
             return
         self.film = film
 
-    def _face_the_gun(self) -> None:
-        """Turn the part as the first gun wants it whose poses look at it.
-
-        As long as an earlier gun has not settled it, it may still decide otherwise: which side is
-        outward does not depend on whose poses came first.
-        """
-        for number in tuple(self._may_face):
-            poses = self.film.guns[number].log.first_poses(POSES_CONSIDERED)
-            if poses is None:
-                continue
-            positions, axes = poses.finite_axes()
-            seen = facing(self.surface, positions, axes)
-            looking = seen.front + seen.back
-            settled = looking >= POSES_FACING or len(poses) >= POSES_CONSIDERED
-            if settled:
-                self._may_face.remove(number)
-            if not looking:
-                continue
-            if settled:
-                self._may_face = [earlier for earlier in self._may_face if earlier < number]
-            self._turn(toward_the_gun(self.surface, positions, axes))
-            return
-
     def _turn(self, faced: Surface) -> None:
         """Paint the motion so far on the part as it is turned now."""
         if faced is self.surface:
             return
         self._take_surface(faced)
-        turned = self._make_film(gun.model for gun in self.film.guns)
+        models = [gun.model for gun in self.film.guns]
+        turned = self._film_on(self.surface, self.points, models)
         for new, old in zip(turned.guns, self.film.guns, strict=True):
             new.follow(old.log.events)
         self.film = turned

@@ -17,6 +17,8 @@ from visualization_msgs.msg import Marker
 
 # Every node that takes poses reports here how far it has come.
 PROGRESS_TOPIC = 'atomizer/progress'
+# The part in the cell, for those who record.
+PART_TOPIC = 'part'
 # A header begins with its stamp, behind the four bytes that say how the message is encoded.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
