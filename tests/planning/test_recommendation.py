@@ -18,6 +18,8 @@ from paint_deposition.model.uniformity import ParallelPasses
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.planning.index_request import Request
+from paint_deposition.planning.index_search import SEARCHED
+from paint_deposition.planning.plane_passes import PassSetup
 from paint_deposition.planning.recommendation import recommend
 
 SYMMETRIC = DepositionModel(planar=PlanarPattern(K3=0.0))
@@ -80,6 +82,17 @@ def test_drift_of_standoff_with_effects_is_computed_through_them():
         there = sigma_n(narrow, answer.index_m, standoff_m=0.25 + change)
         assert there == pytest.approx(0.05, abs=1e-4)
         assert abs(change) > 1.5 * abs(without)
+
+
+@pytest.mark.parametrize('effect', ['incidence_attraction', 'pattern_spread', 'air_drift'])
+@pytest.mark.parametrize('standoff_m', [0.12, 0.25, 0.4])
+def test_the_search_for_drift_is_fine_enough(effect, standoff_m):
+    """Fewer sub-steps and samples give the same sigma_n."""
+    model = SYMMETRIC.with_effect(EFFECTS[effect].typical())
+    setup = PassSetup(standoff_m)
+    fine, searched = (setup.parallel_passes(model, 0.3, f) for f in (1.0, SEARCHED))
+    for index in (0.2, 0.35, 0.5):
+        assert searched.sigma_n(index) == pytest.approx(fine.sigma_n(index), abs=1e-5)
 
 
 def test_mean_film_and_speed_for_a_target():

@@ -144,7 +144,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         wait_until(lambda: replay.exit_code is not None, what='the replay')
     wait_until(lambda: node.film.counts.received == len(motion), what='every pose painted')
     assert node.film.counts.rejected == 0
-    assert node.input.intervals.long == 0
+    assert node.inputs[0].intervals.long == 0
     # Meshes of 12 MB reached the subscriber meanwhile, and the last one shows the last pose.
     meshes = viewer.heard['thickness/mesh']
     wait_until(

@@ -31,7 +31,7 @@ def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, w
     source.send(MOTION, slice(300, None))
     wait_until(lambda: not node.repainting, what='repainting')
     film = painted(node)
-    assert node.film.model == model
+    assert node.film.guns[0].model == model
     assert np.array_equal(film, offline_um(node, MOTION, model))
     assert not np.array_equal(film, offline_um(node, MOTION))
     # Back to the model of before: as if it had never been another.
@@ -86,7 +86,7 @@ def test_an_effect_that_does_not_compile_is_told_and_the_old_model_goes_on(
     # Painting again, for another reason, is done with the model that is in use.
     node.set_parameters(parameters(max_pose_gap_s=0.3))
     wait_until(lambda: not node.repainting, what='repainting')
-    assert (node.model_problem, node.film.max_pose_gap_s) == ('', 0.3)
+    assert (node.model_problem, node.film.guns[0].max_pose_gap_s) == ('', 0.3)
 
 
 def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
@@ -119,7 +119,7 @@ def test_a_model_is_read_once(simulator, robot, painted, wait_until, tmp_path):
     (tmp_path / 'thin.yaml').unlink()
     node.set_parameters(parameters(max_pose_gap_s=0.3))
     wait_until(lambda: not node.repainting, what='repainting')
-    assert node.film.model == model
+    assert node.film.guns[0].model == model
     assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, MOTION, model))
 
 

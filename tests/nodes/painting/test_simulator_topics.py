@@ -186,7 +186,7 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     node = simulator()
     viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
     robot(node).send(MOTION, frame_id='base_link')
-    wait_until(lambda: node.input.poses_refused == len(MOTION))
+    wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
 
     def shown():
         status = viewer.status(POSES)
@@ -223,7 +223,7 @@ def test_a_pose_in_the_parent_frame_is_transformed(simulator, robot, painted):
         source.send_pose(stamp, position, quaternion, '/base_link')
     film, expected = painted(node), offline_um(node, MOTION)
     assert np.abs(film - expected).max() < 1e-5 * expected.max()
-    assert node.input.poses_refused == 0
+    assert node.inputs[0].poses_refused == 0
 
 
 def test_progress_names_the_newest_pose_and_no_reset_lowers_it(simulator, robot, painted, onlooker,
@@ -295,7 +295,7 @@ def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, executor, 
         found = viewer.status(POSES)
         return found and 'steps faster than a robot' in found.message and found
 
-    wait_until(lambda: status() and node.input.jumps.count > 40)
+    wait_until(lambda: status() and node.inputs[0].jumps.count > 40)
     assert status().level == b'\x01'
     wait_until(lambda: '2 publishers, /robot and /robot: their poses' in status().message)
     executor.remove_node(guns[1])

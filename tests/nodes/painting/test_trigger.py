@@ -52,14 +52,14 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
     source.destroy_publisher(source.state_publisher)
     spin(gun, source)
     wait_until(lambda: source.pose_publisher.get_subscription_count(), what='discovery')
-    wait_until(lambda: node.film.flow == 0.0, what='the latched state')
+    wait_until(lambda: node.film.guns[0].flow == 0.0, what='the latched state')
     source.send(UNTRIGGERED)
     assert painted(node).max() == 0.0
     # From here on it is heard as before, and nothing counts twice.
     closed.spraying = True
     closed.header.stamp.sec += 120
     states.publish(closed)
-    wait_until(lambda: node.input.states_received == 2, what='the next state')
+    wait_until(lambda: node.inputs[0].states_received == 2, what='the next state')
 
 
 def test_poses_that_stop_while_the_gun_sprays_are_told(simulator, robot, painted, onlooker,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +13,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.part.facing import toward_the_gun
+from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.surface import Surface
 
 
@@ -73,12 +74,34 @@ def look_at(
     if model is not None:
         require_brushes(trajectory, model)
     model = model or DepositionModel()
-    path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
-    _require_motion(trajectory.source, path, counts, max_pose_gap_s)
-    require_spraying(trajectory, path)
-    surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
-    geometry = spray_geometry(surface, path, model, trajectory.frame_id)
-    return GunOnPart(surface, trajectory, path, counts, geometry)
+    return look_at_guns(surface, [trajectory], [model], max_pose_gap_s=max_pose_gap_s)[0]
+
+
+def look_at_guns(
+    surface: Surface,
+    trajectories: Sequence[Trajectory],
+    models: Sequence[DepositionModel],
+    *,
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+) -> list[GunOnPart]:
+    """The same for several guns on one part, each with its motion and its model.
+
+    The first gun whose axis meets the part says which side of it is outward.
+    """
+    paths = []
+    for trajectory, model in zip(trajectories, models, strict=True):
+        path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
+        _require_motion(trajectory.source, path, counts, max_pose_gap_s)
+        require_spraying(trajectory, path)
+        paths.append((path, counts))
+    surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p, _ in paths))
+    return [
+        GunOnPart(
+            surface, trajectory, path, counts,
+            spray_geometry(surface, path, model, trajectory.frame_id),
+        )
+        for trajectory, model, (path, counts) in zip(trajectories, models, paths, strict=True)
+    ]  # fmt: skip
 
 
 def require_brushes(trajectory: Trajectory, model: DepositionModel) -> None:

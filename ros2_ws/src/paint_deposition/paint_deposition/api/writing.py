@@ -83,7 +83,10 @@ def _(
     pictures: str = PNG,
 ) -> list[Path]:
     about = result.to_dict() | dict(made_from or {})
-    about |= _provenance(result.model, _files(about))
+    models = {gun.name or 'model': gun.model for gun in result.guns}
+    motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
+    there = {what: file for what, file in motions.items() if Path(file).exists()}
+    about |= _provenance(models, _files(about) | there)
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
     )

@@ -29,6 +29,7 @@ COMMANDS = {
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
     'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
+    'runs': ('runs', 'List what a cell has painted, part by part, with figures.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 

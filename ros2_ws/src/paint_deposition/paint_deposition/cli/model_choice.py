@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import paint_deposition as pd
 from paint_deposition.cli.options import say_all
+from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
@@ -86,6 +88,34 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
         return chosen
     words = _words(planned.path, planned.file)
     return ChosenModel(planned.file, planned.path, f'that of the plan, {words}')
+
+
+def models_for(
+    given: Sequence[Path], motions: Sequence[Path], guns: Sequence[str]
+) -> list[ChosenModel]:
+    """The model of each gun: one of those named with --model, else as ``model_for`` has it.
+
+    Args:
+        given: none, one for all guns or one for each.
+        motions: a file for all guns or one for each.
+        guns: their names, for the words.
+
+    Raises:
+        ModelError: there are models for some guns only.
+    """
+    if len(given) not in (0, 1, len(guns)):
+        raise ModelError(
+            f'--model is given {len(given)} times for {len(guns)} guns: give it once for all, or '
+            'once for each'
+        )
+    files = [*given] if len(given) == len(guns) else [*given, None][:1] * len(guns)
+    each = motions if len(motions) == len(guns) else [motions[0]] * len(guns)
+    chosen = [model_for(*pair) for pair in zip(files, each, strict=True)]
+    if len(given) < 2:
+        return chosen
+    return [
+        replace(one, words=f'{gun}: {one.words}') for gun, one in zip(guns, chosen, strict=True)
+    ]
 
 
 def campaign_model_words(

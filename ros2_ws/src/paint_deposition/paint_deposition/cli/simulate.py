@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import paint_deposition as pd
-from paint_deposition.cli.model_choice import model_for
+from paint_deposition.cli.model_choice import models_for
 from paint_deposition.cli.options import (
     BODY,
     FILE,
@@ -18,7 +18,6 @@ from paint_deposition.cli.options import (
     MAX_POSE_GAP,
     MESH,
     MESH_SCALE,
-    MODEL,
     NOT_NEGATIVE,
     PICTURES,
     direction_option,
@@ -40,11 +39,22 @@ if TYPE_CHECKING:
 @click.command('simulate')
 @MESH
 @click.option(
-    '--trajectory', required=True, type=FILE,
+    '--trajectory', 'trajectories', required=True, multiple=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
-    'or a RAPID module, .mod or .prg, taken as programmed.',
+    'or a RAPID module, .mod or .prg, taken as programmed. Give one for each of several guns.',
 )  # fmt: skip
-@MODEL
+@click.option(
+    '--atomizer', 'atomizers', multiple=True, metavar='NAME',
+    help='Gun of a bag whose topics stand behind its name, NAME/atomizer/pose and '
+    'NAME/atomizer/state; once for each gun.',
+)  # fmt: skip
+@click.option(
+    '--model',
+    'model_files',
+    type=FILE,
+    multiple=True,
+    help='Deposition model, YAML, one for all guns or one for each; default: a 50 mm bell.',
+)
 @output_option('film.ply, film.csv, stats.json and film.png')
 @click.option(
     '--at', 'readings_file', type=FILE,
@@ -71,8 +81,9 @@ if TYPE_CHECKING:
 @JSON
 def simulate_command(
     mesh: Path,
-    trajectory: Path,
-    model_file: Path | None,
+    trajectories: tuple[Path, ...],
+    atomizers: tuple[str, ...],
+    model_files: tuple[Path, ...],
     output: Path,
     readings_file: Path | None,
     points_file: Path | None,
@@ -93,33 +104,47 @@ def simulate_command(
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     with Progress('simulate') as tell:
         tell('loading')
+        from paint_deposition.files.gun_motions import read_gun_motions
+        from paint_deposition.files.motion_source import MotionSource
+        from paint_deposition.files.refusals import checked
+
         tell('reading')
-        chosen = model_for(model_file, trajectory)
-        recorded = pd.read_recording(trajectory, **motion)
+        source = checked(MotionSource, 'motion', motion, pd.PaintError)
+        guns = read_gun_motions(trajectories, source, atomizers)
+        chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
         tell('refining the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, recorded, chosen.model, readings=readings, progress=tell, **wanted
-        )
+            surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
+            names=[gun.name for gun in guns], readings=readings, progress=tell, **wanted,
+        )  # fmt: skip
         made_from = {
             'mesh_file': str(mesh),
-            'trajectory': str(trajectory),
-            'model_file': str(chosen.path or ''),
+            'trajectory': ', '.join(map(str, trajectories)),
+            'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         tell('writing and drawing')
         files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
-    say_all('warning', [*recorded.warnings, *film.warnings])
-    say_results(files, as_json, [*_lines(film), *file_lines(files)], model=chosen.words)
+    say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
+    say_all('warning', film.warnings)
+    words = '; '.join(dict.fromkeys(model.words for model in chosen))
+    say_results(files, as_json, [*_lines(film), *file_lines(files)], model=words)
 
 
 def _lines(film: pd.Film) -> Iterator[str]:
     s, counts = film.statistics, film.counts
-    yield film.geometry.sentence
+    laid_cm3 = sum(gun.painted_volume_cm3 for gun in film.guns)
+    for gun in film.guns:
+        if gun.name:
+            share = gun.painted_volume_cm3 / laid_cm3
+            yield f'{gun.name}: {100 * share:.1f} % of the paint; {gun.geometry.sentence}'
+        else:
+            yield gun.geometry.sentence
     yield (
         f'film {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
         f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
@@ -137,7 +162,8 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
     yield from paint_lines(film)
-    yield film.geometry.facet_sentence
+    coarsest = max(film.guns, key=lambda gun: gun.geometry.facet_error)
+    yield coarsest.geometry.facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (
             f'{counts.rejected} of {counts.received} poses dropped, {counts.gaps} gaps taken as '

@@ -97,7 +97,8 @@ def _other_order(path: SprayPath) -> SprayPath:
     spraying = path.spray_pass >= 0
     number = np.where(spraying, path.spray_pass.max() - path.spray_pass, -1)
     ends_s = path.time_s.min() + path.time_s.max()
-    return path.with_(spray_pass=number, time_s=ends_s - backward.time_s)
+    time_s = ends_s - backward.time_s
+    return path.with_(spray_pass=number, passes_before=np.maximum(number, 0), time_s=time_s)
 
 
 def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:

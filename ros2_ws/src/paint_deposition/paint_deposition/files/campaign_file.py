@@ -21,7 +21,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.motion.trigger import ONLY_BRUSH
-from paint_deposition.part.facing import toward_the_gun
+from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.readings.campaign import Campaign, Experiment
 
 # Readings are matched to the surface; a finer mesh only helps where the surface is strongly
@@ -71,12 +71,24 @@ class _Files(BaseModel):
     """The files of an experiment; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
-    trajectory: Text = Field(description='the name of a recording, RAPID module or table')
+    trajectory: Text | None = Field(
+        None, description='the name of a recording, RAPID module or table'
+    )
     measurements: Text = Field(description='the name of a file of gauge readings')
+
+
+class _Gun(MotionSource):
+    """One of several guns; what it does not say holds for it as for the experiment."""
+
+    trajectory: Text | None = Field(None, description='the name of a recording or module')
 
 
 class _Entry(MotionSource, _Files):
     """An experiment as it is written."""
+
+    guns: list[Any] = Field(
+        [], description='a list of guns that painted the part together, each with its motion'
+    )
 
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
     brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
@@ -152,28 +164,67 @@ def read_campaign(
 def _read_experiment(
     folder: Path, name: str, entry: _Entry, progress: Callable[[str], None]
 ) -> Experiment:
-    kinds = ('mesh', 'trajectory', 'measurements')
-    files = {kind: str(folder / getattr(entry, kind)) for kind in kinds}
+    files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
+    motions = _motions(folder, entry)
+    files |= _named([file for file, _ in motions])
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
-    urdf = entry.urdf and str(folder / entry.urdf)
-    trajectory = read_motion(files['trajectory'], entry.model_copy(update={'urdf': urdf}))
-    path, counts = spray_path(trajectory, entry.max_pose_gap_s)
-    require_spraying(trajectory, path)
-    path = _with_brush(path, entry.brush)
-    surface = toward_the_gun(surface, path.position_m, path.rotation[:, :, 2])
-    for note in (*surface.notes, *trajectory.notes):
+    trajectories = [read_motion(file, source) for file, source in motions]
+    paths = []
+    for trajectory in trajectories:
+        path, counts = spray_path(trajectory, entry.max_pose_gap_s)
+        require_spraying(trajectory, path)
+        paths.append(_with_brush(path, entry.brush))
+        if counts.rejected:
+            progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
+    surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
+    for note in (*surface.notes, *(note for t in trajectories for note in t.notes)):
         progress(f'{name}: {note}')
-    for warning in trajectory.warnings:
+    for warning in (warning for t in trajectories for warning in t.warnings):
         progress(f'warning: {name}: {warning}')
-    if counts.rejected:
-        progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
     points = None if entry.points is None else folder / entry.points
     readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)
+    settings: dict[str, float] = {}
+    for trajectory in reversed(trajectories):
+        settings |= trajectory.settings
     return Experiment.of(
-        name, surface, path, readings, files, trajectory.settings, off, trajectory.frame_id
-    )
+        name, surface, SprayPath.of_guns(paths), readings, files, settings, off,
+        trajectories[0].frame_id,
+    )  # fmt: skip
+
+
+def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource]]:
+    """The file of each gun and what to read of it.
+
+    Raises:
+        ReadingsError: a gun has no file.
+    """
+    own = {key: getattr(entry, key) for key in MotionSource.model_fields}
+    motions = []
+    for number, written in enumerate(entry.guns or [{}], start=1):
+        gun = checked(_Gun, f'gun {number}', written, ReadingsError)
+        said = {key: value for key in own if (value := getattr(gun, key)) is not None}
+        file = gun.trajectory or entry.trajectory
+        if file is None:
+            of = f'gun {number}' if entry.guns else 'it'
+            raise ReadingsError(
+                f"{of} has no 'trajectory'; give the name of a recording, RAPID module or table"
+            )
+        source = MotionSource(**(own | said))
+        if source.urdf:
+            source = source.model_copy(update={'urdf': str(folder / source.urdf)})
+        motions.append((str(folder / file), source))
+    return motions
+
+
+def _named(files: list[str]) -> dict[str, str]:
+    """The motions' files for reports: `trajectory`, and `trajectory 2` and so on for more."""
+    different = list(dict.fromkeys(files))
+    return {
+        'trajectory' if number == 1 else f'trajectory {number}': file
+        for number, file in enumerate(different, start=1)
+    }
 
 
 def _with_brush(path: SprayPath, number: int | None) -> SprayPath:

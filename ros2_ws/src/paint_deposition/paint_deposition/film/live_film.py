@@ -121,6 +121,11 @@ class LiveFilm:
         self._brushes = {change.brush for change in self._carried if change.flow > 0.0}
         self._clear()
 
+    def carry_on(self, before: 'LiveFilm') -> None:
+        """Begin bare, with the gun as the motion left it that was painted elsewhere before."""
+        self._carried = before._changes or before._carried
+        self._clear()
+
     def _clear(self) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(

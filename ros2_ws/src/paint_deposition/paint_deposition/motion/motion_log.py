@@ -37,6 +37,14 @@ class PoseBatch:
         chosen = rows if isinstance(rows, slice) else np.array(rows, dtype=np.int64)
         return PoseBatch(*(column[chosen] for column in vars(self).values()))
 
+    def finite_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (M, 3) [m] and tool z (M, 3) of the poses that are finite."""
+        finite = np.isfinite(self.quaternions_xyzw).all(axis=1)
+        finite &= np.isfinite(self.positions_m).all(axis=1)
+        x, y, z, w = self.quaternions_xyzw[finite].T
+        axes = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
+        return self.positions_m[finite], np.stack(axes, axis=1)
+
     @staticmethod
     def joined(batches: list['PoseBatch']) -> 'PoseBatch':
         """At least one batch, one after the other."""

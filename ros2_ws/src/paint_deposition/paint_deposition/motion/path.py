@@ -21,6 +21,7 @@ class SprayPath:
         stroke: (M,) int, number of the straight stroke; a new one starts where a turn of the path
             shows, up to 40 mm behind it.
         spray_pass: (M,) int, number of the spraying pass, -1 before the first.
+        passes_before: (M,) int, spraying passes of the same gun before that one.
         open_flow: (M,) flow of the opening that runs or ran last; 1 before the first.
         since_on_s, since_off_s: (M,) time since the trigger last opened and closed, inf if never
             [s].
@@ -40,6 +41,7 @@ class SprayPath:
     pattern_shift_m: np.ndarray
     stroke: np.ndarray
     spray_pass: np.ndarray
+    passes_before: np.ndarray
     open_flow: np.ndarray
     since_on_s: np.ndarray
     since_off_s: np.ndarray
@@ -62,7 +64,8 @@ class SprayPath:
         numbers, never = np.zeros(len(flow), np.int64), np.full(len(flow), np.inf)
         return SprayPath(
             stamp_ns, np.full(len(flow), np.nan), dwell_s, flow, position_m, rotation,
-            velocity_m_per_s, np.zeros((len(flow), 2)), numbers, numbers, np.ones(len(flow)),
+            velocity_m_per_s, np.zeros((len(flow), 2)), numbers, numbers, numbers,
+            np.ones(len(flow)),
             never, never, never, never, never, never, numbers,
         )  # fmt: skip
 
@@ -107,3 +110,18 @@ class SprayPath:
         return SprayPath(
             *(np.concatenate([getattr(p, item.name) for p in paths]) for item in fields(SprayPath))
         )
+
+    @staticmethod
+    def of_guns(paths: list['SprayPath']) -> 'SprayPath':
+        """Paths of several guns on one part, gun after gun; strokes and passes numbered through.
+
+        A gun alone keeps its path as it is.
+        """
+        numbered = []
+        strokes = passes = 0
+        for path in paths:
+            number = np.where(path.spray_pass < 0, -1, path.spray_pass + passes)
+            numbered.append(path.with_(stroke=path.stroke + strokes, spray_pass=number))
+            strokes = int(numbered[-1].stroke.max(initial=strokes - 1)) + 1
+            passes = int(number.max(initial=passes - 1)) + 1
+        return SprayPath.joined(numbered)

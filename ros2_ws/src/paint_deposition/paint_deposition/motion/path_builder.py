@@ -180,6 +180,7 @@ class PathBuilder:
             time_s=(path.stamp_ns - self._began_ns) * 1e-9,
             stroke=stroke,
             spray_pass=spray_pass,
+            passes_before=np.maximum(spray_pass, 0),
             open_flow=open_flow,
             since_on_s=since_on,
             since_off_s=since_off,

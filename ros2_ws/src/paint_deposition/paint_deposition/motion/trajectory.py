@@ -33,6 +33,13 @@ class PoseCounts:
             + self.not_unit_quaternions
         )
 
+    @staticmethod
+    def of_guns(counts: Sequence['PoseCounts']) -> 'PoseCounts':
+        """The counts of several guns together, and the longest of their gaps."""
+        total = {name: sum(vars(each)[name] for each in counts) for name in vars(counts[0])}
+        total['longest_gap_ns'] = max(each.longest_gap_ns for each in counts)
+        return PoseCounts(**total)
+
     def to_dict(self) -> dict[str, int]:
         """All counts by name, for diagnostics and statistics."""
         return asdict(self) | {'rejected': self.rejected}

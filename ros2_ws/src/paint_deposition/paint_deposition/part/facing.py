@@ -1,5 +1,6 @@
 """Whether a gun looks at the outward side of the part."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -70,6 +71,18 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
     known = replace(surface, gun_side=gun_side)
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
+
+
+def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
+    """The same for several guns: the first of them whose axis meets the part decides.
+
+    Args:
+        motions: (positions_m, z_axes) of each gun, as for ``facing``.
+    """
+    for positions_m, z_axes in motions:
+        if len(_met(surface, positions_m, z_axes)[1]):
+            return toward_the_gun(surface, positions_m, z_axes)
+    return surface
 
 
 def _met(

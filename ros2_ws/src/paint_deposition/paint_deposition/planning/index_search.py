@@ -15,13 +15,16 @@ from paint_deposition.planning.plane_passes import PassSetup
 
 FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
-# Where a window ends is found to this [m].
+# Where a window ends, and the standoff that is still good, are found to this [m].
 PRECISION_M = 1e-7
+STANDOFF_PRECISION_M = 1e-5
 # Drift is followed as far as these shares of the right value.
 LEAST, MOST = 0.4, 1.8
 STEPS = 100
-# With effects each step costs a pass through the integrator.
-STEPS_WITH_EFFECTS = 12
+# With effects each step costs a pass through the integrator: few, and each with less than half the
+# sub-steps and samples, which is good to 1e-5 of sigma_n.
+STEPS_WITH_EFFECTS = 6
+SEARCHED = 0.4
 
 
 @dataclass(frozen=True)
@@ -129,6 +132,7 @@ def standoff_drift_m(
     model: DepositionModel,
     setup: PassSetup,
     speed_m_per_s: float,
+    parallel: ParallelPasses,
     index_m: float,
     tolerance: float,
     index_drift: tuple[float, float],
@@ -136,7 +140,8 @@ def standoff_drift_m(
     """Change of standoff, nearer (negative) and further, that keeps within the tolerance [m].
 
     The bare projection widens a pass in proportion to its distance from the emission point,
-    which is as good as a narrower index; with effects every standoff is computed.
+    which is as good as a narrower index; with effects every standoff is computed. ``parallel``
+    are the passes at the standoff of the setup.
     """
     here = setup.standoff_m
     if not model.effects:
@@ -144,31 +149,44 @@ def standoff_drift_m(
         nearer = distance * (index_m / index_drift[1] - 1.0)
         return max(nearer, -here), distance * (index_m / index_drift[0] - 1.0)
 
-    both_ways = not setup.parallel_passes(model, speed_m_per_s).alike
+    both_ways = not parallel.alike
 
     def sigma_n(standoff_m: float) -> float:
         there = replace(setup, standoff_m=standoff_m, one_way=setup.one_way or not both_ways)
-        return there.parallel_passes(model, speed_m_per_s).sigma_n(index_m)
+        return there.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
 
-    nearest = _farthest_within(sigma_n, here, LEAST * here, tolerance, STEPS_WITH_EFFECTS)
-    farthest = _farthest_within(sigma_n, here, MOST * here, tolerance, STEPS_WITH_EFFECTS)
+    nearest, farthest = (
+        _farthest_within(
+            sigma_n, here, share * here, tolerance, STEPS_WITH_EFFECTS, STANDOFF_PRECISION_M
+        )
+        for share in (LEAST, MOST)
+    )
     return nearest - here, farthest - here
 
 
 def _crossing_at(
-    sigma_n: Callable[[float], float], low: float, high: float, tolerance: float
+    sigma_n: Callable[[float], float],
+    low: float,
+    high: float,
+    tolerance: float,
+    precision_m: float = PRECISION_M,
 ) -> float:
     """Where a function passes the tolerance between two places on either side of it."""
-    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=PRECISION_M))
+    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=precision_m))
 
 
 def _farthest_within(
-    sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float, steps: int
+    sigma_n: Callable[[float], float],
+    start: float,
+    limit: float,
+    tolerance: float,
+    steps: int,
+    precision_m: float = PRECISION_M,
 ) -> float:
     """How far one may go from a good start toward a limit without breaking the tolerance."""
     value = start
     for further in np.linspace(start, limit, steps + 1)[1:].tolist():
         if sigma_n(further) > tolerance:
-            return _crossing_at(sigma_n, value, further, tolerance)
+            return _crossing_at(sigma_n, value, further, tolerance, precision_m)
         value = further
     return limit

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -50,9 +51,13 @@ class PassSetup:
             return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
-    def parallel_passes(self, model: DepositionModel, speed_m_per_s: float) -> ParallelPasses:
-        """Endlessly many of these passes at a speed [m/s]."""
-        options = {'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad}
+    def parallel_passes(
+        self, model: DepositionModel, speed_m_per_s: float, fineness: float = 1.0
+    ) -> ParallelPasses:
+        """Endlessly many of these passes at a speed [m/s]; fineness as for their collapse."""
+        options: dict[str, Any] = {
+            'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad, 'fineness': fineness,
+        }  # fmt: skip
         first = sampled_collapse(model, speed_m_per_s, **options)
         # An effect may tell forth from back, or up from down.
         if self.one_way or not (self.gun_turns or model.effects):

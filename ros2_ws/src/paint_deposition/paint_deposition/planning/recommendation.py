@@ -12,6 +12,7 @@ from paint_deposition.model.collapse import Collapse, half_width_m
 from paint_deposition.model.uniformity import ParallelPasses
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
 from paint_deposition.planning.index_search import (
+    SEARCHED,
     IndexCurve,
     Minimum,
     choose,
@@ -134,7 +135,9 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
         )
     setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
     speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
-    parallel = setup.parallel_passes(model, speed)
+    # A speed that is only a guess is computed anew at the end.
+    guessed = request.speed_m_per_s is None and bool(model.effects)
+    parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
     width = half_width_m(parallel.first)
     curve = IndexCurve.of(parallel, *request.index_range_m(width))
     best = choose(curve, request.tolerance)
@@ -146,7 +149,7 @@ def recommend(model: DepositionModel, request: Request) -> Recommendation:
     if tolerance is not None:
         index_drift = index_drift_m(curve.parallel, best.index_m, tolerance)
         standoff_drift = standoff_drift_m(
-            model, setup, speed, best.index_m, tolerance, index_drift
+            model, setup, speed, curve.parallel, best.index_m, tolerance, index_drift
         )
     passes = cycle_time = length = over_width = None
     if request.width_m is not None:
@@ -234,7 +237,7 @@ def _notes(
     notes = [setup.assumption]
     if not setup.one_way:
         otherwise = replace(setup, gun_turns=not setup.gun_turns)
-        there = otherwise.parallel_passes(model, speed).sigma_n(best.index_m)
+        there = otherwise.parallel_passes(model, speed, SEARCHED).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
             how = (
                 'keeping its orientation'

@@ -133,7 +133,7 @@ def along_path(path: SprayPath) -> dict[str, np.ndarray]:
     """
     return {
         'time_s': path.time_s,
-        'spray_pass': np.where(np.isnan(path.time_s), np.nan, np.maximum(path.spray_pass, 0)),
+        'spray_pass': np.where(np.isnan(path.time_s), np.nan, path.passes_before),
         'stroke_end_m': np.minimum(np.minimum(path.from_turn_m, path.to_turn_m), FARTHEST_TURN_M),
         'since_trigger_s': np.minimum(path.since_on_s, LONGEST_SINCE_TRIGGER_S),
         'speed_m_per_s': path.speed_m_per_s,

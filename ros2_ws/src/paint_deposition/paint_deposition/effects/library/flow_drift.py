@@ -2,8 +2,6 @@
 
 from types import MappingProxyType
 
-import numpy as np
-
 from paint_deposition.effects.base import Effect, PathContext, parameter
 from paint_deposition.motion.path import SprayPath
 
@@ -35,6 +33,5 @@ class FlowDrift(Effect):
     )  # fmt: skip
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
-        passes_before = np.maximum(path.spray_pass, 0)
-        growth = (1.0 + self.drift_per_pass) ** (passes_before - MIDDLE_PASS)
+        growth = (1.0 + self.drift_per_pass) ** (path.passes_before - MIDDLE_PASS)
         return path.with_flow_scaled(growth)

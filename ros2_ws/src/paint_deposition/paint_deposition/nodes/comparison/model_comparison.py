@@ -14,7 +14,7 @@ from paint_deposition.comparison.residual_field import reached, spreading
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
-from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
@@ -72,7 +72,7 @@ class ModelComparison(PaintingNode):
             )
         }
         self.offer('~/compare', self._compare)
-        self._shown: FilmIntegrator | None = None
+        self._shown: CommonFilm | None = None
         tasks = painting_tasks(self) | {'comparison': self._status}
         self._diagnostics = Diagnostics(self, tasks)
         self._publish_legend()
@@ -133,13 +133,14 @@ class ModelComparison(PaintingNode):
 
     @property
     def _model_name(self) -> str:
-        return Path(self.values['model_file']).name or 'default model'
+        files = self.values['model_files'] or [self.values['model_file']]
+        return ' '.join(Path(file).name or 'default model' for file in files)
 
     def publish(self) -> None:
         """Publish the comparison if the film has changed."""
         self.up_to_date()
         film = self.film.up_to_date()
-        if film is self._shown:
+        if film == self._shown:
             return
         self._shown = film
         residuals = self.residuals()

@@ -20,7 +20,7 @@ from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
+from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, of_gun
 from paint_deposition.nodes.runtime.qos_watch import endpoint_name
 
 if TYPE_CHECKING:
@@ -48,12 +48,20 @@ def several_guns(publishers: list[str]) -> str:
 
 
 class AtomizerInput:
-    """Takes `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
+    """Takes a gun's `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
+
+    The gun's name, if it has one, stands before the three topics: `robot_1/atomizer/pose`.
 
     Poses are handed on in batches of fifty, and what there is of them every twentieth of a
     second; a state is handed on at once, so that it is there before the poses that it may cut.
 
+    Args:
+        node: paints the poses.
+        number: of the gun among those of the node.
+        name: of the gun, '' for the only one of a cell.
+
     Attributes:
+        number, name: the same.
         poses_received: since the node started.
         refused_frames: poses refused for their frame, by frame, since the last reset.
         without_frame: poses that name no frame, since the last reset.
@@ -71,8 +79,12 @@ class AtomizerInput:
         tf_queue: poses that wait for their transform.
     """
 
-    def __init__(self, node: PaintingNode) -> None:
+    def __init__(self, node: PaintingNode, number: int, name: str) -> None:
         self._node = node
+        self.number = number
+        self.name = name
+        self._pose_topic = of_gun(name, POSE_TOPIC)
+        self._state_topic = of_gun(name, STATE_TOPIC)
         self.poses_received = self.states_received = 0
         self.refused_s = self.pose_s = -math.inf
         self.sprays = False
@@ -94,12 +106,13 @@ class AtomizerInput:
                 latched=message is AtomizerState,
             )
             for message, topic, take in (
-                (PoseStamped, POSE_TOPIC, self._take_pose),
-                (AtomizerState, STATE_TOPIC, self._take_state),
+                (PoseStamped, self._pose_topic, self._take_pose),
+                (AtomizerState, self._state_topic, self._take_state),
             )
         ]
         node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
-        self._progress = node.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
+        topic = of_gun(name, PROGRESS_TOPIC)
+        self._progress = node.create_publisher(PoseProgress, topic, qos.PROGRESS)
         node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
 
@@ -110,6 +123,13 @@ class AtomizerInput:
 
     def reset(self) -> None:
         """Count from zero; poses that were not handed on yet are dropped."""
+        self.count_from_zero()
+        self.tf_queue.clear()
+        self._stamps.clear()
+        self._poses.clear()
+
+    def count_from_zero(self) -> None:
+        """Forget what was wrong so far."""
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
         self.refused_states = 0
@@ -118,9 +138,6 @@ class AtomizerInput:
         self.without_frame = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
-        self.tf_queue.clear()
-        self._stamps.clear()
-        self._poses.clear()
 
     def hand_on(self) -> None:
         """Give the receiver what has come, except poses that wait for their transform."""
@@ -133,14 +150,14 @@ class AtomizerInput:
         self._poses.clear()
         self.intervals.add(stamps)
         self._look_for_jumps(stamps, positions)
-        self._node.add_poses(PoseBatch(stamps, positions, quaternions))
+        self._node.add_poses(self.number, PoseBatch(stamps, positions, quaternions))
 
     def _look_for_jumps(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
         known = self.jumps.count
         self.jumps.add(stamps_ns, positions_m)
         if self.jumps.count and not known:
             self._node.get_logger().error(
-                f'{POSE_TOPIC}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
+                f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
 
@@ -148,10 +165,10 @@ class AtomizerInput:
         for topic in self._topics:
             topic.follow_publishers()
         publishers = sorted(
-            endpoint_name(info) for info in self._node.watch.publishers_of(POSE_TOPIC)
+            endpoint_name(info) for info in self._node.watch.publishers_of(self._pose_topic)
         )
         if len(publishers) > max(1, len(self.pose_publishers)):
-            self._node.get_logger().warning(f'{POSE_TOPIC}: {several_guns(publishers)}')
+            self._node.get_logger().warning(f'{self._pose_topic}: {several_guns(publishers)}')
         self.pose_publishers = publishers
 
     def _take_pose(self, message: PoseStamped) -> None:
@@ -183,8 +200,8 @@ class AtomizerInput:
         self.refused_s = time.monotonic()
         if frame_id not in self.refused_frames:
             self._node.get_logger().error(
-                f"poses in frame '{frame_id}' are refused: the mesh is in frame "
-                f"'{self._node.frame.frame_id}' and {missing}"
+                f"{self._pose_topic}: poses in frame '{frame_id}' are refused: the mesh is in "
+                f"frame '{self._node.frame.frame_id}' and {missing}"
             )
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 
@@ -195,16 +212,16 @@ class AtomizerInput:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')
             flow = relative_flow(message.spraying, message.flow)
-            self._node.film.add_trigger(TriggerChange(stamp, flow, message.brush))
+            self._node.add_trigger(self.number, TriggerChange(stamp, flow, message.brush))
         except PaintError as error:
             if str(error) not in self.refusals_of_states:
-                self._node.get_logger().error(f'atomizer/state refused: {error}')
+                self._node.get_logger().error(f'{self._state_topic} refused: {error}')
             self.refusals_of_states.add(str(error))
             self.refused_states += 1
             return
         if message.spraying and flow == 0.0:
             if not self.states_without_flow:
-                self._node.get_logger().warning(f'atomizer/state {SPRAYS_NOTHING}')
+                self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
             self.states_without_flow += 1
         self.sprays = flow > 0.0
 

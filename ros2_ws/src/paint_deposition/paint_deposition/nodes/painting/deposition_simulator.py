@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import functools
-import re
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -14,32 +12,33 @@ import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
-from rclpy.task import Future
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import ColourScale, film_scale
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.statistics import (
-    DEFAULT_PAINTED_ABOVE_UM,
-    FilmStatistics,
-    film_statistics,
+from paint_deposition.film.common_film import CommonFilm
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.nodes.painting.film_files import (
+    figures_of,
+    film_to_save,
+    laid_by,
 )
-from paint_deposition.nodes.painting.film_messages import FilmCloud, FilmField, stats_message
+from paint_deposition.nodes.painting.film_messages import ShownFilm, stats_message
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
+from paint_deposition.nodes.painting.part_change import PartChange
+from paint_deposition.nodes.painting.parts import PreparedPart
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import Diagnostics
-from paint_deposition.nodes.runtime.messages import ColouredMesh
+from paint_deposition.nodes.runtime.file_names import require_file_name
+from paint_deposition.nodes.runtime.messages import of_gun
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
+from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.results.film import write_film
-
-STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
 
 SIMULATOR = dict(
     **PAINTING,
@@ -71,6 +70,10 @@ class DepositionSimulator(PaintingNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
+        # Of several guns the film of each, too.
+        self._share_topics = [
+            of_gun(name, 'thickness/field') for name in self.gun_names if len(self.gun_names) > 1
+        ]
         self._outputs = {
             topic: self.watch.publisher(message, topic, profile)
             for topic, message, profile in (
@@ -79,47 +82,53 @@ class DepositionSimulator(PaintingNode):
                 ('thickness/stats', ThicknessStats, qos.LATCHED),
                 ('thickness/cloud', PointCloud2, qos.RESULTS),
                 ('thickness/field', ThicknessField, qos.RESULTS),
+                *((topic, ThicknessField, qos.RESULTS) for topic in self._share_topics),
             )
         }
         self.offer('~/reset', self._reset)
         # In a group of its own: while it waits for the disk, poses must not wait for it.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
-        self._shown: FilmIntegrator | None = None
+        self._shown: CommonFilm | None = None
         self._scale: ColourScale | None = None
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
         self._greeted = 0
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
-        last = 'last publication [ms]'
-        tasks = painting_tasks(self, lambda: {last: f'{self._publish_s * 1e3:.0f}'})
+        self.parts = PartChange(self, saving)
+        tasks = painting_tasks(self, self._more_on_the_film) | {'part': self.parts.status}
         self._diagnostics = Diagnostics(self, tasks)
         self.publish()
 
     # --- the part and its film
+
+    def _more_on_the_film(self) -> dict[str, object]:
+        """What the diagnostics say of the film beside part and model."""
+        told = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
+        each = {f'share of {gun}': f'{share:.1%}' for gun, share in told if gun}
+        return {'last publication [ms]': f'{self._publish_s * 1e3:.0f}', **each}
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return surface.points()
 
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
-        frame_id = self.frame.frame_id
-        self.mesh_id = surface.mesh_id
-        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
-        self._cloud = FilmCloud(surface.vertices_m, frame_id)
-        self._field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
+        self.shown_as = ShownFilm(surface, self.frame.frame_id)
 
-    def statistics(self, film_um: np.ndarray, emitted_cm3: float) -> FilmStatistics:
-        """The film's figures with the target and the limit that are set."""
-        return film_statistics(
-            film_um,
-            self.surface.vertex_areas_m2,
-            emitted_cm3,
-            painted_above_um=self.values['painted_above_um'],
-            target_um=self.values['target_um'],
-            target_tolerance_um=self.values['target_tolerance_um'],
-        )
+    def prepared_part(self, mesh_file: str) -> PreparedPart:
+        """Read a part that is to come; in a thread of its own."""
+        surface = self._read_surface(mesh_file)
+        points = self._points_on(surface)
+        film = self._film_on(surface, points, self._models)
+        film.warm_up()
+        # What is looked up along the gun's axis is made at the first question.
+        facing(surface, np.zeros((1, 3)), np.eye(3)[2:])
+        return PreparedPart(surface, points, film, ShownFilm(surface, self.frame.frame_id))
+
+    def show_anew(self) -> None:
+        """The part is another one."""
+        self._shown = self._scale = None
 
     # --- parameters
 
@@ -143,27 +152,33 @@ class DepositionSimulator(PaintingNode):
         self.up_to_date()
         film = self.film.up_to_date()
         newcomers = self.watch.newcomers
-        news = film is not self._shown
+        news = film != self._shown
         if news or newcomers > self._greeted:
             self._publish_film(film, with_latched=news)
             self._publish_s = time.monotonic() - began_s
         self._shown, self._greeted = film, newcomers
         self._publish_stats()
 
-    def _publish_film(self, film: FilmIntegrator, with_latched: bool) -> None:
+    def _publish_film(self, film: CommonFilm, with_latched: bool) -> None:
         film_um = film.film_um
         stamp_ns = self.film.newest_ns or 0
-        self._outputs['thickness/cloud'].publish(self._cloud.message(stamp_ns, film_um))
-        self._outputs['thickness/field'].publish(self._field.message(stamp_ns, film_um))
+        cloud, field = self.shown_as.cloud, self.shown_as.field
+        self._outputs['thickness/cloud'].publish(cloud.message(stamp_ns, film_um))
+        self._outputs['thickness/field'].publish(field.message(stamp_ns, film_um))
+        if self._share_topics:
+            for topic, share_um in zip(self._share_topics, film.shares_um, strict=True):
+                self._outputs[topic].publish(field.message(stamp_ns, share_um))
         if not with_latched:
             return
-        figures = self.statistics(film_um, film.emitted_cm3)
-        self._stats = stats_message(self.frame.frame_id, stamp_ns, figures)
+        figures = figures_of(self.values, self.surface, film)
+        laid_cm3 = laid_by(self.gun_names, self.surface, film)
+        self._stats = stats_message(self.frame.frame_id, stamp_ns, figures, laid_cm3)
+        self._stats.run = self.parts.part.run
         self._counts_shown = None
         scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
         rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
         self._outputs['thickness/mesh'].publish(
-            self._mesh.serialised(stamp_ns, scale.palette, rows)
+            self.shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
         )
         if self._scale is None or (scale.low, scale.high) != (self._scale.low, self._scale.high):
             self._scale = scale
@@ -173,12 +188,13 @@ class DepositionSimulator(PaintingNode):
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""
-        counts, refused = self.film.counts, self.input.poses_refused
+        counts = self.film.counts
+        refused = sum(source.poses_refused for source in self.inputs)
         shown = (
             counts.received + refused,
             counts.rejected + refused,
             counts.gaps,
-            self.input.intervals.longest_ns * 1e-9,
+            max(source.intervals.longest_ns for source in self.inputs) * 1e-9,
         )
         if shown == self._counts_shown:
             return
@@ -191,6 +207,7 @@ class DepositionSimulator(PaintingNode):
     # --- services
 
     def close(self) -> None:
+        self.parts.close()
         self._saving.shutdown()
 
     def _reset(self) -> tuple[bool, str]:
@@ -205,21 +222,15 @@ class DepositionSimulator(PaintingNode):
     ) -> SaveFilm.Response:
         """Write in a thread: poses keep coming meanwhile."""
         stem = request.name or time.strftime('film_%Y%m%d_%H%M%S')
-        if not STEM.fullmatch(stem):
-            response.message = (
-                f"name '{stem}': use letters, digits, '-', '_' and '.', the last not in front"
-            )
+        try:
+            require_file_name('name', stem)
+        except PaintError as error:
+            response.message = str(error)
             return response
         self.up_to_date()
-        film = self.film.up_to_date()
-        written: Future = Future(executor=self.executor)
-        # Completed from another thread, a future does not wake the executor unless it has a
-        # callback to run.
-        written.add_done_callback(lambda _: None)
-        self._saving.submit(self._film_to_save(stem, film)).add_done_callback(written.set_result)
-        saved: Any = await written
+        write = film_to_save(self, Path(self.values['output_directory']), stem)
         try:
-            paths = saved.result()
+            paths = await self.in_a_thread(self._saving.submit(write))
         except Exception as error:  # the caller of the service is told
             response.message = str(error)
             return response
@@ -227,32 +238,3 @@ class DepositionSimulator(PaintingNode):
         response.paths = [str(path) for path in paths]
         response.message = f'wrote {", ".join(path.name for path in paths)}'
         return response
-
-    def _film_to_save(self, stem: str, film: FilmIntegrator) -> Callable[[], list[Path]]:
-        """A function that writes the film as it is now and returns the paths."""
-        surface, film_um, values = self.surface, film.film_um, self.values
-        statistics = self.statistics(film_um, film.emitted_cm3)
-        details = {
-            'mesh_file': values['mesh_file'],
-            'mesh_id': self.mesh_id,
-            'frame_id': self.frame.frame_id,
-            'down': surface.down,
-            'model_file': values['model_file'],
-            'effects': [effect.id for effect in self.film.model.effects],
-            'paint': film.used.figures(statistics.mean_um, statistics.painted_volume_cm3)
-            if self.film.model.brushes
-            else None,
-            'poses': self.film.counts.to_dict(),
-            'poses_in_other_frames': dict(self.input.refused_frames),
-        }
-        return functools.partial(
-            write_film,
-            Path(values['output_directory']),
-            surface,
-            film_um,
-            statistics,
-            stem=stem,
-            statistics_file=f'{stem}.json',
-            details=details,
-            color_range_um=(values['color_min_um'], values['color_max_um']),
-        )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from array import array
+from collections.abc import Mapping
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
@@ -11,7 +12,28 @@ from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.part.surface import Surface
+
+
+class ShownFilm:
+    """A part as the simulator shows it: mesh, cloud and field, ready to be filled.
+
+    Attributes:
+        mesh_id: digest of the refined mesh.
+    """
+
+    def __init__(self, surface: Surface, frame_id: str) -> None:
+        self.mesh_id = surface.mesh_id
+        self.mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+        self.cloud = FilmCloud(surface.vertices_m, frame_id)
+        self.field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
+
+
+def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
+    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
+    total = sum(laid_cm3.values())
+    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
 class FilmCloud:
@@ -63,9 +85,18 @@ class FilmField:
         return self._message
 
 
-def stats_message(frame_id: str, stamp_ns: int, figures: FilmStatistics) -> ThicknessStats:
-    """The film's figures; counts of poses are the caller's to add."""
+def stats_message(
+    frame_id: str, stamp_ns: int, figures: FilmStatistics, laid_cm3: Mapping[str, float]
+) -> ThicknessStats:
+    """The film's figures; counts of poses are the caller's to add.
+
+    Args:
+        laid_cm3: solids on the part by the name of the gun that laid them [cm3].
+    """
     message = ThicknessStats(header=header(frame_id, stamp_ns))
+    message.atomizers = list(laid_cm3)
+    message.atomizer_volume_cm3 = list(laid_cm3.values())
+    message.atomizer_share = list(shares(laid_cm3).values())
     for name in (
         'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
         'painted_volume_cm3', 'capture_fraction',

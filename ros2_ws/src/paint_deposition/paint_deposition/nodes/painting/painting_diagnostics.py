@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import functools
 import math
 import time
 from collections.abc import Callable, Mapping
 
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.nodes.painting.atomizer_input import several_guns
+from paint_deposition.nodes.painting.atomizer_input import AtomizerInput, several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.messages import of_gun
 
 # Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
@@ -30,9 +32,10 @@ IN_WORDS = {
 }
 
 
-def poses_status(node: PaintingNode) -> Status:
-    """The motion since the last reset: what came and what was wrong with it."""
-    source, counts = node.input, node.film.counts
+def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
+    """A gun's motion since the last reset: what came and what was wrong with it."""
+    film = node.film.guns[source.number]
+    counts = film.counts
     rhythm_ns = source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
     values: dict[str, object] = {
@@ -50,7 +53,7 @@ def poses_status(node: PaintingNode) -> Status:
         'states refused': source.refused_states,
         'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
-        'gun': _gun_in_words(node.film),
+        'gun': _gun_in_words(film),
     }
     now_s = time.monotonic()
     if source.refused_frames and now_s - source.refused_s < RECENT_S:
@@ -94,14 +97,17 @@ def topics_status(node: PaintingNode) -> Status:
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """Part and model."""
-    log, factor = node.film.log, node.real_time_factor.value
+    guns = node.film.guns
+    factor = sum(each.value for each in node.real_time_factors)
+    files = node.values['model_files'] or [node.values['model_file'] or 'default']
+    effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
-        'mesh': node.values['mesh_file'],
+        'mesh': node.mesh_file,
         'triangles': len(node.surface.faces),
         'down': ' '.join(f'{value:g}' for value in node.surface.down),
-        'model': node.values['model_file'] or 'default',
-        'effects': ' '.join(effect.id for effect in node.film.model.effects) or 'none',
-        'poses remembered': log.poses,
+        'model': ' '.join(files),
+        'effects': ' '.join(effects) or 'none',
+        'poses remembered': sum(gun.log.poses for gun in guns),
         'real-time factor': f'{factor:.2f}',
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
         **more_values,
@@ -109,10 +115,11 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     level, message = OK, 'preparing a changed model' if node.repainting else 'up to date'
     if node.model_problem:
         level, message = WARN, node.model_problem
-    elif not log.complete:
+    elif not node.film.complete:
         level = WARN
         message = (
-            f'over {log.limit_poses} poses (pose_memory): a new model paints from then on only'
+            f'over {node.values["pose_memory"]} poses (pose_memory): a new model paints from '
+            'then on only'
         )
     elif factor > BUSY:
         level = WARN
@@ -134,8 +141,12 @@ def painting_tasks(
     node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
 ) -> dict[str, Callable[[], Status]]:
     """The tasks by name; `film_values` are added to those of the film."""
+    poses = {
+        of_gun(source.name, 'poses'): functools.partial(poses_status, node, source)
+        for source in node.inputs
+    }
     return {
-        'poses': lambda: poses_status(node),
+        **poses,
         'topics': lambda: topics_status(node),
         'film': lambda: film_status(node, film_values()),
     }

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,24 +15,21 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import PoseBatch
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
+from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
-from paint_deposition.nodes.runtime.model_parameters import read_chosen_model
+from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
-from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 TEND_PERIOD_S = 0.1
-# So many poses that look at the part settle which side of an open surface is outward; after
-# so many poses in all it stays as it is.
-POSES_FACING = 50
-POSES_CONSIDERED = 2000
 
 
 class PaintingNode(PaintNode, ABC):
@@ -40,35 +38,42 @@ class PaintingNode(PaintNode, ABC):
     A subclass says which points, with ``_points_on``, and shows the film.
 
     Attributes:
-        surface: the refined part.
+        gun_names: of the guns, one empty name for the only one.
+        mesh_file: the part's mesh; surface: the same refined.
         points: where it is painted.
-        film: what is painted so far.
-        input: what comes from the cell.
+        film: what is painted so far, by one gun or several.
+        inputs: what comes from the cell, one for each gun.
         watch: publishers and subscribers whose quality of service does not fit.
-        real_time_factor: how long painting takes beside the motion.
-        repainting: the changed model that is being prepared, if one is.
-        model_problem: why the last model that was set is not used, '' if it is.
+        real_time_factors: how long painting takes beside the motion, one for each gun.
+        repainting: the changed models that are being prepared, if any are.
+        model_problem: why the last models that were set are not used, '' if they are.
     """
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
-        self.input = AtomizerInput(self)
+        self.inputs = [
+            AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
+        ]
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
     def _prepare(self) -> None:
-        self.real_time_factor = RealTimeFactor()
+        self.gun_names: list[str] = self.values['atomizers'] or ['']
+        self.mesh_file: str = self.values['mesh_file']
+        self.real_time_factors = [RealTimeFactor() for _ in self.gun_names]
+        # What comes while a part is changed waits for the next one.
+        self._held: list[tuple[int, PoseBatch | TriggerChange]] | None = None
         self.model_problem = ''
         self.repainting: Repainting | None = None
-        self._facing_settled = False
+        self._outward = OutwardSide(len(self.gun_names))
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
-        self._model = read_chosen_model(self.values)
+        self._models = read_chosen_models(self.values)
         self._read_part()
-        self._take_surface(self._read_surface())
-        self.film = self._make_film(self._model)
+        self._take_surface(self._read_surface(self.mesh_file))
+        self.film = self._film_on(self.surface, self.points, self._models)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
         self.film.warm_up()
 
@@ -95,67 +100,122 @@ class PaintingNode(PaintNode, ABC):
 
     # --- motion
 
-    def add_poses(self, batch: PoseBatch) -> None:
+    def add_poses(self, gun: int, batch: PoseBatch) -> None:
+        """Paint poses of a gun, by its number."""
+        if self._held is not None:
+            self._held.append((gun, batch))
+            return
         began_s = time.monotonic()
-        self.film.add_poses(batch)
-        self.real_time_factor.note(time.monotonic() - began_s, batch.stamps_ns)
+        self.film.guns[gun].add_poses(batch)
+        self.real_time_factors[gun].note(time.monotonic() - began_s, batch.stamps_ns)
+
+    def add_trigger(self, gun: int, change: TriggerChange) -> None:
+        """Switch a gun, by its number.
+
+        Raises:
+            ModelError: its model does not have the brush; the change is not taken.
+        """
+        if self._held is None:
+            self.film.guns[gun].add_trigger(change)
+            return
+        if change.flow > 0.0:
+            self._models[gun].require_brushes([change.brush])
+        self._held.append((gun, change))
 
     def reset(self) -> None:
         """Back to bare metal, all counts to zero."""
-        self.input.reset()
+        for source in self.inputs:
+            source.reset()
         self.film.reset()
         if self.repainting is not None:
             self._repaint()
 
+    def hold(self) -> None:
+        """Keep what comes from now on for the next part."""
+        self._held = []
+
+    def take_part(self, mesh_file: str, surface: Surface, points: SurfacePoints,
+                  film: LiveFilms) -> None:  # fmt: skip
+        """Paint another part from bare metal on, as the guns are now; the counts begin anew."""
+        if any(new.model != now for new, now in zip(film.guns, self._models, strict=True)):
+            film = self._film_on(surface, points, self._models)
+        for new, old in zip(film.guns, self.film.guns, strict=True):
+            new.max_pose_gap_s = self.values['max_pose_gap_s']
+            new.trigger_latency_s = self.values['trigger_latency_s']
+            new.carry_on(old)
+        for source in self.inputs:
+            source.count_from_zero()
+        self.mesh_file, self.surface, self.points, self.film = mesh_file, surface, points, film
+        self._notes_told = len(surface.notes)
+        self._outward = OutwardSide(len(self.gun_names))
+        if self.repainting is not None:
+            self._repaint()
+
+    def release(self) -> None:
+        """Paint what was kept, on the part that is there now."""
+        held, self._held = self._held or [], None
+        for gun, event in held:
+            if isinstance(event, PoseBatch):
+                self.add_poses(gun, event)
+            else:
+                self.add_trigger(gun, event)
+
     def up_to_date(self) -> None:
-        """Paint all poses that have come, and take over a film that has been prepared."""
-        self.input.hand_on()
+        """Paint all poses that have come, and take over films that have been prepared."""
+        for source in self.inputs:
+            source.hand_on()
         self._tend()
 
     # --- the part and the model
 
-    def _make_film(self, model: DepositionModel) -> LiveFilm:
-        return LiveFilm(
-            self.points,
-            model,
-            precision=self.values.get('precision', 'double'),
-            occluder=self.surface.occluder,
-            max_pose_gap_s=self.values['max_pose_gap_s'],
-            trigger_latency_s=self.values['trigger_latency_s'],
-            limit_poses=self.values['pose_memory'],
+    def _film_on(
+        self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
+    ) -> LiveFilms:
+        """Bare films of a model for each gun."""
+        films = (
+            LiveFilm(
+                points,
+                model,
+                precision=self.values.get('precision', 'double'),
+                occluder=surface.occluder,
+                max_pose_gap_s=self.values['max_pose_gap_s'],
+                trigger_latency_s=self.values['trigger_latency_s'],
+                limit_poses=self.values['pose_memory'],
+            )
+            for model in models
         )
+        return LiveFilms(tuple(films))
 
-    def _read_surface(self) -> Surface:
+    def _read_surface(self, mesh_file: str) -> Surface:
         values = self.values
-        if not values['mesh_file']:
+        if not mesh_file:
             raise PaintError(f"{self.get_name()}: mesh_file is empty: give the part's mesh")
         down = np.array(values['down']) if values['down'] else None
-        return read_mesh(
-            values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'], down
-        )
+        return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
 
     def _check(self, values: Mapping[str, Any]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
 
     def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'max_pose_gap_s' in names and not self.film.log.complete:
+        if 'max_pose_gap_s' in names and not self.film.complete:
             raise PaintError(
                 f'max_pose_gap_s: the motion is longer than pose_memory '
-                f'({self.film.log.limit_poses} poses) and cannot be painted again; reset first'
+                f'({self.values["pose_memory"]} poses) and cannot be painted again; reset first'
             )
-        if 'model_file' in names:
-            # Its effect files are tried out in the thread that repaints: poses must not wait.
-            self._next_model = read_chosen_model(values, read_effect_file)
+        if names & {'model_file', 'model_files'}:
+            # Their effect files are tried out in the thread that repaints: poses must not wait.
+            self._next_models = read_chosen_models(values, read_effect_file)
 
     def _changed(self, names: set[str]) -> None:
         if names & {'part_pose', 'part_parent_frame'}:
             self._place_part()
         if 'trigger_latency_s' in names:
-            self.film.trigger_latency_s = self.values['trigger_latency_s']
-        if 'model_file' in names:
-            self._model = self._next_model
-        if names & {'model_file', 'max_pose_gap_s'}:
+            for gun in self.film.guns:
+                gun.trigger_latency_s = self.values['trigger_latency_s']
+        if names & {'model_file', 'model_files'}:
+            self._models = self._next_models
+        if names & {'model_file', 'model_files', 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
             self.destroy_timer(self._show_timer)
@@ -168,24 +228,24 @@ class PaintingNode(PaintNode, ABC):
         self.frame.place(self.values['part_parent_frame'], self.values['part_pose'])
 
     def _repaint(self, from_start: bool = True) -> None:
-        """Prepare a film, in a thread, with the model and the values as they are now."""
+        """Prepare films, in a thread, with the models and the values as they are now."""
         self._give_up_repainting()
-        model = self._model
+        surface, points, models = self.surface, self.points, self._models
 
-        def make() -> LiveFilm:
-            for effect in model.effects:
+        def make() -> LiveFilms:
+            for effect in itertools.chain.from_iterable(model.effects for model in models):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return self._make_film(model)
+            return self._film_on(surface, points, models)
 
         self.repainting = Repainting(self.film, make, from_start)
 
     def _tend(self) -> None:
-        """Take over a film that is ready, and settle which side of the part is outward."""
+        """Take over films that are ready, and settle which side of the part is outward."""
         if self.repainting is not None and self.repainting.done:
             self._take_over(self.repainting)
-        if not self._facing_settled:
-            self._face_the_gun()
+        if not self._outward.settled:
+            self._turn(self._outward.turned(self.surface, self.film))
 
     def _take_over(self, repainting: Repainting) -> None:
         self.repainting = None
@@ -195,36 +255,25 @@ class PaintingNode(PaintNode, ABC):
         except (Exception, SystemExit) as error:  # of a user's effect; the old model goes on
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
-            self._model = self.film.model
+            self._models = tuple(gun.model for gun in self.film.guns)
             return
         if film is None:
             self._repaint()
             return
         self.film = film
 
-    def _face_the_gun(self) -> None:
-        poses = self.film.log.first_poses(POSES_CONSIDERED)
-        if poses is None:
+    def _turn(self, faced: Surface) -> None:
+        """Paint the motion so far on the part as it is turned now."""
+        if faced is self.surface:
             return
-        finite = np.isfinite(poses.quaternions_xyzw).all(axis=1)
-        finite &= np.isfinite(poses.positions_m).all(axis=1)
-        x, y, z, w = poses.quaternions_xyzw[finite].T
-        axes = np.stack(
-            [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)], axis=1
-        )
-        positions = poses.positions_m[finite]
-        seen = facing(self.surface, positions, axes)
-        faced = toward_the_gun(self.surface, positions, axes)
-        if faced is not self.surface:
-            self._take_surface(faced)
-            turned = self._make_film(self.film.model)
-            turned.follow(self.film.log.events)
-            self.film = turned
-            if self.repainting is not None:
-                self._repaint()
-        self._facing_settled = (
-            seen.front + seen.back >= POSES_FACING or len(poses) >= POSES_CONSIDERED
-        )
+        self._take_surface(faced)
+        models = [gun.model for gun in self.film.guns]
+        turned = self._film_on(self.surface, self.points, models)
+        for new, old in zip(turned.guns, self.film.guns, strict=True):
+            new.follow(old.log.events)
+        self.film = turned
+        if self.repainting is not None:
+            self._repaint()
 
     def _give_up_repainting(self) -> None:
         if self.repainting is not None:

@@ -7,6 +7,7 @@ from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
+    atomizer_names,
     direction,
     fixed,
     mesh_parameters,
@@ -46,6 +47,7 @@ PAINTING = dict(
     **fixed(
         'the subscriptions and the pose memory are made with it when the node starts; restart '
         'the node',
+        atomizers=atomizer_names('that paint this part'),
         pose_queue_depth=NodeParameter(
             5000,
             'Poses that may wait while the node is busy; too few lose paint [poses]',
@@ -65,6 +67,12 @@ PAINTING = dict(
         ),
     ),
     **model_parameters(' and paints the motion so far again'),
+    model_files=NodeParameter(
+        [],
+        'One deposition model for each of atomizers, in their order, where they differ; empty: '
+        'model_file for all [path]',
+        element=str,
+    ),
     repaint=NodeParameter(
         True, 'Whether a new model paints the motion so far again; false: from then on only [-]'
     ),

@@ -1,4 +1,4 @@
-"""A motion painted again with another model while it goes on."""
+"""A motion painted again with other models while it goes on."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import Future
 
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import merged
+from paint_deposition.motion.motion_log import MotionLog, merged
 
 # So few poses are left to the thread that paints on: it must not be held up.
 REST_POSES = 250
@@ -17,75 +18,82 @@ SWITCH_INTERVAL_S = 0.0005
 
 
 class Repainting:
-    """Prepares a film in a thread: what must be compiled is, and the motion so far is painted.
+    """Prepares films in a thread: what must be compiled is, and the motion so far is painted.
 
-    The film that it takes over from goes on meanwhile. Compiling takes seconds, a long motion
+    The films that it takes over from go on meanwhile. Compiling takes seconds, a long motion
     more; ``done`` tells when it is over.
 
     Args:
-        current: the film to take over from.
-        make: makes the bare new one; called in the thread.
+        current: the films to take over from, one for each gun.
+        make: makes the bare new ones; called in the thread.
         from_start: whether to paint the motion so far, too.
     """
 
     def __init__(
-        self, current: LiveFilm, make: Callable[[], LiveFilm], from_start: bool = True
+        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool = True
     ) -> None:
-        self._log = current.log
+        self._logs = [gun.log for gun in current.guns]
         self._make = make
         self._from_start = from_start
         self._given_up = threading.Event()
-        self._followed = 0
-        self._prepared: Future[LiveFilm] = Future()
+        self._followed = [0] * len(self._logs)
+        self._prepared: Future[LiveFilms] = Future()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, sys.getswitchinterval()))
         threading.Thread(target=self._run, name='repainting', daemon=True).start()
 
     @property
     def done(self) -> bool:
-        """Whether the film is ready, or never will be."""
+        """Whether the films are ready, or never will be."""
         return self._prepared.done()
 
     def give_up(self) -> None:
         """Stop as soon as possible; a compilation under way still ends first."""
         self._given_up.set()
 
-    def take_over(self, current: LiveFilm) -> LiveFilm | None:
-        """The film, brought up to date; call it once ``done``.
+    def take_over(self, current: LiveFilms) -> LiveFilms | None:
+        """The films, brought up to date; call it once ``done``.
 
         Returns:
-            The film that goes on: the new one, or ``current`` with the new one's model where the
+            The films that go on: the new ones, or ``current`` with the new ones' models where the
             motion so far is not painted again. None: the motion is another one by now, begin
             again.
 
         Raises:
             Exception: whatever went wrong in the thread.
         """
-        film = self._prepared.result()
-        if not self._from_start or not self._log.complete:
-            current.use(film.model)
+        films = self._prepared.result()
+        if not self._from_start or not self._complete:
+            for gun, prepared in zip(current.guns, films.guns, strict=True):
+                gun.use(prepared.model)
             return current
-        if current.log is not self._log:
+        if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
             return None
-        film.follow(self._log.events[self._followed :])
-        return film
+        for film, log, followed in zip(films.guns, self._logs, self._followed, strict=True):
+            film.follow(log.events[followed:])
+        return films
+
+    @property
+    def _complete(self) -> bool:
+        return all(log.complete for log in self._logs)
 
     def _run(self) -> None:
         try:
-            film = self._make()
-            film.warm_up()
+            films = self._make()
+            films.warm_up()
             if self._from_start:
-                self._paint(film)
-            self._prepared.set_result(film)
-        except BaseException as error:  # it is raised again where the film is taken over
+                for gun, film in enumerate(films.guns):
+                    self._paint(gun, film, self._logs[gun])
+            self._prepared.set_result(films)
+        except BaseException as error:  # it is raised again where the films are taken over
             self._prepared.set_exception(error)
 
-    def _paint(self, film: LiveFilm) -> None:
-        while not self._given_up.is_set() and self._log.complete:
-            events = self._log.events[self._followed :]
-            if self._log.poses - film.log.poses <= REST_POSES:
+    def _paint(self, gun: int, film: LiveFilm, log: MotionLog) -> None:
+        while not self._given_up.is_set() and self._complete:
+            events = log.events[self._followed[gun] :]
+            if log.poses - film.log.poses <= REST_POSES:
                 return
             for event in merged(events):
                 if self._given_up.is_set():
                     return
                 film.follow([event])
-            self._followed += len(events)
+            self._followed[gun] += len(events)

@@ -26,7 +26,7 @@ class RecordedTopic:
     whose intervals say nothing.
 
     Attributes:
-        messages: that came.
+        messages: that came. messages_before: the same in the runs before.
         missed: that never arrived, by the jumps of the publishers' sequence numbers.
         unnumbered: messages that the middleware gave no number, whose losses nobody can count.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
@@ -37,8 +37,8 @@ class RecordedTopic:
         self, node: Node, name: str, type_name: str, take: TakeMessage, max_gap_ns: int | None
     ):
         self.name = name
-        self.messages = self.missed = self.unnumbered = self.gaps = 0
-        self.longest_gap_ns = self.newest_stamp_ns = 0
+        self.messages = self.messages_before = 0
+        self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
         self.profile: QoSProfile | None = None
         self._node = node
@@ -47,6 +47,12 @@ class RecordedTopic:
         self._take = take
         self._max_gap_ns = max_gap_ns
         self._subscription: Subscription | None = None
+
+    def count_from_zero(self) -> None:
+        """Another run begins."""
+        self.messages_before += self.messages
+        self.messages = self.missed = self.unnumbered = self.gaps = 0
+        self.longest_gap_ns = self.newest_stamp_ns = 0
 
     def subscribe(self, profile: QoSProfile) -> None:
         """Subscribe, or subscribe anew, with this quality of service."""

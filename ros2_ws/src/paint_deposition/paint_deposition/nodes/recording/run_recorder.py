@@ -8,11 +8,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from paint_msgs.msg import PoseProgress
+from paint_msgs.msg import Part, PoseProgress
 from rclpy.qos import QoSProfile
+from rclpy.serialization import deserialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
@@ -20,14 +21,17 @@ from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, R
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, header
+from paint_deposition.nodes.runtime.file_names import require_file_name
+from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
 
+POSES = 'atomizer/pose'
+STATIC_FRAMES = '/tf_static'
+# Of each gun.
+GUN_TOPICS = (POSES, 'atomizer/state')
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
-    'atomizer/pose',
-    'atomizer/state',
     'thickness/cloud',
     'thickness/field',
     'thickness/stats',
@@ -35,7 +39,7 @@ DEFAULT_TOPICS = (
     'planned_path',
     # Where the part stood, for poses that are not in its frame.
     '/tf',
-    '/tf_static',
+    STATIC_FRAMES,
     '/diagnostics',
     '/parameter_events',
 )
@@ -54,6 +58,7 @@ RECORDER = fixed(
         'Topics to record; empty: motion, film, plan, diagnostics and parameter changes [topics]',
         element=str,
     ),
+    atomizers=atomizer_names('whose run is recorded'),
     output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
     name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
     compression=NodeParameter(
@@ -79,13 +84,27 @@ class RunRecorder(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
-        wanted = self.values['topics'] or DEFAULT_TOPICS
-        self._wanted = [self.resolve_topic_name(name) for name in wanted]
+        guns = self.values['atomizers'] or ['']
+        # Of several guns the film of each, too.
+        shares = [of_gun(gun, 'thickness/field') for gun in guns if len(guns) > 1]
+        motion = [of_gun(gun, topic) for gun in guns for topic in GUN_TOPICS]
+        wanted = self.values['topics'] or [*motion, *shares, *DEFAULT_TOPICS]
+        self._part_run = ''
+        self._part_topic = self.resolve_topic_name(PART_TOPIC)
+        named = [self.resolve_topic_name(name) for name in wanted]
+        self._wanted = list(dict.fromkeys([*named, self._part_topic]))
+        # What is published once, and holds for all runs.
+        self._said_once: list[tuple[str, bytes, int, int]] = []
         self._topics: dict[str, RecordedTopic] = {}
+        self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
         self._error: RecordingError | None = None
-        self._pose_topic = self.resolve_topic_name('atomizer/pose')
-        self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
+        self._progress = {
+            self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
+                PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
+            )
+            for gun in guns
+        }
         self.offer('~/stop', self._stop)
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
@@ -96,8 +115,11 @@ class RunRecorder(PaintNode):
     def _prepare(self) -> None:
         notes = provenance(self.values['mesh_file'], self.values['model_file'])
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        self.run = self._new_run(name, notes)
+
+    def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
         folder = Path(self.values['output_directory']) / name
-        self.run = RunWriter(folder, notes, compression=self.values['compression'])
+        return RunWriter(folder, notes, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
         if not self.run.complete:
@@ -132,16 +154,51 @@ class RunRecorder(PaintNode):
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
             topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             self._guarded(self.run.add_topic, run_topic)
-            self._topics[name] = topic
+            self._topics[name], self._run_topics[name] = topic, run_topic
         if topic.profile is None or _offers_less(profile, topic.profile):
             topic.subscribe(profile)
 
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
+        if name == self._part_topic:
+            self._follow_part(deserialize_message(cdr, Part))
+        if name == STATIC_FRAMES:
+            self._said_once.append((name, cdr, received_ns, sent_ns))
         self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
-        if name == self._pose_topic and self._topics[name].messages % POSES_A_REPORT == 0:
+        if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
+
+    def _follow_part(self, part: Part) -> None:
+        """Begin the run of a part; the one before is complete."""
+        # The message is latched, and may come again.
+        if self._error is not None or part.run == self._part_run:
+            return
+        try:
+            require_file_name('run', part.run)
+            self.run.finish()
+            self.get_logger().info(self.summary())
+            self.run, self._part_run = self._run_of(part), part.run
+            for name, run_topic in self._run_topics.items():
+                self._topics[name].count_from_zero()
+                self.run.add_topic(run_topic)
+            for message in self._said_once:
+                self.run.write(*message)
+        except RecordingError as error:
+            self._give_up(error)
+        except PaintError as error:
+            self.get_logger().error(f'{self._part_topic}: {error}; the run goes on')
+
+    def _run_of(self, part: Part) -> RunWriter:
+        told = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
+        told |= {'part_pose': ' '.join(map(str, part.part_pose))} if part.part_pose else {}
+        mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
+        notes = provenance(mesh_file, self.values['model_file']) | told
+        name = part.run
+        if (Path(self.values['output_directory']) / name).exists():
+            name += time.strftime('_%Y%m%d_%H%M%S')
+            self.get_logger().warning(f'run {part.run} is there already: recorded as {name}')
+        return self._new_run(name, notes)
 
     def _flush(self) -> None:
         if not self.run.complete:
@@ -162,13 +219,13 @@ class RunRecorder(PaintNode):
         self.fail(error)
 
     def _report_progress(self) -> None:
-        topic = self._topics.get(self._pose_topic)
-        if topic is None:
-            return
-        reporter = self.get_fully_qualified_name()
-        progress = PoseProgress(reporter=reporter, poses_received=topic.messages)
-        progress.header = header('', topic.newest_stamp_ns)
-        self._progress.publish(progress)
+        for name, publisher in self._progress.items():
+            topic = self._topics.get(name)
+            if topic is not None:
+                report = PoseProgress(reporter=self.get_fully_qualified_name())
+                report.poses_received = topic.messages_before + topic.messages
+                report.header = header('', topic.newest_stamp_ns)
+                publisher.publish(report)
 
     # --- ending
 

@@ -17,6 +17,8 @@ from visualization_msgs.msg import Marker
 
 # Every node that takes poses reports here how far it has come.
 PROGRESS_TOPIC = 'atomizer/progress'
+# The part in the cell, for those who record.
+PART_TOPIC = 'part'
 # A header begins with its stamp, behind the four bytes that say how the message is encoded.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
@@ -24,6 +26,11 @@ SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 
 SAMPLE_COLOURS = np.array(
     [[0.31, 0.41, 0.59, 0.26], [0.53, 0.58, 0.97, 0.93], [0.23, 0.84, 0.62, 0.64]], np.float32
 )
+
+
+def of_gun(name: str, topic: str) -> str:
+    """A topic of the gun of this name; '' is the only gun of a cell."""
+    return f'{name}/{topic}' if name else topic
 
 
 def header(frame_id: str, stamp_ns: int) -> Header:

@@ -9,8 +9,9 @@ from typing import Any
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import LoadEffect, read_model
+from paint_deposition.film.common_film import require_one_finish
 from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable
 
 
@@ -49,6 +50,32 @@ def read_chosen_model(
     return read_model(
         values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
     )
+
+
+def read_chosen_models(
+    values: Mapping[str, Any], load: LoadEffect = load_effect_file
+) -> tuple[DepositionModel, ...]:
+    """The model of each gun that a node's parameters name, at least one.
+
+    Args:
+        values: of the rows above, `atomizers` and `model_files`.
+        load: reads an effect file, where the model may name one.
+
+    Raises:
+        PaintError: there are not as many models as guns, or as for one model.
+    """
+    guns, files = values['atomizers'] or [''], values['model_files']
+    if not files:
+        return (read_chosen_model(values, load),) * len(guns)
+    if len(files) != len(guns) or values['model_file']:
+        raise PaintError(
+            f'model_files names {len(files)} models for {len(guns)} atomizers'
+            f'{" and model_file another" if values["model_file"] else ""}: give model_file for '
+            'all, or model_files one for each of atomizers'
+        )
+    models = tuple(read_chosen_model({**values, 'model_file': file}, load) for file in files)
+    require_one_finish(dict(zip(guns, models, strict=True)))
+    return models
 
 
 def _refuse_effect_file(path: Path) -> type[Effect]:

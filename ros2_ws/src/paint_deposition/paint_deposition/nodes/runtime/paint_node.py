@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Any
@@ -82,6 +83,16 @@ class PaintNode(Node):
             return response
 
         self.create_service(Trigger, name, respond)
+
+    async def in_a_thread(self, work: concurrent.futures.Future) -> Any:
+        """What a thread's work returns, or raises; other callbacks run meanwhile."""
+        done: Future = Future(executor=self.executor)
+        # Completed from another thread, a future does not wake the executor unless it has a
+        # callback to run.
+        done.add_done_callback(lambda _: None)
+        work.add_done_callback(done.set_result)
+        await done
+        return work.result()
 
     def finish(self, exit_code: int = 0) -> None:
         """Ask the process to end; the callback that runs is completed first."""

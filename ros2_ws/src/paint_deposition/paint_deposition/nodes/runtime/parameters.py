@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,6 +24,7 @@ from paint_deposition.errors import PaintError, did_you_mean
 INT64_MAX = 2**63 - 1
 # What rclpy itself declares, or reads while it makes publishers and subscriptions.
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
+GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 RESERVED_PREFIX = 'qos_overrides.'
 TYPE_WORDS = {
     Parameter.Type.BOOL: 'true or false',
@@ -89,6 +91,8 @@ class NodeParameter:
             return []
         if self.description.endswith('[path]') and isinstance(value, str):
             return os.path.expanduser(value)
+        if self.description.endswith('[path]') and isinstance(value, Sequence):
+            return [os.path.expanduser(path) for path in value]
         if self.ros_type == Parameter.Type.DOUBLE and type(value) is int:
             return float(value)
         if self.ros_type == Parameter.Type.DOUBLE_ARRAY and isinstance(value, Sequence):
@@ -122,6 +126,20 @@ def direction(description: str) -> NodeParameter:
         constraints='three numbers that are not all zero, or none',
         allows=_is_direction,
         element=float,
+    )
+
+
+def atomizer_names(what_they_do: str) -> NodeParameter:
+    """A row for the names of several guns; empty is the only gun of a cell."""
+    return NodeParameter(
+        [],
+        f'Names of the guns {what_they_do}; the topics of each stand behind its name, as '
+        'robot_1/atomizer/pose; empty: one gun on atomizer/pose [names]',
+        constraints='different names of letters, digits, _ and /, robot_1 say',
+        allows=lambda names: (
+            not names or (len(set(names)) == len(names) and all(map(GUN_NAME.fullmatch, names)))
+        ),
+        element=str,
     )
 
 
@@ -204,7 +222,7 @@ def _declare_empty_list(node: Node, name: str, row: NodeParameter) -> None:
 def _with_homes(table: ParameterTable, changes: list[Parameter]) -> list[Parameter]:
     return [
         Parameter(change.name, change.type_, table[change.name].coerced(change.value))
-        if change.name in table and isinstance(change.value, str)
+        if change.name in table and table[change.name].description.endswith('[path]')
         else change
         for change in changes
     ]

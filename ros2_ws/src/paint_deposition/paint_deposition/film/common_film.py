@@ -1,0 +1,139 @@
+"""The one film that several guns lay on a part."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ModelError
+from paint_deposition.film.integrator import FilmIntegrator, settled_um, shown_um
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.paint_used import PaintUsed
+from paint_deposition.motion.trajectory import PoseCounts
+
+
+@dataclass(frozen=True)
+class CommonFilm:
+    """What guns with an integrator each laid on the same points.
+
+    The shares are added in the order of the guns: the film does not depend on whose poses came
+    first. What acts on the finished film, sag say, acts on the sum, as the first gun's model has
+    it; see ``require_one_finish``.
+
+    Attributes:
+        guns: at least one integrator.
+    """
+
+    guns: tuple[FilmIntegrator, ...]
+
+    @property
+    def shares_um(self) -> tuple[np.ndarray, ...]:
+        """(V,) what each gun laid, before effects on the film [um]."""
+        return tuple(gun.raw_um for gun in self.guns)
+
+    @property
+    def raw_um(self) -> np.ndarray:
+        """(V,) film as it arrived, before effects on the film [um]."""
+        first, *others = self.shares_um
+        return sum(others, first)
+
+    @property
+    def film_um(self) -> np.ndarray:
+        """(V,) film [um]."""
+        return settled_um(self.raw_um, self._effects, self.guns[0].points)
+
+    @property
+    def gauge_um(self) -> np.ndarray:
+        """(V,) what a gauge shows on that film [um]."""
+        return shown_um(self.raw_um, self._effects, self.guns[0].points)
+
+    @property
+    def used(self) -> PaintUsed:
+        """Paint that left the guns."""
+        return sum((gun.used for gun in self.guns), PaintUsed())
+
+    @property
+    def emitted_cm3(self) -> float:
+        """Solids that a part which catches everything would have got [cm3]."""
+        return self.used.emitted_cm3
+
+    def laid_cm3(self, areas_m2: np.ndarray) -> np.ndarray:
+        """(G,) solids that each gun laid on vertices of (V,) these areas [m2], as in a share."""
+        return np.array([float(np.sum(share_um * areas_m2)) for share_um in self.shares_um])
+
+    @property
+    def _effects(self) -> list[Effect]:
+        return [effect for effect in self.guns[0].model.effects if not effect.is_neutral]
+
+
+@dataclass(frozen=True)
+class LiveFilms:
+    """The films of several guns that paint the same points, each of a motion under way.
+
+    Attributes:
+        guns: at least one film.
+    """
+
+    guns: tuple[LiveFilm, ...]
+
+    @property
+    def counts(self) -> PoseCounts:
+        """What became of the poses of all guns since the last reset; the longest of their gaps."""
+        return PoseCounts.of_guns([gun.counts for gun in self.guns])
+
+    @property
+    def newest_ns(self) -> int | None:
+        """Stamp of the newest pose of any gun that was kept."""
+        return max((gun.newest_ns for gun in self.guns if gun.newest_ns is not None), default=None)
+
+    @property
+    def complete(self) -> bool:
+        """Whether all motion so far is remembered and can be painted again."""
+        return all(gun.log.complete for gun in self.guns)
+
+    def up_to_date(self) -> CommonFilm:
+        """The film of everything received; two of them are equal while nothing has come."""
+        return CommonFilm(tuple(gun.up_to_date() for gun in self.guns))
+
+    def reset(self) -> None:
+        """Back to bare metal."""
+        for gun in self.guns:
+            gun.reset()
+
+    def warm_up(self) -> None:
+        """Compile and compute all that the models need, before there is any motion."""
+        for gun in self.guns:
+            gun.warm_up()
+
+
+def require_one_finish(models: Mapping[str, DepositionModel]) -> None:
+    """Refuse models, by the name of their gun, that let different things happen to one film.
+
+    Raises:
+        ModelError: naming two guns and the effects on film or gauge in which they differ.
+    """
+    (first, reference), *others = ((gun, _finish(model)) for gun, model in models.items())
+    for gun, finish in others:
+        if finish != reference:
+            differ = ', '.join(dict.fromkeys(e.id for e in (*reference, *finish)))
+            raise ModelError(
+                f'the models of {first} and {gun} differ in what acts on the finished film, which '
+                f'they share ({differ}): give both the same values of it, in the same order'
+            )
+
+
+def _finish(model: DepositionModel) -> tuple[Effect, ...]:
+    """The effects that act on the film after it has arrived, or on the gauge."""
+    return tuple(
+        effect
+        for effect in model.effects
+        if not effect.is_neutral
+        and (
+            type(effect).on_film is not Effect.on_film
+            or type(effect).on_gauge is not Effect.on_gauge
+        )
+    )

@@ -1,0 +1,183 @@
+"""Several guns on one part, offline: one film, each gun's share, and one clear line if not."""
+
+import json
+
+import numpy as np
+import pytest
+import yaml
+
+import paint_deposition as pd
+from booth import LOOKING_ALONG_Y, SAMPLES
+from cli.command import assert_refused, paint
+from files.recorded import Messages, pose_entries, write_bag
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.flow_drift import FlowDrift
+from paint_deposition.effects.library.sag import Sag
+from paint_deposition.errors import ModelError, PaintError
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.fitting.forward import Forward
+from paint_deposition.model.pattern import PlanarPattern
+from scenes import straight_pass
+
+PANEL = SAMPLES / 'panel.stl'
+TIMES_S = np.arange(0.0, 3.0, 0.02)
+UPPER = straight_pass(TIMES_S, (-0.5, -0.25, 0.15), (0.5, -0.25, 0.15), LOOKING_ALONG_Y)
+LOWER = straight_pass(TIMES_S + 1.0, (0.5, -0.25, -0.1), (-0.5, -0.25, -0.1), LOOKING_ALONG_Y)
+THIN = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=0.7))
+
+
+@pytest.fixture(scope='module')
+def surface():
+    return pd.read_mesh(PANEL, max_edge_length_m=0.05)
+
+
+@pytest.fixture(scope='module')
+def bags(tmp_path_factory):
+    """A bag for each gun, and one with both as the cell's recorder names their topics."""
+    folder = tmp_path_factory.mktemp('bags')
+    messages = Messages()
+    # The second gun opens in the middle of its pass; the first one's state was not recorded.
+    half_ns = int(LOWER.stamps_ns[len(LOWER) // 2])
+    states = [
+        ('/robot_2/atomizer/state', half_ns, messages.state(half_ns, True, 1.0)),
+    ]
+    both = write_bag(
+        folder / 'both',
+        sorted(
+            [
+                *pose_entries(UPPER, '/robot_1/atomizer/pose'),
+                *pose_entries(LOWER, '/robot_2/atomizer/pose'),
+                *states,
+            ],
+            key=lambda entry: entry[1],
+        ),
+    )
+    return {
+        'both': both,
+        'upper': write_pose_bag(folder / 'upper', UPPER),
+        'lower': write_pose_bag(folder / 'lower', LOWER),
+        'thin': _model(folder / 'thin.yaml', THIN),
+        'sagging': _model(folder / 'sagging.yaml', THIN.with_effect(Sag.typical())),
+    }
+
+
+def _model(path, model):
+    write_model(path, model)
+    return path
+
+
+def test_the_film_is_the_sum_of_the_guns(surface):
+    models = [DepositionModel(), THIN]
+    alone = [
+        pd.simulate(surface, motion, model)
+        for motion, model in zip((UPPER, LOWER), models, strict=True)
+    ]
+    both = pd.simulate(surface, [UPPER, LOWER], models)
+    assert np.array_equal(both.film_um, alone[0].film_um + alone[1].film_um)
+    volumes = [gun.painted_volume_cm3 for gun in both.guns]
+    assert volumes == pytest.approx([film.statistics.painted_volume_cm3 for film in alone])
+    assert both.statistics.painted_volume_cm3 == pytest.approx(sum(volumes))
+    assert both.statistics.emitted_volume_cm3 == pytest.approx(
+        sum(film.statistics.emitted_volume_cm3 for film in alone)
+    )
+    assert [gun.name for gun in both.guns] == ['gun 1', 'gun 2']
+
+
+def test_paint_that_sags_sags_from_the_whole_film(surface):
+    """What acts on the finished film acts on the sum, and not on each gun's share."""
+    sagging = DepositionModel().with_effect(Sag.typical())
+    motions = [UPPER, UPPER]
+    both = pd.simulate(surface, motions, sagging)
+    twice = PlanarPattern(K1_cm3_per_s=2.0 * PlanarPattern().K1_cm3_per_s)
+    doubled = pd.simulate(surface, UPPER, sagging.model_copy(update={'planar': twice}))
+    assert both.film_um == pytest.approx(doubled.film_um, rel=1e-5, abs=1e-4)
+    with pytest.raises(ModelError, match=r'gun 1 and gun 2 differ in what .* \(sag\)'):
+        pd.simulate(surface, motions, [sagging, DepositionModel()])
+
+
+def test_one_bag_with_both_guns(bags, tmp_path):
+    guns = '--atomizer', 'robot_1', '--atomizer', '/robot_2'
+    done = paint(
+        'simulate', '--mesh', PANEL, '--trajectory', bags['both'], *guns, '--json', '-o', tmp_path,
+        '--max-edge-length-m', 0.05,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    first, second = figures['atomizers']
+    assert (first['name'], second['name']) == ('robot_1', 'robot_2')
+    # The one without a state sprays all the way, the other from the middle of its pass on.
+    assert second['spraying_time_s'] == pytest.approx(0.5 * first['spraying_time_s'], rel=0.02)
+    laid_cm3 = first['painted_volume_cm3'] + second['painted_volume_cm3']
+    assert laid_cm3 == pytest.approx(figures['painted_volume_cm3'])
+    assert set(figures['provenance']['models']) == {'robot_1', 'robot_2'}
+
+
+def test_a_file_and_a_model_for_each_gun(bags, surface, tmp_path):
+    bell = _model(tmp_path / 'bell.yaml', DepositionModel())
+    done = paint(
+        'simulate', '--mesh', PANEL, '--trajectory', bags['upper'], '--trajectory', bags['lower'],
+        '--model', bell, '--model', bags['thin'], '-o', tmp_path / 'out',
+        '--max-edge-length-m', 0.05,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    film = np.genfromtxt(tmp_path / 'out/film.csv', delimiter=',', names=True)['thickness_um']
+    expected = pd.simulate(surface, [UPPER, LOWER], [DepositionModel(), THIN]).film_um
+    assert film == pytest.approx(expected, rel=1e-7)
+    assert f'model: upper: {bell}' in done.stdout
+    assert f'lower: {bags["thin"]}' in done.stdout
+    assert '% of the paint' in done.stdout
+
+
+@pytest.mark.parametrize(
+    ('words', 'message'),
+    [
+        (['--model', 'thin', '--model', 'thin', '--model', 'thin'], '--model is given 3 times'),
+        (['--model', 'thin', '--model', 'sagging'], r'differ in what acts on the finished film'),
+        (['--atomizer', 'a', '--atomizer', 'b', '--atomizer', 'c'], '2 files for 3 atomizers'),
+        (['--atomizer', 'a', '--atomizer', 'b', '--pose-topic', '/p'], 'leave out --atomizer, or'),
+    ],
+)
+def test_what_does_not_go_together_is_refused(bags, tmp_path, words, message):
+    words = [bags.get(word, word) for word in words]
+    done = paint(
+        'simulate', '--mesh', PANEL, '--trajectory', bags['upper'], '--trajectory', bags['lower'],
+        *words, '-o', tmp_path / 'out', '--max-edge-length-m', 0.05,
+    )  # fmt: skip
+    assert_refused(done, message)
+
+
+def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path):
+    """A law that counts a gun's own passes counts them so in a campaign, too."""
+    model = DepositionModel().with_effect(FlowDrift(drift_per_pass=0.2))
+    films = [pd.simulate(surface, motion, model).film_um for motion in (UPPER, LOWER)]
+    film = pd.simulate(surface, [UPPER, LOWER], model)
+    assert np.array_equal(film.film_um, films[0] + films[1])
+    inside = np.flatnonzero(np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.2)[::5]
+    rows = np.column_stack([surface.vertices_m, film.film_um])[inside]
+    table = '\n'.join(','.join(map(repr, row.tolist())) for row in rows)
+    (tmp_path / 'film.csv').write_text(f'x_m,y_m,z_m,thickness_um\n{table}\n')
+    guns = [
+        {'pose_topic': '/robot_1/atomizer/pose'},
+        {'trajectory': str(bags['lower'])},
+    ]
+    entry = {
+        'name': 'panel', 'mesh': str(PANEL), 'trajectory': str(bags['both']), 'guns': guns,
+        'measurements': 'film.csv',
+    }  # fmt: skip
+    path = tmp_path / 'campaign.yaml'
+    path.write_text(yaml.safe_dump({'experiments': [entry]}))
+    campaign = read_campaign(path)
+    assert campaign.experiments[0].path.spray_pass.max() == 1
+    predicted = Forward(campaign).predict_um(model)
+    assert predicted == pytest.approx(campaign.readings.thickness_um, rel=1e-5)
+    assert campaign.experiments[0].files['trajectory 2'] == str(bags['lower'])
+    entry['guns'][1]['pose_tropic'] = '/x'
+    path.write_text(yaml.safe_dump({'experiments': [entry]}))
+    with pytest.raises(PaintError, match="'panel': gun 2: unknown key 'pose_tropic'; did you"):
+        read_campaign(path)
+    entry |= {'guns': guns[:1], 'trajectory': None}
+    path.write_text(yaml.safe_dump({'experiments': [entry]}))
+    with pytest.raises(PaintError, match="'panel': gun 1 has no 'trajectory'; give the name of"):
+        read_campaign(path)

@@ -1,0 +1,272 @@
+"""Another part comes into the cell: a new film, a new run, and nothing of the old one lost."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import Part, ThicknessStats
+from paint_msgs.srv import ChangePart
+
+from cli.command import paint
+from nodes.cell import (
+    DIAGNOSTICS,
+    PANEL_M,
+    offline_um,
+    parameters,
+    two_passes,
+    values_of,
+    write_panel,
+)
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.runtime import qos
+
+LATER_NS = 60_000_000_000
+SERVICE = '/deposition_simulator/change_part'
+
+
+def closed_at_its_end(motion: Trajectory) -> Trajectory:
+    """The gun is off when the part leaves."""
+    return replace(
+        motion,
+        trigger_stamps_ns=np.append(motion.trigger_stamps_ns, motion.stamps_ns[-1]),
+        trigger_flow=np.append(motion.trigger_flow, 0.0),
+    )
+
+
+def later(motion: Trajectory) -> Trajectory:
+    return replace(
+        motion,
+        stamps_ns=motion.stamps_ns + LATER_NS,
+        trigger_stamps_ns=motion.trigger_stamps_ns + LATER_NS,
+    )
+
+
+MOTION = closed_at_its_end(two_passes(poses=300))
+WITHOUT_TRIGGER = two_passes(poses=300, trigger=False)
+
+
+@pytest.fixture
+def change(call, onlooker):
+    """`change(**fields)`: the answer of the simulator."""
+    operator = onlooker({})
+
+    def change(**fields) -> ChangePart.Response:
+        return call(operator, ChangePart, SERVICE, ChangePart.Request(**fields))
+
+    return change
+
+
+@pytest.fixture
+def wider(tmp_path):
+    """The mesh of another part."""
+    path = write_panel(tmp_path / 'wider.stl')
+    mesh = read_mesh(path, max_edge_length_m=0.05)
+    trimesh.Trimesh(1.3 * mesh.vertices_m, mesh.faces).export(path)
+    return str(path)
+
+
+def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, wider, onlooker,
+                                            wait_until, tmp_path):  # fmt: skip
+    node = simulator()
+    viewer = onlooker(
+        {'part': (Part, qos.LATCHED), 'thickness/stats': (ThicknessStats, qos.LATCHED)}
+    )
+    source = robot(node)
+    first = change(serial='4711', type='door')
+    assert first.success, first.message
+    assert (first.run, list(first.paths)) == ('4711', [])
+    source.send(MOTION)
+    film = painted(node, len(MOTION))
+    second = change(serial='4712', type='wide door', mesh_file=wider)
+    assert second.success, second.message
+    folder = tmp_path / 'films/4711'
+    assert list(second.paths) == [str(folder / f'film.{end}') for end in ('ply', 'csv', 'json')]
+    saved = np.loadtxt(folder / 'film.csv', delimiter=',', skiprows=1)[:, 3]
+    assert saved == pytest.approx(film, rel=1e-8)
+    figures = json.loads((folder / 'film.json').read_text())
+    assert figures['part'].items() >= {'serial': '4711', 'type': 'door', 'coat': 1}.items()
+    assert figures['poses']['received'] == len(MOTION)
+    assert node.film.up_to_date().film_um.max() == 0.0
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
+    source.send(later(MOTION))
+    assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
+    wait_until(lambda: (p := viewer.newest('part')) and p.serial == '4712', what='the part')
+    part = viewer.newest('part')
+    assert (part.type, part.coat, part.mesh_file) == ('wide door', 1, wider)
+    wait_until(
+        lambda: (
+            (s := viewer.newest('thickness/stats'))
+            and (s.run, s.poses_received) == ('4712', len(MOTION))
+        )
+    )
+
+
+def test_the_gun_stays_as_it_is(simulator, robot, painted, change, wider):
+    """A gun that was closed before the change is closed after it, without another word."""
+    node = simulator()
+    source = robot(node)
+    source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0)
+    source.send(WITHOUT_TRIGGER)
+    painted(node, 300)
+    source.send_state(WITHOUT_TRIGGER.stamps_ns[-1], 0.0)
+    assert change(serial='1', mesh_file=wider).success
+    source.send(later(WITHOUT_TRIGGER))
+    assert painted(node, 300).max() == 0.0
+
+
+def test_poses_that_come_while_a_mesh_is_read_wait_for_it(simulator, robot, painted, onlooker,
+                                                          wider, wait_until):  # fmt: skip
+    node = simulator(max_edge_length_m=0.015)
+    source, operator = robot(node), onlooker({})
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    future = client.call_async(ChangePart.Request(serial='1', mesh_file=wider))
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(MOTION)
+    wait_until(future.done, what='the change')
+    assert future.result().success, future.result().message
+    film = painted(node, len(MOTION))
+    assert node.mesh_file == wider
+    assert np.array_equal(film, offline_um(node, MOTION))
+
+
+def test_a_mesh_that_was_read_ahead_makes_no_gap(simulator, robot, painted, change, onlooker,
+                                                 wider, wait_until):  # fmt: skip
+    node = simulator(max_edge_length_m=0.015)
+    viewer = onlooker(DIAGNOSTICS)
+    first = node.mesh_file
+    unprepared = change(serial='1', mesh_file=wider)
+    assert unprepared.success, unprepared.message
+    # The one that has left is prepared, and so is what was read ahead.
+    back = change(serial='2', mesh_file=first)
+    again = change(serial='3', mesh_file=wider)
+    assert max(back.gap_s, again.gap_s) < 0.2 * unprepared.gap_s
+    third = write_panel(node_folder(node) / 'third.stl', reverse=True)
+    prepared = change(mesh_file=str(third), prepare=True)
+    assert prepared.success
+    assert 'third.stl is prepared: Surface(' in prepared.message
+    assert node.mesh_file == wider
+    ahead = change(serial='4', mesh_file=str(third))
+    assert ahead.gap_s < 0.2 * unprepared.gap_s
+    robot(node).send(MOTION)
+    film = painted(node, len(MOTION))
+    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the gun')
+    assert node.film.up_to_date().film_um.max() > 1.0, film.max()
+
+    def gap():
+        status = viewer.status('deposition_simulator: part')
+        return status and values_of(status)['gap of the last change [ms]']
+
+    wait_until(lambda: gap() == f'{ahead.gap_s * 1e3:.1f}', what='the gap in the diagnostics')
+
+
+def node_folder(node):
+    return Path(node.mesh_file).parent
+
+
+def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change, wider,
+                                                      tmp_path):  # fmt: skip
+    node = simulator()
+    source = robot(node)
+    assert change(serial='A-1').success
+    source.send(MOTION)
+    once = painted(node, len(MOTION))
+    refused = change(serial='A-1')
+    assert not refused.success
+    assert "serial 'A-1' is the part in the cell: say coat: true" in refused.message
+    other = change(serial='A-2', coat=True)
+    assert "coat: the part in the cell is 'A-1' of " in other.message
+    coat = change(serial='A-1', coat=True)
+    assert coat.success, coat.message
+    assert coat.run == 'A-1_coat_2'
+    source.send(later(MOTION))
+    assert painted(node, 2 * len(MOTION)) == pytest.approx(2.0 * once, rel=1e-5, abs=1e-6)
+    assert change(serial='A-2').success
+    figures = [
+        json.loads((tmp_path / 'films' / run / 'film.json').read_text())
+        for run in ('A-1', 'A-1_coat_2')
+    ]
+    assert [f['part']['coat'] for f in figures] == [1, 2]
+    assert figures[1]['mean_um'] == pytest.approx(2.0 * figures[0]['mean_um'], rel=0.1)
+    done_before = change(serial='A-1')
+    assert not done_before.success
+    assert 'A-1 is there already: a part has one run for each coat' in done_before.message
+
+
+@pytest.mark.parametrize(
+    ('fields', 'message'),
+    [
+        ({'serial': ''}, "serial '': use letters, digits"),
+        ({'serial': '../4711'}, "serial '../4711': use letters, digits"),
+        ({'serial': '..'}, "serial '..': use letters"),
+        ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
+        ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
+        ({'prepare': True}, 'prepare without a mesh_file'),
+    ],
+)
+def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted, change, fields,
+                                                      message, tmp_path):  # fmt: skip
+    node = simulator()
+    robot(node).send(MOTION)
+    film = painted(node, len(MOTION))
+    answer = change(**fields)
+    assert not answer.success
+    assert message in answer.message
+    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert not (tmp_path / 'films').exists()
+
+
+def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,
+                                                 spin, wait_until, tmp_path):  # fmt: skip
+    folder = tmp_path / 'films'
+    node = simulator()
+    recorder = RunRecorder(
+        context=ros_context,
+        parameter_overrides=parameters(output_directory=str(folder), name='before'),
+    )
+    spin(recorder)
+    source = robot(node, recorder)
+    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
+        assert change(serial=f'47-{number}', type='door').success
+        wait_until(lambda n=number: recorder.run.folder.name == f'47-{n}', what='the run')
+        source.send(motion)
+        painted(node, len(MOTION))
+        wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == len(MOTION))
+    recorder.close()
+    node.close()
+    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
+        run = folder / f'47-{number}'
+        recorded = read_trajectory(run, None, '/atomizer/state')
+        assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
+        with open_bag(run) as bag:
+            assert {topic.name for topic in bag.topics} >= {'/part', '/thickness/field'}
+        told = (run / 'metadata.yaml').read_text()
+        assert f'serial: 47-{number}' in told
+        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
+        assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
+    table = paint('runs', folder)
+    assert table.returncode == 0, table.stderr
+    heading, *rows = table.stdout.splitlines()
+    assert heading.split()[:3] == ['run', 'type', 'coat']
+    # The run before the first part has no film.
+    assert [row.split()[0] for row in rows] == ['47-1', '47-2', 'before']
+    assert rows[0].split()[1:3] == ['door', '1']
+    told = json.loads(paint('runs', folder, '--json').stdout)['runs']
+    assert [(run['serial'], run['poses'], run['recording']) for run in told] == [
+        ('47-1', len(MOTION), 'complete'),
+        ('47-2', len(MOTION), 'complete'),
+        ('', None, 'complete'),
+    ]
+    assert told[0]['film']['max_um'] == pytest.approx(saved.max(), rel=1e-3)

@@ -1,0 +1,175 @@
+"""Several guns on one part: one film, whoever's poses come first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import ThicknessField, ThicknessStats
+
+from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes, values_of, write_panel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.sag import Sag
+from paint_deposition.errors import PaintError
+from paint_deposition.files.model_file import write_model
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.runtime import qos
+
+
+def moved(motion: Trajectory, by_m: list[float]) -> Trajectory:
+    return replace(motion, positions_m=motion.positions_m + by_m)
+
+
+def from_behind(motion: Trajectory) -> Trajectory:
+    """The motion turned by half a turn about the vertical z."""
+    half_turn = Rotation.from_euler('z', np.pi)
+    turned = half_turn * Rotation.from_quat(motion.quaternions_xyzw)
+    return replace(
+        motion,
+        positions_m=half_turn.apply(motion.positions_m),
+        quaternions_xyzw=turned.as_quat(),
+    )
+
+
+GUNS = ['robot_1', 'robot_2']
+HIGH = two_passes(poses=400)
+LOW = moved(two_passes(poses=320, trigger=False), [0.1, 0.0, -0.15])
+THIN = DepositionModel(planar={'K1_cm3_per_s': 1.0})
+
+
+@pytest.fixture
+def guns(ros_context, spin, wait_until):
+    """`guns(node)`: a robot for each of GUNS, heard by the node."""
+
+    def guns(node) -> list[Robot]:
+        robots = [Robot(ros_context, namespace=name) for name in GUNS]
+        spin(*robots)
+        wait_until(lambda: all(r.is_heard_by(node) for r in robots), what='discovery')
+        return robots
+
+    return guns
+
+
+def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, painted, tmp_path):
+    write_model(tmp_path / 'thin.yaml', THIN)
+    node = simulator(atomizers=GUNS, model_files=['', str(tmp_path / 'thin.yaml')])
+    first, second = guns(node)
+    expected = offline_um(node, HIGH) + offline_um(node, LOW, THIN)
+    alone = [offline_um(node, HIGH).max(), offline_um(node, LOW, THIN).max()]
+    assert min(alone) > 1.0
+    films = []
+    for order in ('one after the other', 'the second before the first', 'in turn'):
+        if order == 'one after the other':
+            first.send(HIGH)
+            second.send(LOW)
+        elif order == 'the second before the first':
+            second.send(LOW)
+            painted(node, len(LOW))
+            first.send(HIGH)
+        else:
+            for start in range(0, len(HIGH), 37):
+                second.send(LOW, slice(start, start + 37))
+                first.send(HIGH, slice(start, start + 37))
+                painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(LOW)))
+        films.append(painted(node, len(HIGH) + len(LOW)))
+        node.reset()
+    for film in films:
+        assert np.array_equal(film, expected)
+
+
+def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until):
+    node = simulator(atomizers=GUNS)
+    fields = {f'{gun}/thickness/field': (ThicknessField, qos.RESULTS) for gun in GUNS}
+    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | fields | DIAGNOSTICS)
+    first, second = guns(node)
+    first.send(HIGH)
+    second.send(LOW)
+    painted(node, len(HIGH) + len(LOW))
+    alone = [offline_um(node, motion) for motion in (HIGH, LOW)]
+
+    def newest():
+        stats = viewer.newest('thickness/stats')
+        shown = [viewer.newest(topic) for topic in fields]
+        done = stats and stats.poses_received == len(HIGH) + len(LOW) and all(shown)
+        return done and np.max(shown[1].thickness_um) > 1.0 and stats
+
+    wait_until(newest, what='statistics of all poses')
+    stats = newest()
+    volumes = np.array([film @ node.surface.vertex_areas_m2 for film in alone])
+    assert stats.atomizers == GUNS
+    assert np.allclose(stats.atomizer_volume_cm3, volumes, rtol=1e-12)
+    assert np.allclose(stats.atomizer_share, volumes / volumes.sum(), rtol=1e-12)
+    assert sum(stats.atomizer_volume_cm3) == pytest.approx(stats.painted_volume_cm3, rel=1e-12)
+    for topic, film in zip(fields, alone, strict=True):
+        wait_until(
+            lambda t=topic, f=film: np.array_equal(
+                viewer.newest(t).thickness_um, f.astype(np.float32)
+            ),
+            what=topic,
+        )
+    share = f'{volumes[1] / volumes.sum():.1%}'
+    wait_until(
+        lambda: (
+            (s := viewer.status('deposition_simulator: film'))
+            and values_of(s).get('share of robot_2') == share
+        )
+    )
+    # Of each gun's poses by themselves.
+    status = viewer.status('deposition_simulator: robot_2/poses')
+    wait_until(
+        lambda: (
+            values_of(viewer.status('deposition_simulator: robot_2/poses'))['poses taken']
+            == str(len(LOW))
+        ),
+        what=str(status),
+    )
+
+
+def test_a_part_drawn_inside_out_is_turned_whoever_comes_first(simulator, guns, painted,
+                                                               wait_until, tmp_path):  # fmt: skip
+    """The second gun's poses may turn it before the first gun's first pose has come."""
+    reverse = write_panel(tmp_path / 'reverse.stl', reverse=True)
+    node = simulator(atomizers=GUNS, mesh_file=str(reverse))
+    first, second = guns(node)
+    second.send(LOW)
+    painted(node, len(LOW))
+    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned')
+    first.send(HIGH)
+    film = painted(node, len(HIGH) + len(LOW))
+    assert np.array_equal(film, offline_um(node, HIGH) + offline_um(node, LOW))
+
+
+def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait_until):
+    """Two guns on the two sides of a sheet; the one behind it comes first."""
+    node = simulator(atomizers=GUNS)
+    first, second = guns(node)
+    behind = from_behind(LOW)
+    second.send(behind)
+    painted(node, len(behind))
+    wait_until(lambda: node.surface.outward[1] > 0.0, what='the part turned to the second gun')
+    first.send(HIGH)
+    painted(node, len(behind) + len(HIGH))
+    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the first gun')
+    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, HIGH))
+
+
+def test_what_does_not_go_together_is_refused(simulator, tmp_path):
+    thin, sagging = str(tmp_path / 'thin.yaml'), str(tmp_path / 'sagging.yaml')
+    write_model(tmp_path / 'thin.yaml', THIN)
+    write_model(tmp_path / 'sagging.yaml', THIN.with_effect(Sag.typical()))
+    with pytest.raises(PaintError, match='model_files names 1 models for 2 atomizers: give'):
+        simulator(atomizers=GUNS, model_files=[thin])
+    with pytest.raises(PaintError, match='atomizers and model_file another: give model_file'):
+        simulator(atomizers=GUNS, model_files=[thin, thin], model_file=thin)
+    one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
+    with pytest.raises(PaintError, match=one_film):
+        simulator(atomizers=GUNS, model_files=[thin, sagging])
+    with pytest.raises(PaintError, match=r'atomizers is .*must be different names'):
+        simulator(atomizers=['robot_1', 'robot_1'])
+    with pytest.raises(PaintError, match=r'atomizers is .*must be different names'):
+        simulator(atomizers=['../robot'])
