@@ -65,7 +65,7 @@ def test_a_state_of_an_unknown_brush_is_refused_and_the_known_ones_are_named(
     )
     assert np.array_equal(film, offline_um(node, replace(MOTION, **taken), MODEL))
     refusal = 'brush 4 is not in the model; its brushes: 1, 2'
-    assert node.input.refusals_of_states == {refusal}
+    assert node.inputs[0].refusals_of_states == {refusal}
     wait_until(lambda: (s := viewer.status(POSES)) and refusal in s.message, what='the refusal')
     assert viewer.status(POSES).level == b'\x01'
 

@@ -58,7 +58,7 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     mesh = trimesh.load_mesh(folder / 'door_7.ply', process=False)
     assert np.array_equal(mesh.faces, node.surface.faces)
     figures = json.loads((folder / 'door_7.json').read_text())
-    assert figures['mesh_id'] == node.mesh_id
+    assert figures['mesh_id'] == node.shown_as.mesh_id
     assert figures['poses']['received'] == len(MOTION)
     again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
     assert not again.success

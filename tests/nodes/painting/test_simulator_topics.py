@@ -61,7 +61,7 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     colour = mesh.colors[painted_row]
     assert np.allclose([colour.r, colour.g, colour.b], expected[:3], atol=1e-6)
     field = late.newest('thickness/field')
-    assert field.mesh_id == node.mesh_id
+    assert field.mesh_id == node.shown_as.mesh_id
     assert np.array_equal(field.thickness_um, film.astype(np.float32))
     cloud = late.newest('thickness/cloud')
     values = np.frombuffer(bytes(cloud.data), np.float32).reshape(-1, 4)
