@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.geometry import look_at, require_brushes
 from paint_deposition.diagnosis.reading_choice import (
     DEFAULT_POINTS,
     DEFAULT_REPEATS,
@@ -54,7 +54,11 @@ def choose_readings(
         RecordingError: the poses make no motion, or the gun never sprays.
         ReadingsError: the part has no room for so many points.
     """
-    model = model or DepositionModel()
+    if model is not None:
+        require_brushes(trajectory, model)
+    model = (
+        (model or DepositionModel()).of_numbers(trajectory.brushes).single('a choice of points')
+    )
     seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
     part = UnmeasuredPart(seen.surface, seen.path, model, library, posterior)

@@ -77,9 +77,11 @@ class GunView:
     def landing(self) -> np.ndarray:
         """(N,) share of each pose's straight rays that meet the outward side of the part."""
         projection = self.model.projection
-        x, y, weights = pattern_rays(self.model.planar)
-        local = np.stack([x, y, np.full(len(x), projection.model_plane_m)], axis=1)
-        ways = np.einsum('nij,rj->nri', self.path.rotation, local)
+        brush = self.model.pattern_rows(self.path.brush)
+        rays = np.array([pattern_rays(planar) for planar in self.model.patterns])[brush]
+        x, y, weights = np.moveaxis(rays, 1, 0)
+        local = np.stack([x, y, np.full(x.shape, projection.model_plane_m)], axis=2)
+        ways = np.einsum('nij,nrj->nri', self.path.rotation, local)
         back = projection.emission_offset_m * self.path.rotation[:, :, 2]
         first = projection.nearest_m / projection.model_plane_m
         starts = (self.path.position_m - back)[:, None] + first * ways
@@ -88,7 +90,7 @@ class GunView:
         normals = face_normals(self.surface.vertices_m, self.surface.faces[face[hit]])
         lands = np.zeros(len(face))
         lands[hit] = np.einsum('ij,ij->i', normals, ways.reshape(-1, 3)[hit]) < 0.0
-        return lands.reshape(-1, len(weights)) @ weights
+        return np.einsum('nr,nr->n', lands.reshape(weights.shape), weights)
 
     @cached_property
     def passes(self) -> list[SprayPath]:

@@ -103,6 +103,8 @@ def correlations(fit: Fit) -> tuple[Correlation, ...]:
         Correlation(names[i], names[j], float(matrix[i, j]))
         for i in range(len(names))
         for j in range(i)
+        # Brushes share their phase.
+        if not names[i].endswith('phi_rad') or not names[j].endswith('phi_rad')
     ]
     return tuple(sorted(pairs, key=lambda pair: -abs(pair.value)))
 

@@ -1,6 +1,7 @@
 """Rows of the report's tables."""
 
 from dataclasses import astuple
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -85,12 +86,15 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
     fitted = estimates(data.diagnosis.history[-1].fit) if data.diagnosis else ()
     found = {estimate.name: estimate for estimate in fitted}
-    rows = []
-    for name in PATTERN_NAMES:
+    numbers, rows = [brush.number for brush in data.model.brushes], []
+    several = len(numbers) > 1
+    for (k, planar), name in product(enumerate(data.model.patterns), PATTERN_NAMES):
         symbol, words, unit = SYMBOLS[name]
         factor, shown = (1e3, 'mm') if unit == 'm' else (1.0, unit)
-        value = number(factor * getattr(data.model.planar, name), 4)
+        value = number(factor * getattr(planar, name), 4)
         row = {'symbol': symbol, 'words': words, 'unit': shown, 'value': value}
+        if several:
+            row['words'] = f'brush {numbers[k]}: {words}'
         if name in found:
             low, high = (number(factor * end) for end in (found[name].low, found[name].high))
             row['interval'] = f'{low} to {high}'

@@ -1,0 +1,124 @@
+"""Brushes on the command line: a plan with one of them, its film, and what is refused."""
+
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from booth import LOOKING_ALONG_Y
+from brushes import switched
+from cli.command import assert_refused, paint
+from paint_deposition.files.model_file import read_model
+from paint_deposition.files.recordings.bags import write_pose_bag
+from scenes import stamps_ns, straight_pass
+
+MODEL = """
+brushes:
+  1: {planar: {K1_cm3_per_s: 0.7, r_m: 0.1, sigma1_m: 0.06}, flow_cm3_per_min: 200, solids: 0.4,
+      bell_speed_rpm: 30000, density_g_per_cm3: 1.1}
+  2: {planar: {K1_cm3_per_s: 1.4, r_m: 0.2, sigma1_m: 0.08}, flow_cm3_per_min: 400, solids: 0.4,
+      bell_speed_rpm: 50000, density_g_per_cm3: 1.1}
+  3: {flow_cm3_per_min: 300, solids: 0.4, bell_speed_rpm: 40000, density_g_per_cm3: 1.1}
+"""
+
+
+@pytest.fixture
+def model(tmp_path):
+    path = tmp_path / 'model.yaml'
+    path.write_text(MODEL)
+    return path
+
+
+@pytest.fixture
+def panel(tmp_path):
+    corners = [[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]]
+    path = tmp_path / 'panel.stl'
+    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
+    return path
+
+
+def bag(tmp_path, *changes):
+    """A pass before the panel along which these (time [s], flow, brush) are set."""
+    motion = straight_pass(
+        np.arange(0.0, 3.0, 0.02), (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y,
+        **switched(stamps_ns([time_s for time_s, *_ in changes]), *(gun for _, *gun in changes)),
+    )  # fmt: skip
+    return write_pose_bag(tmp_path / 'run', motion)
+
+
+def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
+    run = bag(tmp_path, (0.5, 1.0, 1), (1.5, 1.0, 2), (2.5, 0.0, 0))
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', run, '--model', model, '--state-topic',
+        '/atomizer/state', '--max-edge-length-m', 0.05, '--json', '-o', tmp_path / 'film',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    assert told['emitted_volume_cm3'] == pytest.approx(0.7 + 1.4, rel=1e-6)
+    used = told['paint']
+    assert used['wet_cm3'] == pytest.approx((200 + 400) / 60, rel=1e-6)
+    assert used['mass_g'] == pytest.approx(1.1 * used['wet_cm3'], rel=1e-9)
+    on_part = told['painted_volume_cm3']
+    assert used['transfer_efficiency'] == pytest.approx(on_part / (4.0), rel=1e-6)
+    assert used['mean_wet_film_um'] == pytest.approx(told['mean_um'] / 0.4, rel=1e-9)
+    assert used['spraying_time_s_by_brush'] == pytest.approx({'1': 1.0, '2': 1.0})
+    assert told['provenance']['models']['model']['brushes'][1]['number'] == 2
+
+
+def test_an_unknown_brush_is_refused_and_those_there_are_are_named(model, panel, tmp_path):
+    run = bag(tmp_path, (0.5, 1.0, 1), (1.5, 1.0, 9), (2.5, 0.0, 0))
+    given = ('simulate', '--mesh', panel, '--trajectory', run, '--state-topic', '/atomizer/state')
+    out = ('-o', tmp_path / 'film')
+    done = paint(*given, '--model', model, *out)
+    assert_refused(done, f'{run}: brush 9 is not in the model; its brushes: 1, 2, 3')
+    # Without the trigger nothing says which of them sprays.
+    done = paint(*given[:-2], '--model', model, *out)
+    assert_refused(done, 'no brush is named; its brushes: 1, 2, 3')
+
+
+def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
+    given = ('--mesh', panel, '--model', model, '--speed', 0.4, '--max-edge-length-m', 0.05)
+    done = paint('plan', *given, '--brush', 3, '--json', '-o', tmp_path / 'plan')
+    assert done.returncode == 0, done.stderr
+    planned = json.loads(done.stdout)
+    assert set(planned['paint']['spraying_time_s_by_brush']) == {'3'}
+    (written,) = read_model(tmp_path / 'plan/model.yaml').brushes
+    assert written == read_model(model).brushes[2].model_copy(update={'interpolated': False})
+    films = []
+    for motion in ('trajectory', 'passes.mod', 'passes.csv'):
+        for chosen in ((), ('--model', model)):
+            done = paint(
+                'simulate', '--mesh', panel, '--trajectory', tmp_path / 'plan' / motion, '--json',
+                '--max-edge-length-m', 0.05, *chosen, '-o', tmp_path / 'film',
+            )  # fmt: skip
+            assert done.returncode == 0, done.stderr
+            assert 'planned with another model' not in done.stderr
+            films.append(json.loads(done.stdout)['mean_um'])
+    assert films == pytest.approx([films[0]] * 6, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ('given', 'words'),
+    [
+        ((), 'an index is for one brush and the model has 1, 2, 3: say which (brush)'),
+        (('--brush', 8), 'brush 8 is not in the model; its brushes: 1, 2, 3'),
+    ],
+)
+def test_an_index_is_for_one_brush(model, tmp_path, given, words):
+    done = paint('recommend', '--model', model, '--speed', 0.3, *given, '-o', tmp_path / 'index')
+    assert_refused(done, words)
+
+
+def test_one_pattern_has_no_number(tmp_path):
+    done = paint('recommend', '--brush', 2, '--speed', 0.3, '-o', tmp_path / 'index')
+    assert_refused(done, 'brush 2 is not in the model: it has one pattern, planar, without a')
+
+
+def test_a_brush_outside_the_calibrated_range_is_refused(model, tmp_path):
+    model.write_text(MODEL.replace('bell_speed_rpm: 40000', 'bell_speed_rpm: 55000'))
+    done = paint('recommend', '--model', model, '--brush', 3, '--speed', 0.3, '-o', tmp_path / 'x')
+    assert_refused(
+        done, f'{model}: brushes, 3: bell_speed_rpm is 55000, outside 30000 to 50000 of the',
+        'calibrate a brush there',
+    )  # fmt: skip
