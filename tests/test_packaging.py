@@ -23,7 +23,10 @@ import paint_deposition
 from paint_deposition.nodes import executables
 
 PACKAGE = 'paint_deposition'
-NODES = ('bag_player', 'deposition_simulator', 'index_planner', 'model_comparison', 'run_recorder')
+NODES = (
+    'atomizer_source', 'bag_player', 'deposition_simulator', 'index_planner', 'model_comparison',
+    'run_recorder',
+)  # fmt: skip
 SOURCES = Path(__file__).resolve().parent.parent / 'ros2_ws' / 'src'
 
 

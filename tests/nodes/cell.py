@@ -177,7 +177,11 @@ class Onlooker(Node):
 
     def first(self, topic: str):
         """The first message of a topic."""
-        return deserialize_message(self.heard[topic][0], self.types[topic])
+        return self.decoded(topic, 0)
+
+    def decoded(self, topic: str, row: int):
+        """A message of a topic, by its number."""
+        return deserialize_message(self.heard[topic][row], self.types[topic])
 
     def status(self, name: str):
         """The last DiagnosticStatus of a task, None if there was none."""

@@ -78,6 +78,21 @@ def generate_launch_description():
             description='Run the Python code of effect files that a model names [true/false]',
         ),
         DeclareLaunchArgument(
+            'urdf',
+            default_value='',
+            description='Robot whose joint states give the poses; empty: none [path]',
+        ),
+        DeclareLaunchArgument(
+            'joint_topic',
+            default_value='joint_states',
+            description="The robot's joint states, with urdf [topic]",
+        ),
+        DeclareLaunchArgument(
+            'trigger',
+            default_value='',
+            description='What opens the gun, with urdf: /gun, or "/io.level > 12" [topic]',
+        ),
+        DeclareLaunchArgument(
             'bag',
             default_value='',
             description='Bag to replay into the cell; empty: poses come from the robot [path]',
@@ -145,7 +160,13 @@ def generate_launch_description():
             LaunchConfiguration('wait_for_subscribers'), value_type=int
         ),
     }
+    robot = {
+        'urdf_file': text('urdf'),
+        'joint_topic': text('joint_topic'),
+        'trigger': text('trigger'),
+    }
     nodes = [
+        cell_node('atomizer_source', robot, given('urdf')),
         cell_node('deposition_simulator', mesh | model),
         cell_node('index_planner', model),
         cell_node('bag_player', replay, given('bag')),

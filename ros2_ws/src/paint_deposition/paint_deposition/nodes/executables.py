@@ -28,6 +28,7 @@ def _run(name: str, folder: str, node_class: str) -> int:
     return process.run_node(getattr(module, node_class), told_to_stop)
 
 
+atomizer_source = partial(_run, 'atomizer_source', 'robot', 'AtomizerSource')
 bag_player = partial(_run, 'bag_player', 'replay', 'BagPlayer')
 deposition_simulator = partial(_run, 'deposition_simulator', 'painting', 'DepositionSimulator')
 index_planner = partial(_run, 'index_planner', 'planning', 'IndexPlanner')

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -12,16 +11,13 @@ import numpy as np
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.trajectory import numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # What a state tells of the process while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
-SYNTAX = re.compile(
-    r'(?P<topic>[\w/~]+)(?P<path>(\.\w+|\[\d+\])*)\s*((?P<side>[<>])\s*(?P<level>[-+.\deE]+))?'
-)
-STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
 MOST_FIELDS = 12
 
 
@@ -100,36 +96,27 @@ def read_switching(bag: Bag, name: str) -> Switching:
     Raises:
         RecordingError: there is no such topic or field, or it is no switch.
     """
-    said = SYNTAX.fullmatch(name.strip())
-    topic = bag.find(said['topic']) if said else None
-    if said is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
+    signal = Signal.of(name)
+    topic = bag.find(signal.topic) if signal else None
+    if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
         return _states(bag, choose_state_topic(bag, name))
-    level = _level(said['level'], name)
-    steps = STEP.findall(said['path'])
-    rows = list(_values(bag, topic, steps))
+    rows = list(_values(bag, topic, signal))
     if not rows:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
     stamps, values, stamped = (np.array(column) for column in zip(*rows, strict=True))
     known = np.isfinite(values)
     order = np.argsort(stamps[known], kind='stable')
     stamps, values = stamps[known][order], values[known][order]
-    on = values < level if said['side'] == '<' else values > level
-    side = 'below' if said['side'] == '<' else 'above'
+    on = signal.is_on(values)
+    side = 'below' if signal.below else 'above'
     low, high = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
     note = (
-        f'trigger {topic.name}{said["path"]} is {low:.4g} to {high:.4g}: the gun is on where it '
-        f'is {side} {level:g}'
+        f'trigger {topic.name}{signal.path} is {low:.4g} to {high:.4g}: the gun is on where it '
+        f'is {side} {signal.level:g}'
     )
     if not known.all():
         note += f'; {np.count_nonzero(~known)} values that are no number are left out'
     return Switching(stamps, on.astype(float), numbered([]), {}, not stamped.all(), (note,))
-
-
-def _level(text: str | None, name: str) -> float:
-    try:
-        return float(text or 0.0)
-    except ValueError:
-        raise RecordingError(f"{name}: '{text}' is no number; give a level, 12 say") from None
 
 
 def _states(bag: Bag, topic: BagTopic) -> Switching:
@@ -169,35 +156,21 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     )
 
 
-def _values(
-    bag: Bag, topic: BagTopic, steps: list[tuple[str, str]]
-) -> Iterator[tuple[int, float, bool]]:
+def _values(bag: Bag, topic: BagTopic, signal: Signal) -> Iterator[tuple[int, float, bool]]:
     """(time, value, whether the time is the message's own stamp) of each message."""
     for _, log_time_ns, message in bag.decoded([topic.name]):
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
-        # The messages of std_msgs have one field.
-        value = _followed(message, steps or [('data', '')])
-        if not isinstance(value, bool | int | float | np.bool_ | np.number):
-            raise RecordingError(_no_field(bag, topic, message, steps))
-        yield stamp or log_time_ns, float(value), bool(stamp)
+        value = signal.value(message)
+        if value is None:
+            raise RecordingError(_no_field(bag, topic, message, signal.path))
+        yield stamp or log_time_ns, value, bool(stamp)
 
 
-def _followed(value: Any, steps: list[tuple[str, str]]) -> Any:
-    """What a path of names and indices leads to, None where it ends before."""
-    try:
-        for name, index in steps:
-            value = getattr(value, name) if name else value[int(index)]
-    except (AttributeError, IndexError, TypeError):
-        return None
-    return value
-
-
-def _no_field(bag: Bag, topic: BagTopic, message: Any, steps: list[tuple[str, str]]) -> str:
+def _no_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:
     """What is wrong with a field, and those that could be meant."""
-    path = ''.join(f'.{name}' if name else f'[{index}]' for name, index in steps)
     found = [f'{topic.name}{switch}' for switch in _switches(message)]
     listed = ' '.join(found[:MOST_FIELDS]) + (' ...' if len(found) > MOST_FIELDS else '')
-    if not steps:
+    if not path:
         return f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
     remedy = did_you_mean(topic.name + path, found, f'there are: {listed or "none"}')
     return f'{topic.name} in {bag.path} has no number or Bool at {path}; {remedy}'

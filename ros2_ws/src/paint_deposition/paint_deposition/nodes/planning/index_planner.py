@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,10 +12,11 @@ from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.planning.planning_actions import PlanningActions
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import header
@@ -29,7 +30,7 @@ from paint_deposition.nodes.runtime.parameters import (
     thickness,
 )
 from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
-from paint_deposition.planning.plan import plan
+from paint_deposition.planning.plan import Plan, plan
 from paint_deposition.planning.plan_request import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest
 from paint_deposition.planning.recommendation import Recommendation, recommend
 
@@ -63,6 +64,7 @@ PLANNER = dict(
         'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
         'orientation and lays the same profile both ways [-]',
     ),
+    output_directory=NodeParameter('runs', 'Where the action `diagnose` writes [path]'),
     **fixed(
         'passes are planned once, when the node starts; restart the node with the new value',
         **mesh_parameters(max_edge_length_m=0.02),
@@ -109,11 +111,18 @@ class IndexPlanner(PaintNode):
         self._path_publisher = self.create_publisher(Path, 'planned_path', qos.LATCHED)
         if self._path is not None:
             self._path_publisher.publish(self._path)
+        self._actions = PlanningActions(self)
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
     def _prepare(self) -> None:
         self._model = read_chosen_model(self.values)
-        self._path = self._planned() if self.values['mesh_file'] else None
+        self._path = None
+        if self.values['mesh_file']:
+            planned = self._planned(self.values)
+            self._path = self._path_of(planned)
+
+    def close(self) -> None:
+        self._actions.close()
 
     # --- recommending
 
@@ -153,8 +162,23 @@ class IndexPlanner(PaintNode):
 
     # --- planning
 
-    def _planned(self) -> Path:
-        values = self.values
+    def plan_and_show(
+        self, changed: Mapping[str, Any], tell: Callable[[str, float], None]
+    ) -> tuple[Plan, Path]:
+        """Plan passes with other values of parameters, and publish them."""
+        planned = self._planned(self.values | dict(changed), tell)
+        path = self._path_of(planned)
+        self._path_publisher.publish(path)
+        return planned, path
+
+    def _planned(
+        self,
+        values: Mapping[str, Any],
+        tell: Callable[[str, float], None] = lambda what, share: None,
+    ) -> Plan:
+        if not values['mesh_file']:
+            raise PlanError('mesh_file is empty: name the mesh of the part')
+        tell('reading the mesh', 0.0)
         surface = read_mesh(values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)
@@ -174,8 +198,12 @@ class IndexPlanner(PaintNode):
                 outward=tuple(values['outward']) or None,
             ),
             frame_id,
+            tell,
         )
         self.get_logger().info(planned.sentence)
+        return planned
+
+    def _path_of(self, planned: Plan) -> Path:
         return _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
 
     # --- state

@@ -47,9 +47,12 @@ def read_chosen_model(
     """
     if not values['model_file']:
         return DepositionModel()
-    return read_model(
-        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
-    )
+    return read_model(values['model_file'], effect_loader(values, load))
+
+
+def effect_loader(values: Mapping[str, Any], load: LoadEffect = load_effect_file) -> LoadEffect:
+    """What reads the effect files of a model, or refuses them."""
+    return load if values['allow_user_effects'] else _refuse_effect_file
 
 
 def read_chosen_models(

@@ -1,0 +1,71 @@
+"""A signal of the cell: a number or Bool in a field of any message, and when it means on."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import RecordingError
+
+SYNTAX = re.compile(
+    r'(?P<topic>[\w/~]+)(?P<path>(\.\w+|\[\d+\])*)\s*((?P<side>[<>])\s*(?P<level>[-+.\deE]+))?'
+)
+STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
+
+
+@dataclass(frozen=True)
+class Signal:
+    """What is meant by ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
+
+    Attributes:
+        topic: its name. path: to the field, '' for a message that has one field, ``data``.
+        below: whether it is on below the level and not above it.
+        level: beyond which it is on.
+    """
+
+    topic: str
+    path: str
+    below: bool = False
+    level: float = 0.0
+
+    @staticmethod
+    def of(text: str) -> Signal | None:
+        """The signal that a text names, None if it names none.
+
+        Raises:
+            RecordingError: the level is no number.
+        """
+        said = SYNTAX.fullmatch(text.strip())
+        if said is None:
+            return None
+        try:
+            level = float(said['level'] or 0.0)
+        except ValueError:
+            raise RecordingError(
+                f"{text}: '{said['level']}' is no number; give a level, 12 say"
+            ) from None
+        return Signal(said['topic'], said['path'], said['side'] == '<', level)
+
+    @property
+    def steps(self) -> list[tuple[str, str]]:
+        """(name, '') or ('', index) of each step of the path."""
+        return STEP.findall(self.path)
+
+    def value(self, message: Any) -> float | None:
+        """The number in a message, None where there is none."""
+        value = message
+        # The messages of std_msgs have one field.
+        try:
+            for name, index in self.steps or [('data', '')]:
+                value = getattr(value, name) if name else value[int(index)]
+        except (AttributeError, IndexError, TypeError):
+            return None
+        known = isinstance(value, bool | int | float | np.bool_ | np.number)
+        return float(value) if known else None
+
+    def is_on(self, values: Any) -> Any:
+        """Whether a value, or each of an array, means on."""
+        return values < self.level if self.below else values > self.level

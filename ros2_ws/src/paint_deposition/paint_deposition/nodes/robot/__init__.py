@@ -1,0 +1,1 @@
+"""What a robot tells of its gun, for those who follow `atomizer/pose` and `atomizer/state`."""

@@ -1,0 +1,227 @@
+"""Node `atomizer_source`: poses and states of the gun from what a robot's driver publishes."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from paint_msgs.msg import AtomizerState
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
+from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.files.recordings.signals import Signal
+from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+
+if TYPE_CHECKING:  # older distributions have no such name
+    from rclpy.subscription import MessageInfo
+
+QUEUE_DEPTH = 5000
+# Who comes late must know whether the gun is open; who is slow must miss no change.
+LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+DISCOVERY_PERIOD_S = 0.1
+SILENT_S = 2.0
+# (topic, message, what the middleware says of it)
+TakeMessage = Callable[[str, Any, 'MessageInfo'], None]
+SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
+
+SOURCE = fixed(
+    'the subscriptions are made with it when the node starts; restart the node',
+    urdf_file=NodeParameter('', 'The robot, URDF [path]'),
+    tip_link=NodeParameter('', 'Link that carries the bell; empty: tool0, else the last [name]'),
+    base_link=NodeParameter('', 'Link in which the poses are; empty: the root [name]'),
+    joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
+    tcp_offset=NodeParameter(
+        [],
+        'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link is '
+        'the TCP [m, -]',
+        constraints=f'{POSE_WORDS}, or none',
+        allows=lambda value: not value or is_pose(value),
+        element=float,
+    ),
+    trigger=NodeParameter(
+        '', f'What opens the gun: {SIGNAL}; empty: nothing is published on atomizer/state [topic]'
+    ),
+    flow=NodeParameter('', f'What tells the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
+    calibrated_flow=NodeParameter(
+        1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
+    ),
+)
+
+
+class AtomizerSource(PaintNode):
+    """Publishes `atomizer/pose` from the joints of a robot, and `atomizer/state` from signals.
+
+    A pose has the stamp of the joint state that it was computed from. A signal counts from the
+    stamp of its message, or else from the time at which it was sent.
+    """
+
+    PARAMETERS = SOURCE
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('atomizer_source', **kwargs)
+        self._pose_publisher = self.create_publisher(
+            PoseStamped, 'atomizer/pose', QoSProfile(depth=qos.POSE_DEPTH)
+        )
+        self._state_publisher = self.create_publisher(
+            AtomizerState, 'atomizer/state', LATCHED_STATES
+        )
+        # The joints and the signals that have no publisher yet.
+        self._missing: dict[str, TakeMessage] = {self.values['joint_topic']: self._take_joints}
+        for signal in filter(None, (self._trigger, self._flow)):
+            self._missing[signal.topic] = self._take_signals
+        self._values: dict[Signal, float] = {}
+        self._told: tuple[bool, float] | None = None
+        self._poses = self._without_joints = 0
+        self._joints_s = time.monotonic()
+        self._clock_offset_s = 0.0
+        self._problem = ''
+        self._find_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._find_topics)
+        tasks = {'robot': self._robot_status, 'signals': self._signals_status}
+        self._diagnostics = Diagnostics(self, tasks)
+
+    def _check(self, values: Mapping[str, Any]) -> None:
+        if not values['urdf_file']:
+            raise PaintError(f'{self.get_name()}: urdf_file is empty: give the robot')
+        if values['flow'] and not values['trigger']:
+            raise PaintError('flow is given without a trigger: name what opens the gun')
+        for name in ('trigger', 'flow'):
+            if values[name] and Signal.of(values[name]) is None:
+                raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
+
+    def _prepare(self) -> None:
+        values = self.values
+        self._robot = Robot.read(
+            Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
+        )
+        self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        self._trigger = Signal.of(values['trigger'])
+        self._flow = Signal.of(values['flow'])
+
+    # --- poses
+
+    def _take_joints(self, _topic: str, message: JointState, info: MessageInfo) -> None:
+        told = dict(zip(message.name, message.position, strict=False))
+        if any(name not in told for name in self._robot.moving):
+            self._without_joints += 1
+            return
+        self._joints_s = time.monotonic()
+        stamp = stamp_ns(message.header)
+        if info['source_timestamp']:
+            self._clock_offset_s = (info['source_timestamp'] - stamp) * 1e-9
+        values = np.array([[told[name] for name in self._robot.moving]])
+        positions, quaternions = self._robot.poses(values)
+        x, y, z, qx, qy, qz, qw = (Rigid.of([*positions[0], *quaternions[0]]) @ self._tcp).values
+        pose = PoseStamped()
+        pose.header.frame_id = self._robot.base
+        pose.header.stamp = Time(nanoseconds=stamp).to_msg()
+        p, q = pose.pose.position, pose.pose.orientation
+        p.x, p.y, p.z = x, y, z
+        q.x, q.y, q.z, q.w = qx, qy, qz, qw
+        self._pose_publisher.publish(pose)
+        self._poses += 1
+
+    # --- signals
+
+    def _find_topics(self) -> None:
+        """Subscribe to each topic when its type and its quality of service are known."""
+        for topic, take in tuple(self._missing.items()):
+            found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
+            if found:
+                package, kind, name = found[0].topic_type.split('/')
+                message = getattr(importlib.import_module(f'{package}.{kind}'), name)
+                profile = qos.accepting([info.qos_profile for info in found], QUEUE_DEPTH)
+                self.create_subscription(message, topic, _with_topic(take, topic), profile)
+                del self._missing[topic]
+        if not self._missing:
+            self._find_timer.cancel()
+
+    def _take_signals(self, topic: str, message: Any, info: MessageInfo) -> None:
+        """Take trigger and flow, which may be fields of one message."""
+        stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
+        self._problem = ''
+        for signal in (self._flow, self._trigger):
+            if signal is None or signal.topic != topic:
+                continue
+            value = signal.value(message)
+            if value is None:
+                self._problem = (
+                    f'{topic}: {type(message).__name__} has no number or Bool at '
+                    f'{signal.path or ".data"}'
+                )
+            elif not stamp and abs(self._clock_offset_s) > MAX_CLOCK_OFFSET_S:
+                self._problem = (
+                    f'{topic} has no stamps, and the joint states are sent '
+                    f'{self._clock_offset_s:.3g} s off their own stamps: set the clocks'
+                )
+            else:
+                self._values[signal] = value
+        if not self._problem:
+            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
+            self._publish_state(stamp or now_ns)
+
+    def _publish_state(self, stamp: int) -> None:
+        """Publish the state from this time on, if it has changed."""
+        if self._trigger not in self._values:
+            return
+        on = bool(self._trigger.is_on(self._values[self._trigger]))
+        flow = 1.0
+        if self._flow is not None:
+            flow = self._values.get(self._flow, np.nan) / self.values['calibrated_flow']
+        if (on, flow) == self._told:
+            return
+        self._told = on, flow
+        state = AtomizerState(spraying=on, flow=flow)
+        state.header.frame_id = self._robot.base
+        state.header.stamp = Time(nanoseconds=stamp).to_msg()
+        self._state_publisher.publish(state)
+
+    # --- health
+
+    def _robot_status(self) -> Status:
+        values = {
+            'robot': self._robot.path,
+            'poses': f"of '{self._robot.tip}' in '{self._robot.base}'",
+            'published': self._poses,
+            'joint states without all joints': self._without_joints,
+        }
+        if self._without_joints and not self._poses:
+            joints = ' '.join(self._robot.moving)
+            return Status(ERROR, f'no joint state tells of all of {joints}', values)
+        if time.monotonic() - self._joints_s > SILENT_S:
+            return Status(WARN, f'no joint states on {self.values["joint_topic"]}', values)
+        return Status(OK, 'following the robot', values)
+
+    def _signals_status(self) -> Status:
+        values = {
+            signal.topic + signal.path: self._values.get(signal, 'not heard')
+            for signal in (self._trigger, self._flow)
+            if signal is not None
+        }
+        if self._problem:
+            return Status(ERROR, self._problem, values)
+        missing = [name for name, value in values.items() if value == 'not heard']
+        if missing:
+            return Status(WARN, f'not heard: {" ".join(missing)}', values)
+        return Status(OK, 'following the signals' if values else 'no signal is named', values)
+
+
+def _with_topic(take: TakeMessage, topic: str) -> Callable[[Any, MessageInfo], None]:
+    # rclpy counts the arguments of a callback: two are the message and what is said of it.
+    def on_message(message: Any, info: MessageInfo) -> None:
+        take(topic, message, info)
+
+    return on_message

@@ -1,0 +1,139 @@
+"""Passes and diagnoses as actions over real DDS: feedback, result, refusal and cancel."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from action_msgs.msg import GoalStatus
+from nav_msgs.msg import Path
+from paint_msgs.action import Diagnose, PlanPasses
+from paint_msgs.srv import RecommendIndex
+from rclpy.action import ActionClient
+from rclpy.node import Node
+
+from nodes.cell import parameters, write_panel
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.runtime import qos
+from paint_deposition.planning.plan import PlanRequest, plan
+
+COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
+
+
+@pytest.fixture
+def planner(ros_context, spin, tmp_path):
+    """`planner(**parameters)`: a planner that runs, and is closed at the end."""
+    made = []
+
+    def planner(**values) -> IndexPlanner:
+        chosen = COARSE | {'output_directory': str(tmp_path / 'runs')} | values
+        made.append(IndexPlanner(context=ros_context, parameter_overrides=parameters(**chosen)))
+        spin(made[-1])
+        return made[-1]
+
+    yield planner
+    for node in made:
+        node.close()
+
+
+@pytest.fixture
+def ask(ros_context, spin, wait_until):
+    """`ask(action, name, cancel_at='', **goal)`: the status, the result and the feedback."""
+    user = Node('user', context=ros_context)
+    spin(user)
+
+    def ask(action, action_name, cancel_at='', **goal):
+        client = ActionClient(user, action, action_name)
+        wait_until(client.server_is_ready, what=f'action {action_name}')
+        heard, cancelled = [], []
+
+        def hear(message) -> None:
+            heard.append(message.feedback)
+            if cancel_at and message.feedback.stage == cancel_at and not cancelled:
+                cancelled.append(handle.cancel_goal_async())
+
+        sent = client.send_goal_async(action.Goal(**goal), feedback_callback=hear)
+        wait_until(sent.done, what='the goal')
+        handle = sent.result()
+        done = handle.get_result_async()
+        wait_until(done.done, what='the result')
+        client.destroy()
+        return done.result().status, done.result().result, heard
+
+    return ask
+
+
+def test_passes_are_planned_with_feedback(planner, ask, onlooker, wait_until, tmp_path):
+    mesh = write_panel(tmp_path / 'panel.stl')
+    planner()
+    viewer = onlooker({'planned_path': (Path, qos.LATCHED)})
+    status, result, heard = ask(
+        PlanPasses, 'plan_passes', mesh_file=str(mesh), target_um=15.0, direction='vertical'
+    )
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.message
+    expected = plan(
+        read_mesh(mesh, max_edge_length_m=0.05),
+        DepositionModel(),
+        PlanRequest(direction='vertical', target_um=15.0),
+    )
+    assert result.message == expected.sentence
+    assert (result.passes, result.mean_um) == (len(expected.passes), expected.mean_um)
+    assert result.speed_m_per_s == expected.style.speed_m_per_s
+    stages = [feedback.stage for feedback in heard]
+    assert stages[:2] == ['begin', 'reading the mesh']
+    assert {'single passes', 'film'} <= set(stages)
+    wait_until(lambda: viewer.newest('planned_path'), what='the path')
+    path = viewer.newest('planned_path')
+    assert path == result.path
+    assert len(path.poses) > 10
+
+
+def test_what_has_no_answer_is_aborted_with_the_reason(planner, ask, tmp_path):
+    planner()
+    status, result, _ = ask(PlanPasses, 'plan_passes')
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.message == 'mesh_file is empty: name the mesh of the part'
+    status, result, _ = ask(PlanPasses, 'plan_passes', mesh_file='nowhere.stl')
+    assert 'nowhere.stl: no such mesh file' in result.message
+    status, result, _ = ask(Diagnose, 'diagnose', campaign_file='x.yaml', name='../out')
+    assert status == GoalStatus.STATUS_ABORTED
+    assert "name '../out': use letters" in result.message
+    (tmp_path / 'runs/done').mkdir(parents=True)
+    _, result, _ = ask(Diagnose, 'diagnose', campaign_file='x.yaml', name='done')
+    assert 'runs/done is there already: choose another name' in result.message
+
+
+def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
+    planner, ask, ros_context, spin, wait_until, tmp_path
+):
+    mesh = write_panel(tmp_path / 'panel.stl')
+    planner(max_edge_length_m=0.01)
+    asker = Node('asker', context=ros_context)
+    spin(asker)
+    client = asker.create_client(RecommendIndex, 'recommend_index')
+    wait_until(client.service_is_ready)
+    answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
+    status, result, heard = ask(
+        PlanPasses, 'plan_passes', cancel_at='single passes', mesh_file=str(mesh)
+    )
+    assert status == GoalStatus.STATUS_CANCELED
+    assert (result.success, result.message) == (False, 'cancelled')
+    assert heard[-1].stage == 'single passes'
+    wait_until(answer.done)
+    assert answer.result().success
+
+
+@pytest.mark.timeout(600)
+def test_a_diagnosis_is_cancelled_and_leaves_nothing(planner, ask, repository, tmp_path):
+    planner()
+    sample = repository / 'ros2_ws/src/paint_deposition/samples/measured_door/campaign.yaml'
+    status, _, heard = ask(
+        Diagnose, 'diagnose', cancel_at='reading door', campaign_file=str(sample), name='door'
+    )
+    assert status == GoalStatus.STATUS_CANCELED
+    assert np.all([feedback.stage for feedback in heard])
+    assert not (tmp_path / 'runs').exists()

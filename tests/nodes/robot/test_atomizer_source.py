@@ -1,0 +1,179 @@
+"""Poses from joints and states from signals, over real DDS, as a robot's driver sends them."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseStamped
+from paint_msgs.msg import AtomizerState
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Bool, Float64, UInt16
+
+from nodes.cell import DIAGNOSTICS, parameters
+from paint_deposition.errors import PaintError
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
+from robot_arm import JOINTS, tip_poses, urdf
+
+WAY = np.linspace([0.1, -0.2, 0.3, 0.0, 0.2, -0.1], [0.4, 0.1, 0.1, 0.3, -0.2, 0.5], 40)
+STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+
+
+class Driver(Node):
+    """A robot's driver: joint states, best effort as some send them, and signals."""
+
+    def __init__(self, context, signals=()) -> None:
+        super().__init__('driver', context=context)
+        profile = QoSProfile(depth=100, reliability=ReliabilityPolicy.BEST_EFFORT)
+        self.joints = self.create_publisher(JointState, 'joint_states', profile)
+        self.signals = {topic: self.create_publisher(kind, topic, 10) for topic, kind in signals}
+
+    def move(self, stamps_ns, names=JOINTS, rows=WAY) -> None:
+        for stamp, row in zip(stamps_ns, rows, strict=True):
+            message = JointState(name=['rail', *names], position=[9.0, *row.tolist()])
+            message.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
+            self.joints.publish(message)
+
+    def is_heard(self) -> bool:
+        publishers = [self.joints, *self.signals.values()]
+        return all(publisher.get_subscription_count() for publisher in publishers)
+
+
+@pytest.fixture
+def source(ros_context, spin, tmp_path):
+    """`source(**parameters)`: the node, with the arm's URDF."""
+
+    def source(**values) -> AtomizerSource:
+        (tmp_path / 'arm.urdf').write_text(urdf())
+        chosen = {'urdf_file': str(tmp_path / 'arm.urdf')} | values
+        node = AtomizerSource(context=ros_context, parameter_overrides=parameters(**chosen))
+        spin(node)
+        return node
+
+    return source
+
+
+@pytest.fixture
+def driver(ros_context, spin, wait_until):
+    def driver(*signals) -> Driver:
+        node = Driver(ros_context, signals)
+        spin(node)
+        wait_until(node.is_heard, what='discovery')
+        return node
+
+    return driver
+
+
+@pytest.fixture
+def viewer(onlooker):
+    return onlooker(
+        {
+            'atomizer/pose': (PoseStamped, QoSProfile(depth=500)),
+            'atomizer/state': (AtomizerState, STATES),
+        }
+        | DIAGNOSTICS
+    )
+
+
+def stamps_from_now() -> np.ndarray:
+    return time.time_ns() + 4_000_000 * np.arange(len(WAY))
+
+
+def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until):
+    offset = [0.0, 0.02, 0.15, 0.0, np.sin(0.2), 0.0, np.cos(0.2)]
+    source(tcp_offset=offset)
+    robot = driver()
+    wait_until(lambda: viewer.count_publishers('atomizer/pose'))
+    stamps = stamps_from_now()
+    robot.move(stamps)
+    wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY), what='the poses')
+    pose = viewer.newest('atomizer/pose')
+    expected = Rigid.of(np.concatenate([column[-1] for column in tip_poses(WAY)])) @ Rigid.of(
+        offset
+    )
+    p, q = pose.pose.position, pose.pose.orientation
+    assert [p.x, p.y, p.z] == pytest.approx(list(expected.values[:3]), abs=1e-9)
+    quaternion = np.array([q.x, q.y, q.z, q.w])
+    assert abs(quaternion @ expected.values[3:]) == pytest.approx(1.0, abs=1e-9)
+    assert pose.header.frame_id == 'base_link'
+    assert pose.header.stamp == Time(nanoseconds=int(stamps[-1])).to_msg()
+
+
+@pytest.mark.parametrize(
+    ('trigger', 'kind', 'off', 'on'),
+    [
+        ('/gun', Bool, False, True),
+        ('/io.data > 3', UInt16, 3, 4),
+        ('closed < 1', UInt16, 1, 0),
+    ],
+)
+def test_a_signal_opens_the_gun(source, driver, viewer, wait_until, trigger, kind, off, on):
+    source(trigger=trigger)
+    topic = trigger.split()[0].split('.')[0]
+    robot = driver((topic, kind))
+    for value in (off, off, on, on, off):
+        robot.signals[topic].publish(kind(data=value))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 3, what='the changes')
+    assert viewer.newest('atomizer/state').spraying is False
+    first = viewer.first('atomizer/state')
+    assert abs(first.header.stamp.sec - time.time()) < 60.0
+
+
+def test_an_analogue_signal_is_the_flow(source, driver, viewer, wait_until):
+    source(trigger='/paint_ml_min > 5', flow='/paint_ml_min', calibrated_flow=250.0)
+    robot = driver(('/paint_ml_min', Float64))
+    for value in (0.0, 250.0, 300.0, 0.0):
+        robot.signals['/paint_ml_min'].publish(Float64(data=value))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 4, what='the changes')
+    told = [viewer.decoded('atomizer/state', row) for row in range(4)]
+    assert [state.spraying for state in told] == [False, True, True, False]
+    assert [state.flow for state in told] == [0.0, 1.0, 1.2, 0.0]
+
+
+def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
+    source(trigger='/io.level > 1')
+    robot = driver(('/io', UInt16))
+    robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
+    robot.signals['/io'].publish(UInt16(data=1))
+
+    def status(task):
+        return viewer.status(f'atomizer_source: {task}')
+
+    wait_until(lambda: (s := status('robot')) and 'no joint state tells of all' in s.message)
+    assert 'wrist_roll' in status('robot').message
+    wait_until(lambda: '/io: UInt16 has no number or Bool at .level' in status('signals').message)
+    assert status('signals').level == b'\x02'
+
+
+def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, wait_until):
+    source(trigger='/gun')
+    robot = driver(('/gun', Bool))
+    robot.move(stamps_from_now() - 30_000_000_000)
+    wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY))
+    robot.signals['/gun'].publish(Bool(data=True))
+    told = '/gun has no stamps, and the joint states are sent 29.'
+    wait_until(lambda: (s := viewer.status('atomizer_source: signals')) and told in s.message)
+    assert not viewer.heard['atomizer/state']
+
+
+@pytest.mark.parametrize(
+    ('values', 'message'),
+    [
+        ({'urdf_file': ''}, 'urdf_file is empty: give the robot'),
+        ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
+        ({'flow': '/flow'}, 'flow is given without a trigger'),
+        ({'trigger': '/io > many'}, "trigger is '/io > many': give a topic"),
+        ({'tip_link': 'bell'}, "no link 'bell'"),
+    ],
+)
+def test_bad_input_is_refused(source, values, message):
+    with pytest.raises(PaintError, match=message):
+        source(**values)
