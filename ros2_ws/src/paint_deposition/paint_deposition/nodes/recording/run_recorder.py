@@ -34,6 +34,7 @@ DEFAULT_TOPICS = (
     'comparison/stats',
     'planned_path',
     # Where the part stood, for poses that are not in its frame.
+    'part_pose',
     '/tf',
     '/tf_static',
     '/diagnostics',
