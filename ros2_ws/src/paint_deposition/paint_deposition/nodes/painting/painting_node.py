@@ -14,6 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
@@ -54,6 +55,8 @@ class PaintingNode(PaintNode, ABC):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
         self.input = AtomizerInput(self)
+        self._shown: FilmIntegrator | None = None
+        self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
@@ -106,6 +109,13 @@ class PaintingNode(PaintNode, ABC):
         self.film.reset()
         if self.repainting is not None:
             self._repaint()
+
+    def _reset(self) -> tuple[bool, str]:
+        poses = self.film.counts.received
+        self.reset()
+        self._shown = None
+        self.publish()
+        return True, f'bare metal again; {poses} poses forgotten'
 
     def up_to_date(self) -> None:
         """Paint all poses that have come, and take over a film that has been prepared."""
