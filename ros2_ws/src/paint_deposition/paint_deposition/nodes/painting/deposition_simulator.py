@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import re
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
@@ -34,12 +33,15 @@ from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import Diagnostics
 from paint_deposition.nodes.runtime.messages import ColouredMesh
-from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
+from paint_deposition.nodes.runtime.parameters import (
+    FILE_NAME,
+    FILE_NAME_WORDS,
+    NodeParameter,
+    thickness,
+)
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.results.film import write_film
-
-STEM = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
 
 SIMULATOR = dict(
     **PAINTING,
@@ -60,7 +62,11 @@ SIMULATOR = dict(
         True,
         'Whether the coloured mesh goes out; of 275,000 vertices it takes 65 MB each time [-]',
     ),
-    output_directory=NodeParameter('runs', 'Where ~/save_film writes [path]'),
+    output_directory=NodeParameter(
+        'runs',
+        'Where ~/save_film writes [path]',
+        fixed_because='the network does not choose where files are written; restart the node',
+    ),
 )
 
 
@@ -201,10 +207,8 @@ class DepositionSimulator(PaintingNode):
     ) -> SaveFilm.Response:
         """Write in a thread: poses keep coming meanwhile."""
         stem = request.name or time.strftime('film_%Y%m%d_%H%M%S')
-        if not STEM.fullmatch(stem):
-            response.message = (
-                f"name '{stem}': use letters, digits, '-', '_' and '.', the last not in front"
-            )
+        if not FILE_NAME.fullmatch(stem):
+            response.message = f"name '{stem}': use {FILE_NAME_WORDS}"
             return response
         self.up_to_date()
         film = self.film.up_to_date()

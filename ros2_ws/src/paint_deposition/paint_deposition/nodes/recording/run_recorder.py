@@ -17,12 +17,18 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.log_time import LogTime
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, header
 from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import (
+    FILE_NAME,
+    FILE_NAME_WORDS,
+    NodeParameter,
+    fixed,
+)
 
 # The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
 DEFAULT_TOPICS = (
@@ -56,7 +62,12 @@ RECORDER = fixed(
         element=str,
     ),
     output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
-    name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
+    name=NodeParameter(
+        '',
+        "Run's name; empty: run_<date>_<time> [text]",
+        constraints=FILE_NAME_WORDS,
+        allows=lambda value: not value or bool(FILE_NAME.fullmatch(value)),
+    ),
     compression=NodeParameter(
         'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
     ),
@@ -85,6 +96,7 @@ class RunRecorder(PaintNode):
         self._topics: dict[str, RecordedTopic] = {}
         self._refused: set[str] = set()
         self._error: RecordingError | None = None
+        self._log_time = LogTime()
         self._pose_topic = self.resolve_topic_name('atomizer/pose')
         self._progress = self.create_publisher(PoseProgress, PROGRESS_TOPIC, qos.PROGRESS)
         self.offer('~/stop', self._stop)
@@ -140,7 +152,14 @@ class RunRecorder(PaintNode):
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
-        self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
+        set_back_ns = self._log_time.set_back_ns
+        log_time_ns = self._log_time.of(received_ns)
+        if self._log_time.set_back_ns > set_back_ns:
+            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
+            self.get_logger().warning(
+                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
+            )
+        self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name == self._pose_topic and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 

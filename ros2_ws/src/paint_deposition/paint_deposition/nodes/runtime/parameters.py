@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -22,6 +23,9 @@ from paint_deposition.errors import PaintError, did_you_mean
 
 INT64_MAX = 2**63 - 1
 # What rclpy itself declares, or reads while it makes publishers and subscriptions.
+# Names of files that somebody else may give: they stay in their folder.
+FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+FILE_NAME_WORDS = "letters, digits, '-', '_' and '.', the last not in front"
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 RESERVED_PREFIX = 'qos_overrides.'
 TYPE_WORDS = {
