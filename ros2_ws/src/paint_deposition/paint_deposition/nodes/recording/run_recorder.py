@@ -18,10 +18,15 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.log_time import LogTime
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.file_names import require_file_name
+from paint_deposition.nodes.runtime.file_names import (
+    FILE_NAME,
+    FILE_NAME_WORDS,
+    require_file_name,
+)
 from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
@@ -38,6 +43,7 @@ DEFAULT_TOPICS = (
     'comparison/stats',
     'planned_path',
     # Where the part stood, for poses that are not in its frame.
+    'part_pose',
     '/tf',
     STATIC_FRAMES,
     '/diagnostics',
@@ -60,7 +66,12 @@ RECORDER = fixed(
     ),
     atomizers=atomizer_names('whose run is recorded'),
     output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
-    name=NodeParameter('', "Run's name; empty: run_<date>_<time> [text]"),
+    name=NodeParameter(
+        '',
+        "Run's name; empty: run_<date>_<time> [text]",
+        constraints=FILE_NAME_WORDS,
+        allows=lambda value: not value or bool(FILE_NAME.fullmatch(value)),
+    ),
     compression=NodeParameter(
         'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
     ),
@@ -105,6 +116,7 @@ class RunRecorder(PaintNode):
             )
             for gun in guns
         }
+        self._log_time = LogTime()
         self.offer('~/stop', self._stop)
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
@@ -163,11 +175,23 @@ class RunRecorder(PaintNode):
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
+        log_time_ns = self._log_time_ns(received_ns)
         if name == STATIC_FRAMES:
-            self._said_once.append((name, cdr, received_ns, sent_ns))
-        self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
+            self._said_once.append((name, cdr, log_time_ns, sent_ns))
+        self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
+
+    def _log_time_ns(self, received_ns: int) -> int:
+        """When a message is logged: as received, but never before the one before."""
+        set_back_ns = self._log_time.set_back_ns
+        log_time_ns = self._log_time.of(received_ns)
+        if self._log_time.set_back_ns > set_back_ns:
+            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
+            self.get_logger().warning(
+                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
+            )
+        return log_time_ns
 
     def _follow_part(self, part: Part) -> None:
         """Begin the run of a part; the one before is complete."""

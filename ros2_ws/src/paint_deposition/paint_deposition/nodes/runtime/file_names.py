@@ -7,6 +7,7 @@ import re
 from paint_deposition.errors import PaintError
 
 FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+FILE_NAME_WORDS = "letters, digits, '-', '_' and '.', the last not in front"
 
 
 def require_file_name(what: str, name: str) -> None:
@@ -16,6 +17,4 @@ def require_file_name(what: str, name: str) -> None:
         PaintError: it is empty, or has other characters than files of a cell need.
     """
     if not FILE_NAME.fullmatch(name):
-        raise PaintError(
-            f"{what} '{name}': use letters, digits, '-', '_' and '.', the last not in front"
-        )
+        raise PaintError(f"{what} '{name}': use {FILE_NAME_WORDS}")
