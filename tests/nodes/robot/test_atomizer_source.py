@@ -138,6 +138,19 @@ def test_an_analogue_signal_is_the_flow(source, driver, viewer, wait_until):
     assert [state.flow for state in told] == [0.0, 1.0, 1.2, 0.0]
 
 
+def test_a_number_is_the_brush(source, driver, viewer, wait_until):
+    source(trigger='/gun', brush='/brush_number')
+    robot = driver(('/gun', Bool), ('/brush_number', UInt16))
+    robot.signals['/gun'].publish(Bool(data=True))
+    # A state needs both.
+    robot.signals['/brush_number'].publish(UInt16(data=3))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 1, what='the state')
+    robot.signals['/brush_number'].publish(UInt16(data=4))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the next brush')
+    told = [viewer.decoded('atomizer/state', row) for row in range(2)]
+    assert [(state.spraying, state.brush) for state in told] == [(True, 3), (True, 4)]
+
+
 def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
     source(trigger='/io.level > 1')
     robot = driver(('/io', UInt16))

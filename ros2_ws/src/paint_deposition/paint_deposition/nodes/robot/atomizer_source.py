@@ -21,6 +21,7 @@ from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
+from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.paint_node import PaintNode
@@ -34,6 +35,7 @@ QUEUE_DEPTH = 5000
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
 SILENT_S = 2.0
+SIGNALS = ('trigger', 'flow', 'brush')
 # (topic, message, what the middleware says of it)
 TakeMessage = Callable[[str, Any, 'MessageInfo'], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
@@ -56,6 +58,9 @@ SOURCE = fixed(
         '', f'What opens the gun: {SIGNAL}; empty: nothing is published on atomizer/state [topic]'
     ),
     flow=NodeParameter('', f'What tells the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
+    brush=NodeParameter(
+        '', f'What tells the number of the brush: {SIGNAL}; empty: the only one [topic]'
+    ),
     calibrated_flow=NodeParameter(
         1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
     ),
@@ -81,10 +86,10 @@ class AtomizerSource(PaintNode):
         )
         # The joints and the signals that have no publisher yet.
         self._missing: dict[str, TakeMessage] = {self.values['joint_topic']: self._take_joints}
-        for signal in filter(None, (self._trigger, self._flow)):
+        for signal in self._signals.values():
             self._missing[signal.topic] = self._take_signals
-        self._values: dict[Signal, float] = {}
-        self._told: tuple[bool, float] | None = None
+        self._values: dict[str, float] = {}
+        self._told: tuple[bool, float, int] | None = None
         self._poses = self._without_joints = 0
         self._joints_s = time.monotonic()
         self._clock_offset_s = 0.0
@@ -96,9 +101,10 @@ class AtomizerSource(PaintNode):
     def _check(self, values: Mapping[str, Any]) -> None:
         if not values['urdf_file']:
             raise PaintError(f'{self.get_name()}: urdf_file is empty: give the robot')
-        if values['flow'] and not values['trigger']:
-            raise PaintError('flow is given without a trigger: name what opens the gun')
-        for name in ('trigger', 'flow'):
+        alone = [name for name in ('flow', 'brush') if values[name] and not values['trigger']]
+        if alone:
+            raise PaintError(f'{alone[0]} is given without a trigger: name what opens the gun')
+        for name in SIGNALS:
             if values[name] and Signal.of(values[name]) is None:
                 raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
 
@@ -108,8 +114,8 @@ class AtomizerSource(PaintNode):
             Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
         )
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        self._trigger = Signal.of(values['trigger'])
-        self._flow = Signal.of(values['flow'])
+        named = {name: Signal.of(values[name]) for name in SIGNALS}
+        self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
 
@@ -150,11 +156,11 @@ class AtomizerSource(PaintNode):
             self._find_timer.cancel()
 
     def _take_signals(self, topic: str, message: Any, info: MessageInfo) -> None:
-        """Take trigger and flow, which may be fields of one message."""
+        """Take trigger, flow and brush, which may be fields of one message."""
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         self._problem = ''
-        for signal in (self._flow, self._trigger):
-            if signal is None or signal.topic != topic:
+        for name, signal in self._signals.items():
+            if signal.topic != topic:
                 continue
             value = signal.value(message)
             if value is None:
@@ -168,23 +174,23 @@ class AtomizerSource(PaintNode):
                     f'{self._clock_offset_s:.3g} s off their own stamps: set the clocks'
                 )
             else:
-                self._values[signal] = value
+                self._values[name] = value
         if not self._problem:
             now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
             self._publish_state(stamp or now_ns)
 
     def _publish_state(self, stamp: int) -> None:
-        """Publish the state from this time on, if it has changed."""
-        if self._trigger not in self._values:
+        """Publish the state from this time on, if it is known and has changed."""
+        if self._signals.keys() - self._values.keys():
             return
-        on = bool(self._trigger.is_on(self._values[self._trigger]))
-        flow = 1.0
-        if self._flow is not None:
-            flow = self._values.get(self._flow, np.nan) / self.values['calibrated_flow']
-        if (on, flow) == self._told:
+        on = bool(self._signals['trigger'].is_on(self._values['trigger']))
+        full = self.values['calibrated_flow']
+        flow = self._values['flow'] / full if 'flow' in self._values else 1.0
+        brush = int(self._values.get('brush', ONLY_BRUSH))
+        if (on, flow, brush) == self._told:
             return
-        self._told = on, flow
-        state = AtomizerState(spraying=on, flow=flow)
+        self._told = on, flow, brush
+        state = AtomizerState(spraying=on, flow=flow, brush=brush)
         state.header.frame_id = self._robot.base
         state.header.stamp = Time(nanoseconds=stamp).to_msg()
         self._state_publisher.publish(state)
@@ -207,9 +213,8 @@ class AtomizerSource(PaintNode):
 
     def _signals_status(self) -> Status:
         values = {
-            signal.topic + signal.path: self._values.get(signal, 'not heard')
-            for signal in (self._trigger, self._flow)
-            if signal is not None
+            f'{name}, {signal.topic}{signal.path}': self._values.get(name, 'not heard')
+            for name, signal in self._signals.items()
         }
         if self._problem:
             return Status(ERROR, self._problem, values)
