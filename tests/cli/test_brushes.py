@@ -77,6 +77,7 @@ def test_an_unknown_brush_is_refused_and_those_there_are_are_named(model, panel,
     assert_refused(done, 'no brush is named; its brushes: 1, 2, 3')
 
 
+@pytest.mark.slow
 def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
     given = ('--mesh', panel, '--model', model, '--speed', 0.4, '--max-edge-length-m', 0.05)
     done = paint('plan', *given, '--brush', 3, '--json', '-o', tmp_path / 'plan')

@@ -167,3 +167,11 @@ def test_a_new_model_must_have_the_brushes_in_use():
     with pytest.raises(ModelError, match='brush 2 is not in the model; its brushes: 4'):
         film.use(DepositionModel.of_brushes([Brush(number=4, planar=NARROW)]))
     assert film.model is MODEL
+
+
+def test_brushes_are_in_the_order_of_their_numbers_each_once():
+    one, two = MODEL.brushes
+    assert DepositionModel(brushes=(two, one)) == MODEL
+    assert MODEL.planar == NARROW
+    with pytest.raises(ValueError, match='there twice'):
+        DepositionModel(brushes=(one, one))

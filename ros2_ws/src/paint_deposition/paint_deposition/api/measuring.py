@@ -54,11 +54,9 @@ def choose_readings(
         RecordingError: the poses make no motion, or the gun never sprays.
         ReadingsError: the part has no room for so many points.
     """
-    if model is not None:
-        require_brushes(trajectory, model)
-    model = (
-        (model or DepositionModel()).of_numbers(trajectory.brushes).single('a choice of points')
-    )
+    model = model or DepositionModel()
+    require_brushes(trajectory, model)
+    model = model.of_numbers(trajectory.brushes).single('a choice of points')
     seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
     part = UnmeasuredPart(seen.surface, seen.path, model, library, posterior)

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, SerializeAsAny
+from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
@@ -36,11 +36,23 @@ class DepositionModel(BaseModel):
     effects: tuple[SerializeAsAny[Effect], ...] = ()
     brushes: tuple[Brush, ...] = ()
 
+    @model_validator(mode='before')
+    @classmethod
+    def _in_order(cls, values: Any) -> Any:
+        """With brushes in the order of their numbers, and the pattern of the first as planar."""
+        if not (isinstance(values, dict) and values.get('brushes')):
+            return values
+        brushes = [Brush.model_validate(brush) for brush in values['brushes']]
+        by_number = {brush.number: brush for brush in brushes}
+        if len(by_number) < len(brushes):
+            raise ValueError('a number of brushes is there twice; keep one')
+        ordered = tuple(by_number[number] for number in sorted(by_number))
+        return {**values, 'planar': ordered[0].planar, 'brushes': ordered}
+
     @staticmethod
     def of_brushes(brushes: Iterable[Brush], **rest: Any) -> 'DepositionModel':
         """The model with these brushes, each number once, and the other fields."""
-        ordered = tuple(sorted(brushes, key=lambda brush: brush.number))
-        return DepositionModel(planar=ordered[0].planar, brushes=ordered, **rest)
+        return DepositionModel(brushes=tuple(brushes), **rest)
 
     @property
     def patterns(self) -> tuple[PlanarPattern, ...]:
@@ -172,7 +184,11 @@ class DepositionModel(BaseModel):
     @property
     def reach_m(self) -> float:
         """Radius on the model plane beyond which the flux is negligible [m]."""
-        return max(planar.radius_of_flux_m(CUT_FLUX) for planar in self.patterns) * self.widening
+        return max(map(self.reach_of_m, self.patterns))
+
+    def reach_of_m(self, planar: PlanarPattern) -> float:
+        """The same for one of its patterns [m]."""
+        return planar.radius_of_flux_m(CUT_FLUX) * self.widening
 
     @property
     def shadow(self) -> float:

@@ -31,7 +31,7 @@ def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
     c[kernel.COS] = planar.K3 * np.cos(planar.phi_rad)
     c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
     c[kernel.NEAREST] = projection.nearest_m
-    c[kernel.REACH] = model.reach_m
+    c[kernel.REACH] = model.reach_of_m(planar)
     c[kernel.SHADOW] = model.shadow
     return c
 

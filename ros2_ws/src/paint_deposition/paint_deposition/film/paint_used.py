@@ -129,11 +129,9 @@ def paint_sentence(result: Painted) -> str:
 
 def seconds_by_pattern(model: DepositionModel, path: SprayPath) -> np.ndarray:
     """(B,) time sprayed with each of the model's patterns, weighted by the flow [s]."""
-    sprayed = path.select(path.flow > 0.0)
-    rows = model.pattern_rows(sprayed.brush)
-    return np.array([
-        sprayed.select(rows == row).spraying_time_s for row in range(len(model.patterns))
-    ])  # fmt: skip
+    on = path.flow > 0.0
+    rows, sprayed_s = model.pattern_rows(path.brush[on]), (path.dwell_s * path.flow)[on]
+    return np.array([np.sum(sprayed_s[rows == row]) for row in range(len(model.patterns))])
 
 
 def impossible_brushes(model: DepositionModel) -> tuple[str, ...]:
