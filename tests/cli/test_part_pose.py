@@ -107,10 +107,71 @@ def test_a_static_transform_of_the_recording_is_used_and_said(panel, expected, s
     write_bag(path, [('/tf_static', first_ns, static), *entries], storage, messages)
     film, said = simulated(panel, path, tmp_path / 'out', '--frame-id', 'door')
     assert np.allclose(film, expected, atol=2e-3)
-    assert said.startswith("note: /tf_static: poses brought from 'base_link' to 'door', which ")
+    assert said.startswith("note: static transforms: poses brought from 'base_link' to 'door', ")
     assert 'stands at 2.1 -0.4 0.9 ' in said
     _, said = simulated(panel, path, tmp_path / 'out')
     assert 'it stands still to door, table' in said
+
+
+@pytest.mark.slow
+def test_where_a_node_was_told_that_the_part_stands_is_used(panel, expected, tmp_path):
+    messages = Messages()
+    entries = pose_entries(seen_from_the_robot())
+    told = messages.transforms((1, '/base_link', 'part', PART_POSE)).transforms[0]
+    path = write_bag(tmp_path / 'run', [('/cell_1/part_pose', entries[0][1], told), *entries])
+    film, said = simulated(panel, path, tmp_path / 'out')
+    assert np.allclose(film, expected, atol=2e-3)
+    assert said.startswith("note: static transforms: poses brought from 'base_link' to 'part', ")
+
+
+def test_a_part_that_was_placed_anew_in_a_run_is_not_guessed(panel, tmp_path):
+    messages = Messages()
+    entries = pose_entries(seen_from_the_robot())
+    told = [
+        messages.transforms((1, 'base_link', 'part', [x, *PART_POSE[1:]])).transforms[0]
+        for x in (2.1, 2.2)
+    ]
+    placed = [
+        ('/part_pose', entries[0][1], told[0]),
+        ('/part_pose', entries[50][1], told[1]),
+    ]
+    path = write_bag(tmp_path / 'run', sorted([*placed, *entries], key=lambda e: e[1]))
+    done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
+    assert_refused(done, "'part' was placed anew in 'base_link'", 'give --part-pose')
+
+
+@pytest.mark.slow
+def test_a_part_on_a_conveyor_is_followed(panel, expected, tmp_path):
+    """It moves evenly at 0.2 m/s and is told at 10 Hz, from 0.5 s after the first pose on."""
+    messages, at_part = Messages(), level_pass('part')
+    times_s = (at_part.stamps_ns - at_part.stamps_ns[0]) * 1e-9
+    places = [Rigid.of([PART_POSE[0] + 0.2 * t, *PART_POSE[1:]]) for t in times_s]
+    poses = [
+        place.applied(*pose)
+        for place, *pose in zip(places, at_part.positions_m, at_part.quaternions_xyzw, strict=True)
+    ]
+    stamps = at_part.stamps_ns
+    seen = Trajectory(stamps, *map(np.array, zip(*poses, strict=True)), 'base_link')
+
+    def run(name: str, first: int):
+        told = [
+            ('/tf', int(stamps[row]), messages.transforms(
+                (int(stamps[row]), 'base_link', 'part', places[row].values)))
+            for row in [*range(first, len(stamps), 5), len(stamps) - 1]
+        ]  # fmt: skip
+        entries = sorted([*told, *pose_entries(seen)], key=lambda entry: entry[1])
+        return write_bag(tmp_path / name, entries)
+
+    film, said = simulated(panel, run('whole', 0), tmp_path / 'out')
+    assert np.allclose(film, expected, atol=2e-3)
+    assert (
+        said
+        == f"note: /tf: {len(stamps)} poses brought to the moving part, 'part' in 'base_link'\n"
+    )
+    late, said = simulated(panel, run('late', 25), tmp_path / 'out')
+    assert '25 of 150 poses are left out' in said
+    assert (late <= film + 2e-3).all()
+    assert late.sum() < 0.99 * film.sum()
 
 
 @pytest.mark.slow

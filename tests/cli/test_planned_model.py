@@ -94,7 +94,7 @@ def test_a_plan_in_the_robots_frame_lays_the_same_film(motion, plan, placed, tmp
     if motion == 'trajectory':
         film, done = simulated(placed / motion, tmp_path / 'told')
         assert film['mean_um'] == pytest.approx(expected['mean_um'], rel=1e-4)
-        assert "note: /tf_static: poses brought from 'base_link' to 'part'" in done.stderr
+        assert "note: static transforms: poses brought from 'base_link' to 'part'" in done.stderr
 
 
 @pytest.mark.slow

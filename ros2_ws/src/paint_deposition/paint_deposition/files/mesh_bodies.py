@@ -61,7 +61,7 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
     if kind == '.stl' and body in (None, path.stem) and (triangles := _binary_stl(path)):
         return Bodies(*triangles, 1.0, ())
     scene = _scene(path, kind)
-    found = _by_name(scene)
+    found = _by_name(path, scene)
     if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
         found = {path.stem: next(iter(found.values()))}
     notes = []
@@ -105,6 +105,10 @@ def _scene(path: Path, kind: str) -> Scene:
         content = _as_utf8(path, kind)
         options |= {'validate': False, 'split_objects': True} if kind == '.obj' else {}
         source: Any = BytesIO(content)
+    elif kind == '.glb':
+        # A file would be asked for as many bytes at once as its head claims.
+        source = BytesIO(path.read_bytes())
+        options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
     else:
         source = str(path)
     if kind in ('.step', '.stp'):
@@ -121,7 +125,7 @@ def _scene(path: Path, kind: str) -> Scene:
         raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
 
 
-def _by_name(scene: Scene) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+def _by_name(path: Path, scene: Scene) -> dict[str, tuple[np.ndarray, np.ndarray]]:
     """Vertices (V, 3) and faces (F, 3) of each body with triangles, where the scene has it."""
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for node in scene.graph.nodes_geometry:
@@ -130,6 +134,8 @@ def _by_name(scene: Scene) -> dict[str, tuple[np.ndarray, np.ndarray]]:
         if faces is None or not len(faces):
             continue
         vertices: np.ndarray = np.asarray(scene.geometry[name].vertices, dtype=np.float64)
+        if vertices.shape[1:] != (3,):
+            raise MeshError(f'{path}: the vertices of {name!r} have no x, y, z; export it again')
         faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
         if np.linalg.det(pose[:3, :3]) < 0.0:
             faces = faces[:, ::-1]

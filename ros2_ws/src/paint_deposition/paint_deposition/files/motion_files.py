@@ -6,6 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.pose_tables.reading import PoseLayout, is_pose_table, read_pose_table
@@ -14,7 +16,7 @@ from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, custom_data
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.transforms import StaticFrames
+from paint_deposition.files.recordings.transforms import StaticFrames, poses_over_time
 from paint_deposition.files.refusals import checked
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
@@ -86,7 +88,7 @@ def _robot(path: Path, source: MotionSource) -> Robot | None:
 
 
 def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
-    """By the pose of the part that is given, else by a static transform of the recording."""
+    """By the pose of the part that is given, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
     if source.part_pose is not None:
         if source.frame_id and named and is_frame(named, part):
@@ -100,16 +102,19 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
         return _noted(at_part(recorded, source.part_pose, part), said)
     if is_frame(named, part):
         return recorded
-    static = _static_frames(Path(recorded.source))
+    path = Path(recorded.source)
+    static = _static_frames(path)
     place = static.pose_of(part, named)
     if place is not None:
-        said = f"/tf_static: poses brought from '{named}' to '{part}', which stands at "
+        said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
         return _noted(at_part(recorded, place.values, part), said + words(place))
+    if _has_frames(path) and (over_time := poses_over_time(path, part, named, recorded.stamps_ns)):
+        return _on_a_moving_part(recorded, part, *over_time)
     known = static.words(named)
     if source.frame_id:
         raise RecordingError(
             f"{recorded.source}: its poses are in frame '{named}', the mesh in '{part}', and no "
-            f'static transform between them is recorded{known}; give --part-pose'
+            f'transform between them is recorded{known}; give --part-pose'
         )
     warning = (
         f"{recorded.source}: its poses are in frame '{named}' and are taken as if the mesh were "
@@ -119,9 +124,46 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
     return replace(recorded, warnings=(*recorded.warnings, warning))
 
 
+def _on_a_moving_part(
+    recorded: Trajectory, part: str, known: np.ndarray, places: np.ndarray
+) -> Trajectory:
+    """By the pose of the part at the time of each pose, (M, 7) where it is known (N,)."""
+    frames = f"'{part}' in '{recorded.frame_id}'"
+    if not known.any():
+        raise RecordingError(
+            f'{recorded.source}: the transforms of {frames} cover none of its poses; their clock '
+            'is another, give --part-pose'
+        )
+    # One by one, as the nodes do, so that the film is the same.
+    poses = zip(recorded.positions_m[known], recorded.quaternions_xyzw[known], strict=True)
+    brought = [
+        Rigid.of(place).inverse().applied(*pose) for place, pose in zip(places, poses, strict=True)
+    ]
+    positions, quaternions = map(np.array, zip(*brought, strict=True))
+    moved = replace(
+        recorded,
+        stamps_ns=recorded.stamps_ns[known],
+        positions_m=positions,
+        quaternions_xyzw=quaternions,
+        frame_id=part,
+    )
+    if left_out := len(recorded) - len(moved):
+        warning = (
+            f'{recorded.source}: {left_out} of {len(recorded)} poses are left out, since the '
+            f'transforms of {frames} do not cover their time; record /tf from before the first'
+            ' pose on'
+        )
+        moved = replace(moved, warnings=(*moved.warnings, warning))
+    return _noted(moved, f'/tf: {len(moved)} poses brought to the moving part, {frames}')
+
+
 def _static_frames(path: Path) -> StaticFrames:
+    return StaticFrames.of(path) if _has_frames(path) else StaticFrames()
+
+
+def _has_frames(path: Path) -> bool:
     """Only bags tell of frames."""
-    return StaticFrames() if is_rapid(path) or is_pose_table(path) else StaticFrames.of(path)
+    return not is_rapid(path) and not is_pose_table(path)
 
 
 def words(place: Rigid) -> str:

@@ -74,5 +74,5 @@ def _figures_digest(folder: Path) -> str:
             told = json.loads((folder / name).read_text(encoding='utf-8'))
         except (OSError, ValueError):
             continue
-        return str(told.get(DIGEST, ''))
+        return str(told.get(DIGEST, '')) if isinstance(told, dict) else ''
     return ''

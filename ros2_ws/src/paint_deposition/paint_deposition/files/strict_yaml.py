@@ -27,6 +27,8 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
         raise refusal(f'{path}: no such file; give a {kind} YAML') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror})') from None
+    except RecursionError:
+        raise refusal(f'{path}: its values are nested too deeply; give a {kind} YAML') from None
     except (UnicodeDecodeError, YAMLError) as error:
         raise refusal(f'{path}: cannot be read as YAML ({_problem(error)})') from None
 

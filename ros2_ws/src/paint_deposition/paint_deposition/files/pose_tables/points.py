@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -32,9 +33,9 @@ def read_points(path: Path, unit: str | None = None) -> dict[str, np.ndarray]:
         names = [row[column] for row in table.rows]
         if '' in names:
             raise RecordingError(f'line {table.lines[names.index("")]}: a point without a name')
-        for name in names:
-            if names.count(name) > 1:
-                raise RecordingError(f"two points are called '{name}'; rename one")
+        if len({*names}) < len(names):
+            (name, _), *_ = Counter(names).most_common(1)
+            raise RecordingError(f"two points are called '{name}'; rename one")
         if not np.isfinite(positions).all():
             raise RecordingError('a position is no number')
     except RecordingError as error:

@@ -77,8 +77,11 @@ def read_program(path: Path | str, gun_signal: str | None = None) -> RapidProgra
         text = path.read_text(encoding='utf-8', errors='replace')
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-    module = ModuleParser(text, str(path)).module()
-    return _Run(module, str(path), gun_signal).run()
+    try:
+        module = ModuleParser(text, str(path)).module()
+        return _Run(module, str(path), gun_signal).run()
+    except RecursionError:
+        raise RecordingError(f'{path}: its values are nested too deeply to be RAPID') from None
 
 
 class _Run:

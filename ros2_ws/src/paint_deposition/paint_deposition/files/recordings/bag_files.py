@@ -4,6 +4,7 @@ Only the types of the topics that are read are parsed: one exotic topic, such as
 events that rosbags does not understand, does not make the poses beside it unreadable.
 """
 
+import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
+from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -25,6 +27,16 @@ from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_
 # The key of a bag's custom data under which a plan says which topic is its trigger.
 TRIGGER = 'trigger_topic'
 ROS2_SUFFIXES = ('.mcap', '.db3')
+# How records begin: in MCAP a kind and a length; in ROS 1 the lengths of head and data.
+ROS1_MAGIC = b'#ROSBAG V2.0\n'
+ROS1_LENGTH, MCAP_LENGTH = struct.Struct('<I'), struct.Struct('<BQ')
+# The messages that are read by the names of their fields.
+KNOWN = (
+    'builtin_interfaces/msg/Time', 'std_msgs/msg/Header', 'std_msgs/msg/Bool',
+    'geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/Pose', 'geometry_msgs/msg/Point',
+    'geometry_msgs/msg/Quaternion', 'geometry_msgs/msg/TransformStamped',
+    'geometry_msgs/msg/Transform', 'geometry_msgs/msg/Vector3', 'sensor_msgs/msg/JointState',
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -98,9 +110,18 @@ class Bag:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
             types = self._definitions(connection)
+            self._refuse_other_fields(types)
             store.register({name: types[name] for name in types if name not in store.fielddefs})
             self._stores[topic] = store
         return self._stores[topic]
+
+    def _refuse_other_fields(self, types: dict) -> None:
+        standard = get_typestore(definitions.STANDARD_STORE).fielddefs
+        for name in () if self._is_ros1 else {*KNOWN} & {*types}:
+            if types[name][1] != standard[name][1]:
+                raise RecordingError(
+                    f'{self.path} defines {name} with other fields than ROS does; record it again'
+                )
 
     @staticmethod
     def _definitions(connection: Connection) -> dict:
@@ -128,6 +149,7 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
     path = Path(path)
     _refuse_what_is_no_bag(path)
     with _reading(path):
+        _refuse_claims(path)
         reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
@@ -141,8 +163,8 @@ def custom_data(path: Path) -> dict[str, str]:
     try:
         told = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
         return dict(told['rosbag2_bagfile_information'].get('custom_data') or {})
-    except (OSError, yaml.YAMLError, KeyError, TypeError, AttributeError):
-        return {}  # of an older version, or no bag: whoever reads it says so
+    except Exception:  # of an older version, damaged, or no bag: whoever reads it says so
+        return {}
 
 
 def _refuse_what_is_no_bag(path: Path) -> None:
@@ -163,6 +185,28 @@ def _refuse_what_is_no_bag(path: Path) -> None:
             raise RecordingError(_unfinished(path, f'{file.name} has no end'))
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
+
+
+def _refuse_claims(path: Path) -> None:
+    """A record that is said to be longer than its file, before memory is taken for it."""
+    files = [path] if path.suffix == '.bag' else mcap_files(path)
+    for file in files:
+        magic, lengths, behind = (
+            (MCAP0_MAGIC, (MCAP_LENGTH,), len(MCAP0_MAGIC))
+            if file.suffix == '.mcap'
+            else (ROS1_MAGIC, (ROS1_LENGTH, ROS1_LENGTH), 0)
+        )
+        size, at = file.stat().st_size - behind, len(magic)
+        with file.open('rb') as stream:
+            while at < size:
+                for length in lengths:
+                    stream.seek(at)
+                    at += (
+                        length.size
+                        + length.unpack(stream.read(length.size).ljust(length.size, b'\xff'))[-1]
+                    )
+        if at > size:
+            raise ValueError(f'its last record ends {at - size} bytes behind the file')
 
 
 def _unfinished(path: Path, reason: str) -> str:

@@ -45,21 +45,24 @@ class Robot:
         Raises:
             RecordingError: it is no URDF, or has no such links.
         """
-        from pytransform3d.urdf import UrdfException, parse_urdf
+        from pytransform3d.urdf import parse_urdf
 
         try:
             text = path.read_text(encoding='utf-8')
-            if 'xacro:' in text:
-                raise RecordingError(f'{path} is xacro; run: xacro {path} > robot.urdf')
-            _, links, joints = parse_urdf(text)
         except OSError as error:
             raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-        except (UrdfException, ValueError, AttributeError) as error:
+        except UnicodeDecodeError as error:
             raise RecordingError(f'{path} is no URDF ({error})') from None
+        if 'xacro:' in text:
+            raise RecordingError(f'{path} is xacro; run: xacro {path} > robot.urdf')
+        try:
+            _, links, joints = parse_urdf(text)
+        except Exception as error:  # whatever the XML provokes in the parser
+            raise RecordingError(f'{path} is no URDF ({" ".join(str(error).split())})') from None
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
         parents.add_nodes_from(link.name for link in links)
         tip = tip or _last_link(path, parents)
-        base = base or next(link for link in parents if not parents.out_degree(link))
+        base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
             if name not in parents:
                 known = did_you_mean(name, sorted(parents))

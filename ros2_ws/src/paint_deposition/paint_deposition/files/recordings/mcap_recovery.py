@@ -1,12 +1,14 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
+import mmap
 import re
 import shutil
 import struct
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, cast
 
 import yaml
 import zstandard
@@ -23,9 +25,12 @@ from paint_deposition.files.recordings.mcap_cut_chunk import readable_beginning
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
-MAX_CUT_CHUNK_BYTES = 256 * 1024 * 1024
+MAX_CHUNK_BYTES = 256 * 1024 * 1024
 # What the readers raise on bytes that are not what they should be.
-DAMAGE = (McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError)
+DAMAGE = (
+    McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
+    OverflowError,
+)  # fmt: skip
 
 
 @dataclass
@@ -153,10 +158,17 @@ class _Survey:
 
 def _survey(file: Path) -> _Survey:
     survey = _Survey()
-    with file.open('rb') as stream:
+    with _content(file) as stream:
         for record in _records(file, stream, []):
             survey.note(record)
     return survey
+
+
+@contextmanager
+def _content(file: Path) -> Iterator[mmap.mmap]:
+    """A file as bytes; a plain stream would take memory for what a damaged length asks for."""
+    with file.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as all_:
+        yield all_
 
 
 def _mapping(record: Metadata) -> dict:
@@ -167,10 +179,10 @@ def _mapping(record: Metadata) -> dict:
     return content if isinstance(content, dict) else {}
 
 
-def _records(file: Path, stream: BinaryIO, breaks: list[str]) -> Iterator[McapRecord]:
+def _records(file: Path, stream: mmap.mmap, breaks: list[str]) -> Iterator[McapRecord]:
     """Records up to the break, which is noted; chunks are not opened."""
     size = file.stat().st_size
-    reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
+    reader = StreamReader(cast(IO[bytes], stream), emit_chunks=True, record_size_limit=size)
     record_at = len(MCAP0_MAGIC)
     try:
         for record in reader.records:
@@ -181,7 +193,7 @@ def _records(file: Path, stream: BinaryIO, breaks: list[str]) -> Iterator[McapRe
     except DAMAGE as error:
         cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
         stream.seek(record_at)
-        beginning = readable_beginning(stream.read(MAX_CUT_CHUNK_BYTES))
+        beginning = readable_beginning(stream.read(MAX_CHUNK_BYTES))
         if beginning:
             yield beginning
         reason = 'the end is missing' if cut else str(error)
@@ -195,7 +207,7 @@ def _copy(
     recovery: Recovery,
     on_bytes: Callable[[int], None],
 ) -> None:
-    with file.open('rb') as stream:
+    with _content(file) as stream:
         position = 0
         for record in _records(file, stream, recovery.breaks):
             for inner in _opened(record, recovery):
@@ -215,6 +227,8 @@ def _opened(record: McapRecord, recovery: Recovery) -> list[McapRecord]:
     if not isinstance(record, Chunk):
         return [record]
     try:
+        if record.uncompressed_size > MAX_CHUNK_BYTES:
+            raise ValueError('no recorder makes chunks of that size')
         return breakup_chunk(record, validate_crc=True)
     except DAMAGE:
         recovery.damaged_chunks += 1
@@ -224,16 +238,22 @@ def _opened(record: McapRecord, recovery: Recovery) -> list[McapRecord]:
 def _is_kept(channel: Channel, survey: _Survey, writer: RunWriter, recovery: Recovery) -> bool:
     """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
     schema = survey.schemas.get(channel.schema_id)
-    if schema is None or channel.message_encoding != 'cdr':
+    text = _text(schema)
+    if schema is None or text is None or channel.message_encoding != 'cdr':
         if channel.topic not in recovery.skipped_topics:
             recovery.skipped_topics.append(channel.topic)
         return False
     if channel.topic not in writer.counts:
-        definition = Definition(
-            schema.data.decode(), channel.metadata.get('topic_type_hash', ''), schema.encoding
-        )
+        definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
         writer.add_topic(RunTopic(channel.topic, schema.name, definition, _qos(channel)))
     return True
+
+
+def _text(schema: Schema | None) -> str | None:
+    try:
+        return schema.data.decode() if schema else None
+    except UnicodeDecodeError:
+        return None
 
 
 def _qos(channel: Channel) -> list[Qos]:

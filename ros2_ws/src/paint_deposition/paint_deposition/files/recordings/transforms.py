@@ -1,4 +1,4 @@
-"""The frames of a recording, from its transforms: /tf_static, and /tf over time.
+"""The frames of a recording, from its transforms: /tf_static, part_pose, and /tf over time.
 
 networkx finds the way from one frame to another; the interpolation over time and the products
 along the way are pytransform3d's.
@@ -21,6 +21,9 @@ from paint_deposition.motion.trajectory import Trajectory
 
 TF_TYPES = ('tf2_msgs/msg/TFMessage', 'tf/msg/tfMessage')
 STATIC = 'tf_static'
+# Where the part stood, as a painting node was told.
+PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
+PART_POSE_TOPIC = 'part_pose'
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +38,11 @@ class Edge:
 
 
 def read_edges(bag: Bag, static: bool) -> list[Edge]:
-    """The transforms of a bag, either the static ones or those over time."""
+    """The transforms of a bag, either the static ones or those over time.
+
+    Raises:
+        RecordingError: the part was placed anew while the run was recorded.
+    """
     names = [
         topic.name for topic in bag.topics_of(*TF_TYPES)
         if (topic.name.rsplit('/', 1)[-1] == STATIC) == static
@@ -47,9 +54,32 @@ def read_edges(bag: Bag, static: bool) -> list[Edge]:
                 pair = (transform.header.frame_id, transform.child_frame_id)
                 row = (*_numbers(transform, log_time_ns),)
                 rows.setdefault((pair[0].lstrip('/'), pair[1].lstrip('/')), []).append(row)
+    if static:
+        for pair, found in _part_poses(bag).items():
+            rows.setdefault(pair, found)
     # Of a static transform that is sent again, the last holds, as in tf2.
     last = slice(-1, None) if static else slice(None)
     return [_edge(*pair, found[last]) for pair, found in rows.items()]
+
+
+def _part_poses(bag: Bag) -> dict[tuple[str, str], list[tuple]]:
+    """Where the part stood, by the names of its parent's frame and its own."""
+    found: dict[tuple[str, str], list[tuple]] = {}
+    names = [
+        topic.name for topic in bag.topics_of(PART_POSE_TYPE)
+        if topic.name.rsplit('/', 1)[-1] == PART_POSE_TOPIC
+    ]  # fmt: skip
+    if not names:
+        return found
+    for _, log_time_ns, message in bag.decoded(names):
+        pair = message.header.frame_id.lstrip('/'), message.child_frame_id.lstrip('/')
+        row = (*_numbers(message, log_time_ns),)
+        if found.setdefault(pair, [row])[0][-1] != row[-1]:
+            raise RecordingError(
+                f"{bag.path}: '{pair[1]}' was placed anew in '{pair[0]}' while the run was "
+                'recorded; give --part-pose'
+            )
+    return found
 
 
 def _numbers(transform: Any, log_time_ns: int) -> Iterator[Any]:
@@ -82,10 +112,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         RecordingError: a frame is not there, they are not connected, or do not move.
     """
     target, source = target.lstrip('/'), source.lstrip('/')
-    moving, still = read_edges(bag, static=False), read_edges(bag, static=True)
-    graph = nx.Graph()
-    for edge in (*still, *moving):
-        graph.add_edge(edge.parent, edge.child, edge=edge, moves=edge in moving)
+    graph = _frames(bag)
     for name in (target, source):
         if name not in graph:
             known = did_you_mean(name, sorted(graph))
@@ -113,6 +140,45 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         note += f', {edges} more transforms interpolated over up to {longest_s:.3g} s'
     trajectory = Trajectory(stamps, poses[:, :3], poses[:, 3:], target, notes=(note,))
     return trajectory, clock.log_times_ns[known]
+
+
+def _frames(bag: Bag) -> nx.Graph:
+    """All frames of a bag, joined by their edges; ``moves`` tells those over time."""
+    graph = nx.Graph()
+    for moves in (False, True):
+        for edge in read_edges(bag, static=not moves):
+            graph.add_edge(edge.parent, edge.child, edge=edge, moves=moves)
+    return graph
+
+
+def poses_over_time(
+    path: Path, frame: str, parent: str, stamps_ns: np.ndarray
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """A frame in another one that it moves in, from the transforms of a bag.
+
+    Args:
+        path: of the bag. frame, parent: names.
+        stamps_ns: (N,) times.
+
+    Returns:
+        Which of these times (N,) the transforms cover, and the poses (M, 7) at those, x y z qx qy
+        qz qw; None where the frames are not connected.
+    """
+    with open_bag(path) as bag:
+        graph = _frames(bag)
+    source, target = frame.lstrip('/'), parent.lstrip('/')
+    if source not in graph or target not in graph or not nx.has_path(graph, source, target):
+        return None
+    way = nx.utils.pairwise(nx.shortest_path(graph, source, target))
+    steps = [graph.edges[pair] for pair in way]
+    timed = [step['edge'] for step in steps if step['moves']]
+    known = np.ones(len(stamps_ns), dtype=bool)
+    for edge in timed:
+        known &= (stamps_ns >= edge.stamps_ns[0]) & (stamps_ns <= edge.stamps_ns[-1])
+    if not known.any():
+        return known, np.empty((0, 7))
+    edges = [step['edge'] for step in steps]
+    return known, _followed(edges, source, target, stamps_ns[known])
 
 
 def _followed(edges: list[Edge], source: str, target: str, stamps: np.ndarray) -> np.ndarray:
@@ -159,7 +225,7 @@ class StaticFrames:
 
     @staticmethod
     def of(path: Path) -> StaticFrames:
-        """Those that a bag tells in /tf_static."""
+        """Those that a bag tells in /tf_static and in part_pose."""
         with open_bag(path) as bag:
             return StaticFrames(read_edges(bag, static=True))
 

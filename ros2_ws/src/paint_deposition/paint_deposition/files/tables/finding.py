@@ -18,6 +18,8 @@ from paint_deposition.files.tables.rows import numbers_among, sorted_rows
 from paint_deposition.files.tables.sheets import Sheet, sheets_of, text_of
 from paint_deposition.files.tables.table import Table
 
+SHOWN_HEADINGS = 20
+
 
 def read_table(path: Path, needs: str, layout: Layout) -> Table:
     """Find the table in a file.
@@ -102,7 +104,10 @@ def _no_table(sheets: list[Sheet], best: Columns | None, needs: str, layout: Lay
         return 'there is nothing to read in it; give a table with a heading over each column'
     widest = max((sheet.rows[0] for sheet in sheets if sheet.rows), key=len)
     headings = [text_of(cell) for cell in widest] if best is None else best.headings
-    shown = f'(columns: {", ".join(repr(heading) for heading in headings if heading) or "none"})'
+    named = [repr(heading) for heading in headings if heading]
+    if len(named) > SHOWN_HEADINGS:
+        named[SHOWN_HEADINGS:] = [f'and {len(named) - SHOWN_HEADINGS} more']
+    shown = f'(columns: {", ".join(named) or "none"})'
     for quantity, name in layout.columns.items():
         if isinstance(name, str) and name not in headings:
             known = did_you_mean(name, filter(None, headings), 'copy the heading')

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from geometry_msgs.msg import Quaternion, Transform, TransformStamped, Vector3
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.time import Time
+from std_msgs.msg import Header
 
+from paint_deposition.files.recordings.transforms import PART_POSE_TOPIC
 from paint_deposition.motion.part_frame import Rigid, is_frame
 from paint_deposition.nodes.painting.tf_queue import NoTransform
+from paint_deposition.nodes.runtime import qos
 
 GIVE_FRAMES = 'set part_pose and part_parent_frame, or frame_id'
 
@@ -29,12 +34,35 @@ class PartFrame:
         self.frame_id = frame_id.lstrip('/')
         self._parent = ''
         self._from_parent: Rigid | None = None
+        self._node = node
+        self._told: Publisher | None = None
         self._buffer = _transform_buffer(node)
 
     def place(self, parent_frame: str, part_pose: Sequence[float]) -> None:
-        """Say where the part is: its pose [x y z qx qy qz qw] in another frame, or [] for none."""
+        """Say where the part is: its pose [x y z qx qy qz qw] in another frame, or [] for none.
+
+        A pose is published on `part_pose`, so that a recording of the run can be used without the
+        node.
+        """
         self._parent = parent_frame.lstrip('/')
         self._from_parent = Rigid.of(part_pose).inverse() if len(part_pose) else None
+        if self._from_parent is None:
+            return
+        if self._told is None:
+            self._told = self._node.create_publisher(
+                TransformStamped, PART_POSE_TOPIC, qos.LATCHED
+            )
+        x, y, z, *quaternion = Rigid.of(part_pose).values
+        self._told.publish(
+            TransformStamped(
+                header=Header(frame_id=self._parent, stamp=self._node.get_clock().now().to_msg()),
+                child_frame_id=self.frame_id,
+                transform=Transform(
+                    translation=Vector3(x=x, y=y, z=z),
+                    rotation=Quaternion(**dict(zip('xyzw', quaternion, strict=True))),
+                ),
+            )
+        )
 
     def is_own(self, frame_id: str) -> bool:
         """Whether a pose in this frame can be taken as it is."""

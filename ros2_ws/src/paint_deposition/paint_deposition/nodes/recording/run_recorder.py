@@ -38,6 +38,7 @@ DEFAULT_TOPICS = (
     'comparison/stats',
     'planned_path',
     # Where the part stood, for poses that are not in its frame.
+    'part_pose',
     '/tf',
     STATIC_FRAMES,
     '/diagnostics',
