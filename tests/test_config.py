@@ -32,6 +32,11 @@ def config(repository):
 
 
 @pytest.fixture
+def layouts(repository):
+    return repository / 'ros2_ws' / 'src' / 'paint_deposition' / 'config'
+
+
+@pytest.fixture
 def samples(repository):
     return repository / 'ros2_ws' / 'src' / 'paint_deposition' / 'samples'
 
@@ -103,15 +108,15 @@ def test_campaigns_commented_keys_are_as_good(config, samples, tmp_path):
     assert len(read_campaign(campaign).experiments) == 2
 
 
-def test_rviz_shows_what_is_published_as_it_is_published(config, publishers):
+def test_rviz_shows_what_is_published_as_it_is_published(layouts, publishers):
     from rclpy.qos import DurabilityPolicy
 
-    manager = yaml.safe_load((config / 'paint.rviz').read_text())['Visualization Manager']
+    manager = yaml.safe_load((layouts / 'paint.rviz').read_text())['Visualization Manager']
     assert manager['Global Options']['Fixed Frame'] == 'part'
     shown = [display for display in manager['Displays'] if 'Topic' in display]
     assert len(shown) == 7
     for display in shown:
-        publisher = publishers[display['Topic']['Value']]
+        publisher = publishers['/' + display['Topic']['Value']]
         assert type_of(publisher) == SHOWN[display['Class'].removeprefix('rviz_default_plugins/')]
         latched = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
         assert latched == (display['Topic']['Durability Policy'] == 'Transient Local')
@@ -119,14 +124,17 @@ def test_rviz_shows_what_is_published_as_it_is_published(config, publishers):
     assert cloud['Channel Name'] == 'thickness_um'
 
 
-def test_foxglove_shows_topics_and_fields_that_there_are(config, publishers):
-    layout = json.loads((config / 'foxglove.json').read_text())
+def test_foxglove_shows_topics_and_fields_that_there_are(layouts, publishers):
+    layout = json.loads((layouts / 'foxglove.json').read_text())
     panels = layout['configById']
     assert set(panels) == set(panels_of(layout['layout']))
     scene = panels['3D!part']
     assert scene['followTf'] == 'part'
     assert set(scene['topics']) <= set(publishers)
     assert scene['topics']['/thickness/cloud']['colorField'] == 'thickness_um'
+    titled = [panel for panel in panels.values() if 'foxglovePanelTitle' in panel]
+    assert len(titled) == 4
+    assert all(p['lichtblickPanelTitle'] == p['foxglovePanelTitle'] for p in titled)
     plots = [panel for name, panel in panels.items() if name.startswith('Plot!')]
     paths = [path['value'] for plot in plots for path in plot['paths']]
     assert len(paths) == 11

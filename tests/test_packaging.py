@@ -130,43 +130,94 @@ def test_launch_file_compiles(tmp_path):
     py_compile.compile(source, cfile=tmp_path / 'compiled.pyc', doraise=True)
 
 
-def launch_description():
-    """What the launch file describes; needs a ROS installation."""
+LAUNCH_FILE = SOURCES / PACKAGE / 'launch' / 'paint_cell.launch.py'
+LAUNCHED = """
+import sys
+from launch import LaunchDescription, LaunchService
+from launch.actions import IncludeLaunchDescription
+from launch.launch_description_sources import PythonLaunchDescriptionSource
+
+source = PythonLaunchDescriptionSource(sys.argv[1])
+arguments = [argument.split(':=') for argument in sys.argv[2:]]
+service = LaunchService()
+service.include_launch_description(
+    LaunchDescription([IncludeLaunchDescription(source, launch_arguments=arguments)])
+)
+sys.exit(service.run())
+"""
+
+
+def wanted(**given: str) -> dict[str, dict]:
+    """The nodes that the launch file starts for these arguments, with what it tells them."""
     pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
-    source = SOURCES / PACKAGE / 'launch' / 'paint_cell.launch.py'
-    spec = importlib.util.spec_from_file_location('paint_cell', source)
+    from launch import LaunchContext
+    from launch.actions import DeclareLaunchArgument
+
+    spec = importlib.util.spec_from_file_location('paint_cell', LAUNCH_FILE)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return module.generate_launch_description()
+    context = LaunchContext()
+    context.launch_configurations.update(given)
+    for entity in module.generate_launch_description().entities:
+        if isinstance(entity, DeclareLaunchArgument):
+            entity.execute(context)
+    return module.wanted(context.launch_configurations)
+
+
+def launched(*arguments: str) -> subprocess.CompletedProcess:
+    """The launch file as `ros2 launch` runs it."""
+    pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
+    command = [sys.executable, '-c', LAUNCHED, LAUNCH_FILE, *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120)
 
 
 def test_launch_file_describes_every_node():
-    entities = launch_description().entities
-    executables = {e.node_executable for e in entities if hasattr(e, 'node_executable')}
-    assert executables == set(NODES)
+    nodes = wanted(bag='run', record='runs', measurements='readings.csv')
+    assert set(nodes) == set(NODES)
+    for node, parameters in nodes.items():
+        assert set(parameters) <= set(table_of(node))
+    assert set(wanted()) == {'deposition_simulator', 'index_planner'}
 
 
 @pytest.mark.parametrize(
     ('given', 'count'),
     [
-        ({}, '1'),
-        ({'record': 'runs'}, '2'),
-        ({'measurements': "painter's.csv"}, '2'),
-        ({'record': '1', 'measurements': 'readings.csv'}, '3'),
-        ({'wait_for_subscribers': '5'}, '5'),
+        ({}, 1),
+        ({'record': 'runs'}, 2),
+        ({'measurements': "painter's.csv"}, 2),
+        ({'record': '1', 'measurements': 'readings.csv'}, 3),
+        ({'wait_for_subscribers': '5'}, 5),
     ],
 )
 def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
-    description = launch_description()
-    from launch import LaunchContext
-    from launch.actions import DeclareLaunchArgument
+    assert wanted(bag='run', **given)['bag_player']['wait_for_subscribers'] == count
 
-    context = LaunchContext()
-    context.launch_configurations.update(given)
-    for entity in description.entities:
-        if isinstance(entity, DeclareLaunchArgument):
-            entity.execute(context)
-    assert context.launch_configurations['wait_for_subscribers'] == count
+
+@pytest.mark.parametrize(
+    ('argument', 'words'),
+    [
+        ('rate:=fast', "rate: 'fast' is no number"),
+        ('parameters:=nowhere.yaml', 'there is no file nowhere.yaml'),
+        ('use_sim_time:=maybe', '"maybe" is not valid'),
+    ],
+)
+def test_a_launch_that_cannot_be_starts_no_node(argument, words):
+    done = launched('bag:=run', argument)
+    said = done.stdout + done.stderr
+    assert done.returncode == 1, said
+    assert words in said
+    assert 'process started' not in said
+
+
+@pytest.mark.slow
+def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
+    """The bag is not there: the player fails at once, while the others still load."""
+    done = launched(f'bag:={tmp_path / "run"}')
+    said = done.stdout + done.stderr
+    assert done.returncode == 1, said
+    assert 'bag_player ended with exit code 2' in said
+    for process in re.findall(r'process started with pid \[(\d+)\]', said):
+        assert not Path(f'/proc/{process}').exists()
 
 
 def test_parameter_file_names_every_node():

@@ -3,61 +3,25 @@
 ros2 launch paint_deposition paint_cell.launch.py
 ros2 launch paint_deposition paint_cell.launch.py bag:=run_1 record:=runs
 ros2 launch paint_deposition paint_cell.launch.py --show-args
+
+A node that fails ends the cell, and the launch with an error.
 """
 
+from pathlib import Path
+
 from launch import LaunchDescription
-from launch.actions import DeclareLaunchArgument
-from launch.conditions import IfCondition
-from launch.substitutions import (
-    LaunchConfiguration,
-    NotEqualsSubstitution,
-    PathJoinSubstitution,
-    PythonExpression,
-)
+from launch.actions import DeclareLaunchArgument, OpaqueFunction
+from launch.substitutions import PathJoinSubstitution
 from launch_ros.actions import Node
 from launch_ros.parameter_descriptions import ParameterValue
 from launch_ros.substitutions import FindPackageShare
 
 PACKAGE = 'paint_deposition'
+SWITCH = ['true', 'false']
 
 
 def shared(*path):
     return PathJoinSubstitution([FindPackageShare(PACKAGE), *path])
-
-
-def text(argument):
-    """Take a launch argument as text, also where it looks like a number."""
-    return ParameterValue(LaunchConfiguration(argument), value_type=str)
-
-
-def given(argument):
-    return IfCondition(NotEqualsSubstitution(LaunchConfiguration(argument), ''))
-
-
-def count_with(*arguments):
-    """One for the simulator, and one for each of these launch arguments that is given."""
-    expression = ['1']
-    for argument in arguments:
-        is_given = NotEqualsSubstitution(LaunchConfiguration(argument), '')
-        expression += [" + ('", is_given, "'.lower() == 'true')"]
-    return PythonExpression(expression)
-
-
-def cell_node(name, parameters=None, condition=None):
-    """Describe one node: the parameter file first, then what the arguments say."""
-    use_sim_time = ParameterValue(LaunchConfiguration('use_sim_time'), value_type=bool)
-    return Node(
-        package=PACKAGE,
-        executable=name,
-        name=name,
-        namespace=LaunchConfiguration('namespace'),
-        parameters=[
-            LaunchConfiguration('parameters'),
-            {'use_sim_time': use_sim_time, **(parameters or {})},
-        ],
-        condition=condition,
-        output='screen',
-    )
 
 
 def generate_launch_description():
@@ -75,7 +39,8 @@ def generate_launch_description():
         DeclareLaunchArgument(
             'allow_user_effects',
             default_value='false',
-            description='Run the Python code of effect files that a model names [true/false]',
+            choices=SWITCH,
+            description='Run the Python code of effect files that a model names',
         ),
         DeclareLaunchArgument(
             'bag',
@@ -98,6 +63,12 @@ def generate_launch_description():
             description='Speed of the replay; 0: as fast as the nodes take poses [-]',
         ),
         DeclareLaunchArgument(
+            'publish_clock',
+            default_value='true',
+            choices=SWITCH,
+            description='Publish the time of the bag on /clock, which all cells share',
+        ),
+        DeclareLaunchArgument(
             'record',
             default_value='',
             description='Folder to record the run in; empty: no recording [path]',
@@ -110,9 +81,9 @@ def generate_launch_description():
         # A node that is still loading when the replay starts would miss its first poses.
         DeclareLaunchArgument(
             'wait_for_subscribers',
-            default_value=count_with('record', 'measurements'),
+            default_value='',
             description='Nodes that take the poses and must be there before the replay; '
-            'as many as are started here [count]',
+            'empty: as many as are started here [count]',
         ),
         DeclareLaunchArgument(
             'parameters',
@@ -127,37 +98,81 @@ def generate_launch_description():
         DeclareLaunchArgument(
             'use_sim_time',
             default_value='false',
-            description='Take time from /clock, which a replayed bag publishes [true/false]',
+            choices=SWITCH,
+            description='Take time from /clock, which a replayed bag publishes',
         ),
     ]
-    mesh, model_file = {'mesh_file': text('mesh')}, {'model_file': text('model')}
-    model = model_file | {
-        'allow_user_effects': ParameterValue(
-            LaunchConfiguration('allow_user_effects'), value_type=bool
-        )
-    }
+    # All is checked before the first node starts: one that fails later would leave the others.
+    return LaunchDescription([*arguments, OpaqueFunction(function=cell)])
+
+
+def cell(context):
+    """The nodes that the arguments ask for."""
+    given = context.launch_configurations
+    return [cell_node(given, name, parameters) for name, parameters in wanted(given).items()]
+
+
+def wanted(given):
+    """The parameters that the arguments tell of each node, by its name."""
+    if not Path(given['parameters']).is_file():
+        raise ValueError(f'parameters: there is no file {given["parameters"]}')
+    mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
+    model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
-        'bag': text('bag'),
-        'pose_topic': text('pose_topic'),
-        'state_topic': text('state_topic'),
-        'rate': ParameterValue(LaunchConfiguration('rate'), value_type=float),
-        'wait_for_subscribers': ParameterValue(
-            LaunchConfiguration('wait_for_subscribers'), value_type=int
-        ),
+        'bag': given['bag'],
+        'pose_topic': given['pose_topic'],
+        'state_topic': given['state_topic'],
+        'rate': number(given, 'rate', float),
+        'publish_clock': switched(given, 'publish_clock'),
+        'wait_for_subscribers': number(given, 'wait_for_subscribers', int)
+        if given['wait_for_subscribers']
+        else 1 + bool(given['record']) + bool(given['measurements']),
     }
-    nodes = [
-        cell_node('deposition_simulator', mesh | model),
-        cell_node('index_planner', model),
-        cell_node('bag_player', replay, given('bag')),
-        cell_node(
-            'run_recorder',
-            mesh | model_file | {'output_directory': text('record')},
-            given('record'),
-        ),
-        cell_node(
-            'model_comparison',
-            mesh | model | {'measurements_file': text('measurements')},
-            given('measurements'),
-        ),
-    ]
-    return LaunchDescription(arguments + nodes)
+    nodes = {'deposition_simulator': mesh | model, 'index_planner': mesh | model}
+    if given['bag']:
+        nodes['bag_player'] = replay
+    if given['record']:
+        nodes['run_recorder'] = mesh | model_file | {'output_directory': given['record']}
+    if given['measurements']:
+        nodes['model_comparison'] = mesh | model | {'measurements_file': given['measurements']}
+    return nodes
+
+
+def cell_node(given, name, parameters):
+    """Describe one node: the parameter file first, then what the arguments say."""
+
+    def ended(event, context):
+        if event.returncode and not context.is_shutdown:
+            # An exception is what makes a launch end, and end with an error.
+            raise RuntimeError(
+                f'{name} ended with exit code {event.returncode}; see its last line'
+            )
+
+    # Text stays text, also where it looks like a number.
+    told = {
+        key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
+        for key, value in parameters.items()
+    }
+    return Node(
+        package=PACKAGE,
+        executable=name,
+        name=name,
+        namespace=given['namespace'],
+        parameters=[
+            given['parameters'],
+            told | {'use_sim_time': switched(given, 'use_sim_time')},
+        ],
+        output='screen',
+        on_exit=ended,
+    )
+
+
+def switched(given, argument):
+    return given[argument] == 'true'
+
+
+def number(given, argument, kind):
+    try:
+        return kind(given[argument])
+    except ValueError:
+        raise ValueError(f"{argument}: '{given[argument]}' is no number") from None

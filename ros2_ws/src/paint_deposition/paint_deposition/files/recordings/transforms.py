@@ -62,13 +62,18 @@ def read_edges(bag: Bag, static: bool) -> list[Edge]:
     return [_edge(*pair, found[last]) for pair, found in rows.items()]
 
 
-def _part_poses(bag: Bag) -> dict[tuple[str, str], list[tuple]]:
-    """Where the part stood, by the names of its parent's frame and its own."""
-    found: dict[tuple[str, str], list[tuple]] = {}
-    names = [
+def part_pose_topics(bag: Bag) -> list[str]:
+    """The topics of a bag on which painting nodes told where the part stood."""
+    return [
         topic.name for topic in bag.topics_of(PART_POSE_TYPE)
         if topic.name.rsplit('/', 1)[-1] == PART_POSE_TOPIC
     ]  # fmt: skip
+
+
+def _part_poses(bag: Bag) -> dict[tuple[str, str], list[tuple]]:
+    """Where the part stood, by the names of its parent's frame and its own."""
+    found: dict[tuple[str, str], list[tuple]] = {}
+    names = part_pose_topics(bag)
     if not names:
         return found
     for _, log_time_ns, message in bag.decoded(names):
@@ -227,7 +232,20 @@ class StaticFrames:
     def of(path: Path) -> StaticFrames:
         """Those that a bag tells in /tf_static and in part_pose."""
         with open_bag(path) as bag:
-            return StaticFrames(read_edges(bag, static=True))
+            return StaticFrames.in_bag(bag)
+
+    @staticmethod
+    def in_bag(bag: Bag) -> StaticFrames:
+        """The same of an open bag."""
+        return StaticFrames(read_edges(bag, static=True))
+
+    @property
+    def places(self) -> list[tuple[str, str, Rigid]]:
+        """Each frame in its parent's: (parent, child, pose)."""
+        found = ((*pair, edge) for *pair, edge in self._graph.edges(data=True))
+        return [
+            (a if edge['child'] == b else b, edge['child'], edge['place']) for a, b, edge in found
+        ]
 
     def pose_of(self, frame: str, parent: str) -> Rigid | None:
         """The pose of a frame in another, None where they are not connected."""

@@ -14,7 +14,6 @@ from paint_deposition.comparison.residual_field import reached, spreading
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
-from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
@@ -72,7 +71,6 @@ class ModelComparison(PaintingNode):
             )
         }
         self.offer('~/compare', self._compare)
-        self._shown: CommonFilm | None = None
         tasks = painting_tasks(self) | {'comparison': self._status}
         self._diagnostics = Diagnostics(self, tasks)
         self._publish_legend()

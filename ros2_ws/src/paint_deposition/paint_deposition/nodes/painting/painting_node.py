@@ -15,7 +15,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
@@ -55,6 +55,8 @@ class PaintingNode(PaintNode, ABC):
         self.inputs = [
             AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
         ]
+        self._shown: CommonFilm | None = None
+        self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
@@ -159,6 +161,13 @@ class PaintingNode(PaintNode, ABC):
                 self.add_poses(gun, event)
             else:
                 self.add_trigger(gun, event)
+
+    def _reset(self) -> tuple[bool, str]:
+        poses = self.film.counts.received
+        self.reset()
+        self._shown = None
+        self.publish()
+        return True, f'bare metal again; {poses} poses forgotten'
 
     def up_to_date(self) -> None:
         """Paint all poses that have come, and take over films that have been prepared."""

@@ -21,6 +21,7 @@ from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_t
 from paint_deposition.nodes.replay.flow_control import FlowControl
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
+from paint_deposition.nodes.replay.replayed_transforms import ReplayedTransforms
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.paint_node import PaintNode
@@ -56,7 +57,7 @@ PLAYER = fixed(
 
 
 class BagPlayer(PaintNode):
-    """Publishes `atomizer/pose` and `atomizer/state` as recorded, and the bag's time on /clock.
+    """Publishes `atomizer/pose`, `atomizer/state` and transforms as recorded, and /clock.
 
     Every pose goes out as the bytes that were recorded, in the recorded order, whatever the rate;
     a std_msgs/Bool trigger becomes an AtomizerState stamped with its log time. At rate 0 the
@@ -87,6 +88,8 @@ class BagPlayer(PaintNode):
         self._flow_control = FlowControl(
             self, self._pose_publisher, self.values['window'], self._stopped
         )
+        with open_bag(self.values['bag']) as bag:
+            self._transforms = ReplayedTransforms(self, bag)
         self.poses_published = 0
         self.states_published = 0
         self._diagnostics = Diagnostics(self, {'replay': self._status})
@@ -138,6 +141,12 @@ class BagPlayer(PaintNode):
         return not was_running, 'not paused' if was_running else 'resumed'
 
     def _status(self) -> Status:
+        if self._clock_publisher and self.count_publishers('/clock') > 1:
+            return Status(
+                WARN,
+                'another node publishes /clock, too: nodes with use_sim_time see the time jump; '
+                'set publish_clock to false for one of them',
+            )
         doing = self._flow_control.doing if self._time.running else 'paused'
         return Status(
             WARN if doing.startswith('waiting') else OK,
@@ -167,7 +176,8 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            for message in replay_messages(bag, self._poses_in_bag, self._states_in_bag):
+            topics = (self._poses_in_bag, self._states_in_bag, self._transforms.topics)
+            for message in replay_messages(bag, *topics):
                 if not begun:
                     begun = True
                     self._time.stand_at(message.log_time_ns)
@@ -191,7 +201,9 @@ class BagPlayer(PaintNode):
             self._flow_control.wait_for_room()
 
     def _publish(self, message: ReplayMessage) -> None:
-        if message.is_pose:
+        if message.transform:
+            self._transforms.publish(message.transform)
+        elif message.is_pose:
             self._flow_control.sent(message.stamp_ns)
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1

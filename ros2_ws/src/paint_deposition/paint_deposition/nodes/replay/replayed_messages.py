@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -20,20 +20,26 @@ from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 
 class ReplayMessage(NamedTuple):
-    """One serialised message; `stamp_ns` is its header's."""
+    """One serialised message; `stamp_ns` is its header's. `transform` is set for those of tf."""
 
     log_time_ns: int
     is_pose: bool
     stamp_ns: int
     cdr: bytes
+    transform: RawMessage | None = None
 
 
-def replay_messages(bag: Bag, poses: BagTopic, states: BagTopic | None) -> Iterator[ReplayMessage]:
-    """Poses and states in the order of their log times, states first among equal ones."""
-    names = [poses.name] + ([states.name] if states else [])
+def replay_messages(
+    bag: Bag, poses: BagTopic, states: BagTopic | None, transforms: Sequence[str] = ()
+) -> Iterator[ReplayMessage]:
+    """Poses, states and transforms in the order of their log times, poses last of equal ones."""
+    names = [poses.name, *([states.name] if states else []), *transforms]
     as_state = _state_converter(bag, states)
     for _, simultaneous in groupby(bag.messages(names), key=lambda message: message.log_time_ns):
         for message in sorted(simultaneous, key=lambda message: message.topic == poses.name):
+            if message.topic in transforms:
+                yield ReplayMessage(message.log_time_ns, False, 0, b'', message)
+                continue
             is_pose = message.topic == poses.name
             cdr = message.cdr if is_pose else as_state(message)
             yield ReplayMessage(message.log_time_ns, is_pose, header_stamp_ns(cdr), cdr)

@@ -184,7 +184,7 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         if name not in {*table, *RESERVED_NAMES} and not name.startswith(RESERVED_PREFIX):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
-    node.add_pre_set_parameters_callback(lambda changes: _with_homes(table, changes))
+    node.add_pre_set_parameters_callback(lambda changes: _as_meant(table, changes))
     node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
     for name, row in table.items():
         _declare(node, name, row, row.coerced(overrides.get(name, row.default)))
@@ -219,13 +219,20 @@ def _declare_empty_list(node: Node, name: str, row: NodeParameter) -> None:
     node.set_descriptor(name, row.descriptor())
 
 
-def _with_homes(table: ParameterTable, changes: list[Parameter]) -> list[Parameter]:
+def _as_meant(table: ParameterTable, changes: list[Parameter]) -> list[Parameter]:
+    """The changes as their rows mean them; the command line takes an empty list for any kind."""
     return [
-        Parameter(change.name, change.type_, table[change.name].coerced(change.value))
+        Parameter(change.name, table[change.name].ros_type, [])
+        if change.name in table and _is_empty_list(change.value)
+        else Parameter(change.name, change.type_, table[change.name].coerced(change.value))
         if change.name in table and table[change.name].description.endswith('[path]')
         else change
         for change in changes
     ]
+
+
+def _is_empty_list(value: Any) -> bool:
+    return isinstance(value, Sequence) and not isinstance(value, str) and not len(value)
 
 
 def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:

@@ -1,0 +1,104 @@
+"""A run whose poses are not in the part's frame: recorded, used without the nodes, replayed."""
+
+from __future__ import annotations
+
+import importlib.util
+import math
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from rcl_interfaces.msg import Parameter as ParameterMessage
+from rcl_interfaces.msg import ParameterType, ParameterValue
+from rcl_interfaces.srv import SetParameters
+
+from nodes.cell import offline_um, parameters, two_passes
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.replay.bag_player import BagPlayer
+
+MOTION = two_passes(poses=200, trigger=False)
+# The part hangs turned by 90 degrees about z, a metre along the cell's x.
+PART_POSE = [1.0, 0.0, 0.5, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]
+HAS_TF = importlib.util.find_spec('tf2_ros') is not None
+
+
+def in_the_cell() -> Trajectory:
+    poses = Rigid.of(PART_POSE).applied(MOTION.positions_m, MOTION.quaternions_xyzw)
+    return Trajectory(MOTION.stamps_ns, *poses, 'base_link')
+
+
+@pytest.fixture
+def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path):
+    """A run of poses in `base_link`, and the film that the simulator had of it."""
+    node = simulator(part_pose=PART_POSE, part_parent_frame='base_link')
+    values = {'output_directory': str(tmp_path), 'name': 'run'}
+    recorder = RunRecorder(context=ros_context, parameter_overrides=parameters(**values))
+    spin(recorder)
+    wait_until(lambda: '/part_pose' in recorder.run.counts, what='the pose of the part recorded')
+    source = robot(node)
+    # The recorder subscribes once it has found the publisher.
+    wait_until(lambda: source.pose_publisher.get_subscription_count() == 2)
+    source.send(in_the_cell(), frame_id='base_link')
+    film = painted(node, len(MOTION))
+    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='all recorded')
+    recorder.close()
+    return recorder.run.folder, film
+
+
+def test_it_is_simulated_without_being_told_where_the_part_stood(recorded, simulator):
+    run, film = recorded
+    read = read_recording(run)
+    assert read.frame_id == 'part'
+    assert "'base_link' to 'part'" in read.notes[-1]
+    assert film.max() > 2.0
+    offline = offline_um(simulator(), read)
+    assert np.abs(offline - film).max() < 1e-6 * film.max()
+
+
+@pytest.mark.skipif(HAS_TF, reason='tf2 is installed')
+def test_its_replay_says_what_to_give_the_simulator_where_there_is_no_tf(
+    recorded, ros_context, executor, capfd
+):
+    player = BagPlayer(
+        context=ros_context,
+        parameter_overrides=parameters(bag=str(recorded[0]), start_paused=True),
+    )
+    executor.add_node(player)
+    said = capfd.readouterr().err
+    assert "part_parent_frame: 'base_link' and part_pose: [1, 0, 0.5, 0, 0, 0.70710" in said
+
+
+@pytest.mark.skipif(not HAS_TF, reason='needs tf2_ros')
+def test_its_replay_brings_the_transforms_along(
+    recorded, ros_context, executor, simulator, painted, wait_until
+):
+    run, film = recorded
+    for node in executor.get_nodes():
+        executor.remove_node(node)
+        node.destroy_node()
+    node = simulator()
+    player = BagPlayer(context=ros_context, parameter_overrides=parameters(bag=str(run), rate=0.0))
+    executor.add_node(player)
+    replayed = painted(node, len(MOTION))
+    assert np.abs(replayed - film).max() < 1e-6 * film.max()
+
+
+@pytest.mark.parametrize('kind', ['byte', 'bool', 'double'])
+def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, onlooker, call,
+                                                                    kind):  # fmt: skip
+    node = simulator(part_pose=PART_POSE, part_parent_frame='base_link')
+    assert node.frame.transform_from('base_link', 0) is not None
+    type_ = getattr(ParameterType, f'PARAMETER_{kind.upper()}_ARRAY')
+    request = SetParameters.Request(
+        parameters=[ParameterMessage(name='part_pose', value=ParameterValue(type=type_))]
+    )
+    service = f'/{node.get_name()}/set_parameters'
+    (result,) = call(onlooker({}), SetParameters, service, request).results
+    assert result.successful, result.reason
+    assert list(node.values['part_pose']) == []
+    assert list(node.get_parameter('part_pose').value) == []
