@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure fuzz soak lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure fuzz soak reliability lint format lock clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -39,6 +39,9 @@ bench-measure: build  ## count the readings that chosen points save
 
 fuzz: build  ## feed changed files to the readers; ARGS='--seconds 600 rapid ply' chooses
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m fuzz.run $(ARGS)
+
+reliability: build  ## end the nodes at random moments, 50 times each
+	@$(IN_ENVIRONMENT) python benchmarks/reliability.py $(ARGS)
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 8 --vertices 20000' for less
 	@$(IN_ENVIRONMENT) python benchmarks/soak.py $(ARGS)

@@ -25,6 +25,9 @@ RATE_HZ = 250
 PART_M = (1.6, 0.8)
 EDGE_M = {200_000: 0.0036, 20_000: 0.0115, 2_000: 0.036}
 SAMPLE_S = 5.0
+# The poses that are kept to paint them again grow to a size that is set, 90 bytes each: as few as
+# can be, so that what else grows is seen.
+POSE_MEMORY = 10_000
 # The first part of a run fills caches and queues; the slope is of the rest.
 WARM_SHARE = 0.25
 LARGEST_SLOPE_MB_PER_MIN = 1.0
@@ -90,7 +93,7 @@ def soak(minutes: float, vertices: int, folder: Path) -> Outcome:
     with ExitStack() as running:
         simulator = _node(
             running, folder, 'deposition_simulator', mesh_file=mesh, max_edge_length_m=edge_m,
-            output_directory=folder,
+            output_directory=folder, pose_memory=POSE_MEMORY,
         )  # fmt: skip
         recorder = _node(
             running, folder, 'run_recorder', output_directory=folder, name='run',
