@@ -2,14 +2,14 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure fuzz soak reliability lint format lock clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure fuzz soak reliability numbers lint format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
 # Files of tests side by side, on four cores at the most.
 TESTS := pytest --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 PIN := .venv/bin/uv pip compile --quiet --universal --python-version 3.10 --fork-strategy fewest \
-	--no-annotate --custom-compile-command 'make lock' --upgrade
+	--no-annotate --generate-hashes --custom-compile-command 'make lock' --upgrade
 
 help:  ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / {printf "  make %-17s %s\n", $$1, $$2}' $(MAKEFILE_LIST)
@@ -46,6 +46,9 @@ reliability: build  ## end the nodes at random moments, 50 times each
 soak: build  ## run a cell for half an hour; ARGS='--minutes 8 --vertices 20000' for less
 	@$(IN_ENVIRONMENT) python benchmarks/soak.py $(ARGS)
 
+numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
+	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 $(ARGS)
+
 lint: build  ## check style, types and the order of the rooms
 	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports
 
@@ -62,6 +65,12 @@ lock: build  ## pin the newest library versions that all supported Pythons can u
 	$(PIN) requirements/core.in -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
 	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
+
+audit: build  ## look the pinned libraries up among the known vulnerabilities (needs the network)
+	@setup/audit.sh
+
+sbom: build  ## list the libraries that the package brings, as CycloneDX
+	@setup/sbom.sh
 
 clean:  ## remove everything that was built, keep the environment
 	rm -rf ros2_ws/{build,install,log} $(PACKAGE)/{build,*.egg-info} .setup .{pytest,mypy,ruff}_cache .hypothesis

@@ -32,13 +32,13 @@ if ! venv_is_sound 2>>"$log"; then
 fi
 rm -f "$venv/.fingerprint"
 
-uv_pin=$(<"$root/requirements/uv.txt")
-if [[ $("$venv/bin/uv" --version 2>>"$log") != "uv ${uv_pin#uv==}"* ]]; then
+uv_version=$(sed -n 's/^uv==\([^ ]*\).*/\1/p' "$root/requirements/uv.txt")
+if [[ $("$venv/bin/uv" --version 2>>"$log") != "uv $uv_version"* ]]; then
     logged 'Installing the installer, uv' \
         "$venv/bin/python" -m pip install --disable-pip-version-check -r "$root/requirements/uv.txt"
 fi
 logged "Installing $libraries" \
-    "$venv/bin/uv" pip install --compile-bytecode --python "$venv/bin/python" \
+    "$venv/bin/uv" pip install --require-hashes --compile-bytecode --python "$venv/bin/python" \
     "${requirements[@]}"
 logged 'Repairing the CMake exports of the wheels' \
     "$venv/bin/python" "$root/setup/repair_cmake_exports.py"

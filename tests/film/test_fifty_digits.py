@@ -72,12 +72,10 @@ def worlds():
                 model_plane_m=rng.uniform(0.15, 0.5), emission_offset_m=rng.uniform(0.0, 0.1)
             )
             model = DepositionModel(planar=planar, projection=projection)
-            normals = rng.normal(size=(POINTS, 3)) + [0.0, 0.0, 2.0]
+            normals = rng.normal([0.0, 0.0, 2.0], 1.0, size=(POINTS, 3))
             normals /= np.linalg.norm(normals, axis=1, keepdims=True)
             places = rng.uniform([-0.4, -0.4, -0.1], [0.4, 0.4, 0.1], size=(POINTS, 3))
-            points = SurfacePoints(
-                places, normals, area_m2=np.ones(POINTS), down=(0.0, 0.0, -1.0)
-            )
+            points = SurfacePoints(places, normals, area_m2=np.ones(POINTS), down=(0.0, 0.0, -1.0))
             path = _random_path(rng)
             film = [
                 mpmath.fsum(

@@ -59,7 +59,11 @@ SIMULATOR = dict(
         True,
         'Whether the coloured mesh goes out; of 275,000 vertices it takes 65 MB each time [-]',
     ),
-    output_directory=NodeParameter('runs', 'Where ~/save_film writes [path]'),
+    output_directory=NodeParameter(
+        'runs',
+        'Where ~/save_film writes [path]',
+        fixed_because='the network does not choose where files are written; restart the node',
+    ),
 )
 
 

@@ -18,6 +18,7 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.log_time import LogTime
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
@@ -100,6 +101,7 @@ class RunRecorder(PaintNode):
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
         self._error: RecordingError | None = None
+        self._log_time = LogTime()
         self._progress = {
             self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
                 PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
@@ -162,11 +164,18 @@ class RunRecorder(PaintNode):
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
+        set_back_ns = self._log_time.set_back_ns
+        log_time_ns = self._log_time.of(received_ns)
+        if self._log_time.set_back_ns > set_back_ns:
+            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
+            self.get_logger().warning(
+                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
+            )
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
         if name == STATIC_FRAMES:
-            self._said_once.append((name, cdr, received_ns, sent_ns))
-        self._guarded(self.run.write, name, cdr, received_ns, sent_ns)
+            self._said_once.append((name, cdr, log_time_ns, sent_ns))
+        self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 

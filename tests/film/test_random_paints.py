@@ -1,0 +1,131 @@
+"""Whatever is painted with whatever: no film below zero, no paint from nowhere, live as offline.
+
+`make numbers` tries 10,000 parts, paths and models; PAINT_EXAMPLES says how many here.
+"""
+
+import os
+
+import numpy as np
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
+from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+from scenes import LOOKING_DOWN, stamps_ns
+
+EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '25'))
+many = settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow])
+# Of each way in which a law can act: on the flux, on the path, with what lies ahead.
+LAWS = [
+    (), ('incidence_attraction',), ('trigger_lag', 'air_drift'), ('corner_slowdown',),
+]  # fmt: skip
+HALF_M, COUNT = 0.7, 71
+
+
+@st.composite
+def models(draw) -> DepositionModel:
+    """A narrow pattern, so that all of it meets the part, and the laws of one of LAWS."""
+    planar = PlanarPattern(
+        K1_cm3_per_s=draw(st.floats(0.1, 10.0)), K2=draw(st.floats(0.0, 1.0)),
+        K3=draw(st.floats(0.0, 1.0)), phi_rad=draw(st.floats(-3.1, 3.1)),
+        r_m=draw(st.floats(0.0, 0.08)), sigma1_m=draw(st.floats(0.03, 0.05)),
+        sigma2_m=draw(st.floats(0.03, 0.05)),
+    )  # fmt: skip
+    plane = draw(st.floats(0.2, 0.4))
+    projection = Projection(model_plane_m=plane, emission_offset_m=draw(st.floats(0.0, 0.1)))
+    laws = [effect_class(name).typical() for name in draw(st.sampled_from(LAWS))]
+    return DepositionModel(planar=planar, projection=projection, effects=tuple(laws))
+
+
+@st.composite
+def motions(draw) -> Trajectory:
+    """Straight legs between random corners at a random rate, with a random trigger or none."""
+    corners = np.array(draw(st.lists(
+        st.tuples(*[st.floats(-0.2, 0.2)] * 2, st.floats(0.2, 0.3)), min_size=2, max_size=4,
+    )))  # fmt: skip
+    times_s = np.arange(0.0, draw(st.floats(0.5, 2.0)), draw(st.sampled_from([0.004, 0.01, 0.04])))
+    at_corner = np.linspace(0.0, times_s[-1], len(corners))
+    positions = np.stack([np.interp(times_s, at_corner, c) for c in corners.T], axis=1)
+    tilt = Rotation.from_euler('xyz', draw(st.tuples(*[st.floats(-0.3, 0.3)] * 3)))
+    quaternion = (Rotation.from_quat(LOOKING_DOWN) * tilt).as_quat()
+    switched_s = sorted(draw(st.lists(st.floats(0.0, 2.0), max_size=4)))
+    flow = draw(st.lists(
+        st.sampled_from([0.0, 0.5, 1.0]), min_size=len(switched_s), max_size=len(switched_s),
+    ))  # fmt: skip
+    return Trajectory(
+        stamps_ns(times_s), positions, np.tile(quaternion, (len(times_s), 1)), 'part',
+        stamps_ns(switched_s), np.array(flow, dtype=float),
+    )  # fmt: skip
+
+
+@st.composite
+def parts(draw) -> SurfacePoints:
+    """A wavy sheet below the gun, with the area of each point."""
+    line = np.linspace(-HALF_M, HALF_M, COUNT)
+    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
+    height, wave = draw(st.floats(0.0, 0.02)), draw(st.floats(3.0, 8.0))
+    z = height * np.sin(wave * x) * np.cos(wave * y)
+    slope_x = height * wave * np.cos(wave * x) * np.cos(wave * y)
+    slope_y = -height * wave * np.sin(wave * x) * np.sin(wave * y)
+    steep = np.sqrt(1.0 + slope_x**2 + slope_y**2)
+    normals = np.stack([-slope_x, -slope_y, np.ones(len(x))], axis=1) / steep[:, np.newaxis]
+    return SurfacePoints(
+        np.stack([x, y, z], axis=1), normals, area_m2=steep * (line[1] - line[0]) ** 2,
+        down=(0.0, -1.0, 0.0),
+    )  # fmt: skip
+
+
+def offline(points: SurfacePoints, motion: Trajectory, model: DepositionModel) -> FilmIntegrator:
+    path, _ = spray_path(
+        motion, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
+    )
+    integrator = FilmIntegrator(points, model, 'double')
+    integrator.add(path)
+    return integrator
+
+
+@many
+@given(points=parts(), motion=motions(), model=models())
+def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, model):
+    film = offline(points, motion, model)
+    assert (film.film_um >= 0.0).all()
+    assert np.isfinite(film.film_um).all()
+    landed_cm3 = float(film.film_um @ points.area_m2)
+    if not model.effects:
+        # All of the narrow pattern meets the sheet; what is off is the sum over its points.
+        assert abs(landed_cm3 - film.emitted_cm3) <= 0.01 * film.emitted_cm3
+    else:
+        assert landed_cm3 <= 1.3 * film.emitted_cm3
+
+
+@many
+@given(
+    points=parts(), motion=motions(), model=models(),
+    sizes=st.lists(st.integers(1, 60), min_size=1, max_size=5),
+)  # fmt: skip
+def test_the_live_film_is_the_offline_film_to_the_last_bit(points, motion, model, sizes):
+    expected = offline(points, motion, model)
+    film = LiveFilm(points, model, precision='double')
+    states = list(zip(motion.trigger_stamps_ns.tolist(), motion.trigger_flow, strict=True))
+    start = turn = 0
+    while start < len(motion):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        batch = PoseBatch(
+            motion.stamps_ns[rows], motion.positions_m[rows], motion.quaternions_xyzw[rows]
+        )
+        while states and states[0][0] <= batch.stamps_ns[-1]:
+            film.add_trigger(TriggerChange(states[0][0], float(states.pop(0)[1])))
+        film.add_poses(batch)
+        start, turn = rows.stop, turn + 1
+    for stamp, flow in states:
+        film.add_trigger(TriggerChange(stamp, float(flow)))
+    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
