@@ -64,6 +64,13 @@ class NodeProcess:
     def terminate(self) -> None:
         self._process.terminate()
 
+    def stall(self) -> None:
+        """Stop the process where it is, as a debugger or a lack of memory does."""
+        self._process.send_signal(signal.SIGSTOP)
+
+    def go_on(self) -> None:
+        self._process.send_signal(signal.SIGCONT)
+
     def kill(self) -> None:
         self._process.kill()
         self._process.wait()
