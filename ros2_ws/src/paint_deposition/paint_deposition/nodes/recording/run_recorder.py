@@ -118,6 +118,7 @@ class RunRecorder(PaintNode):
     def _prepare(self) -> None:
         notes = provenance(self.values['mesh_file'], self.values['model_file'])
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        require_file_name('name', name)
         self.run = self._new_run(name, notes)
 
     def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
