@@ -19,6 +19,7 @@ from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
+from paint_deposition.nodes.painting.catching_up import CatchingUp
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
@@ -55,6 +56,8 @@ class PaintingNode(PaintNode, ABC):
         self.inputs = [
             AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
         ]
+        if self.values['catch_up']:
+            CatchingUp(self, self.values['catch_up'])
         self._shown: CommonFilm | None = None
         self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
@@ -132,9 +135,10 @@ class PaintingNode(PaintNode, ABC):
         if self.repainting is not None:
             self._repaint()
 
-    def hold(self) -> None:
-        """Keep what comes from now on for the next part."""
+    def hold(self) -> list[tuple[int, PoseBatch | TriggerChange]]:
+        """Keep what comes from now on, with its gun's number, in this list until `release`."""
         self._held = []
+        return self._held
 
     def take_part(self, mesh_file: str, surface: Surface, points: SurfacePoints,
                   film: LiveFilms) -> None:  # fmt: skip

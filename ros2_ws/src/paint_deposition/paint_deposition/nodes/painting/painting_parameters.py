@@ -59,6 +59,11 @@ PAINTING = dict(
             'hear all of them, reliable only those that offer it [name]',
             choices=('as_offered', 'best_effort', 'reliable'),
         ),
+        catch_up=NodeParameter(
+            '',
+            'Folder of a running recording, to paint what it has before the live poses: for a '
+            'node that is restarted in a run; empty: none [path]',
+        ),
         pose_memory=NodeParameter(
             DEFAULT_LIMIT_POSES,
             'Poses kept, about 100 bytes each, to paint the motion again with another model; '

@@ -110,6 +110,7 @@ class RunRecorder(PaintNode):
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
         self._error: RecordingError | None = None
+        self._log_time = LogTime()
         self._progress = {
             self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
                 PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
@@ -127,6 +128,7 @@ class RunRecorder(PaintNode):
     def _prepare(self) -> None:
         notes = provenance(self.values['mesh_file'], self.values['model_file'])
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        require_file_name('name', name)
         self.run = self._new_run(name, notes)
 
     def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
@@ -173,6 +175,13 @@ class RunRecorder(PaintNode):
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
+        set_back_ns = self._log_time.set_back_ns
+        log_time_ns = self._log_time.of(received_ns)
+        if self._log_time.set_back_ns > set_back_ns:
+            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
+            self.get_logger().warning(
+                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
+            )
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
         log_time_ns = self._log_time_ns(received_ns)

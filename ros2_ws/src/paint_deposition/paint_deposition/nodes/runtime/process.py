@@ -46,7 +46,7 @@ def run_node(
         if told_to_stop.is_set():
             return 0
         _init()
-        node = make_node()
+        node = _made(make_node)
         exit_code = _spin(node, told_to_stop)
     except KeyboardInterrupt:
         exit_code = 0
@@ -77,6 +77,17 @@ def _init() -> None:
     except RuntimeError as error:
         reason = str(error).split(', at /')[0]
         raise PaintError(f'ROS arguments: {" ".join(reason.split())}') from None
+
+
+def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
+    try:
+        return make_node()
+    except RuntimeError as error:
+        # Of rclpy's own core: security without keys or without its libraries, a bad name.
+        if type(error).__name__ != 'RCLError':
+            raise
+        reason = ' '.join(str(error).split(', at /')[0].split())
+        raise PaintError(f'ROS cannot make the node: {reason}') from None
 
 
 def _spin(node: PaintNode, told_to_stop: threading.Event) -> int:

@@ -1,0 +1,56 @@
+"""A simulator that dies in a run and is started again has the whole film in the end."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from paint_msgs.msg import ThicknessStats
+
+from nodes.cell import Robot, offline_um, two_passes, write_panel
+from nodes.processes import NodeProcess
+from paint_deposition.nodes.runtime import qos
+
+POSES = 900
+MOTION = two_passes(poses=POSES)
+KILLED_AT, AGAIN_AT = 350, 500
+STATS = {'thickness/stats': (ThicknessStats, qos.LATCHED)}
+
+
+def test_it_catches_up_from_the_running_recording(
+    ros_domain, ros_context, spin, simulator, wait_until, onlooker, painted, tmp_path
+):
+    robot, viewer = Robot(ros_context), onlooker(STATS)
+    spin(robot)
+    mesh = write_panel(tmp_path / 'panel.stl')
+    listening = robot.pose_publisher.get_subscription_count
+    recorder = NodeProcess(tmp_path / 'rec', 'run_recorder', output_directory=tmp_path, name='run')
+    with recorder:
+        first = NodeProcess(
+            tmp_path / 'sim', 'deposition_simulator', mesh_file=mesh, max_edge_length_m=0.05
+        )
+        with first:
+            wait_until(lambda: listening() == 2, what='both')
+            robot.send(MOTION, slice(0, KILLED_AT))
+            wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
+        # Killed; the gun goes on.
+        robot.send(MOTION, slice(KILLED_AT, AGAIN_AT))
+        node = simulator(catch_up=str(tmp_path / 'run'), pose_queue_depth=2000)
+        wait_until(lambda: robot.is_heard_by(node), what='the new simulator')
+        robot.send(MOTION, slice(AGAIN_AT, POSES))
+        film, expected = painted(node, POSES), offline_um(node, MOTION)
+    assert expected.max() > 5.0
+    assert node.film.counts.rejected == 0
+    assert np.array_equal(film, expected)
+
+
+def test_a_recording_that_is_not_there_is_told_and_the_live_poses_are_painted(
+    simulator, robot, painted, tmp_path, capfd
+):
+    node = simulator(catch_up=str(tmp_path / 'nowhere'))
+    robot(node).send(MOTION)
+    film, expected = painted(node, POSES), offline_um(node, MOTION)
+    assert np.array_equal(film, expected)
+    assert f'not caught up: {tmp_path}/nowhere does not exist' in capfd.readouterr().err

@@ -1,0 +1,67 @@
+"""The policies of the nodes allow what the nodes do, and name nothing that is not there."""
+
+from __future__ import annotations
+
+from xml.etree import ElementTree
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+from booth import SAMPLES
+from nodes.cell import parameters
+from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.recording.run_recorder import DEFAULT_TOPICS, RunRecorder
+from paint_deposition.nodes.replay.bag_player import BagPlayer
+
+PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
+PLACE = {'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 'part_parent_frame': 'base'}
+NODES = {
+    'deposition_simulator': (DepositionSimulator, PANEL | PLACE),
+    'model_comparison': (
+        ModelComparison,
+        PANEL | PLACE | {'measurements_file': str(SAMPLES / 'panel_study/panel_577.csv')},
+    ),
+    'index_planner': (IndexPlanner, PANEL),
+    'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
+    'run_recorder': (RunRecorder, {'name': 'run'}),
+}
+# Where tf2 is installed, and with use_sim_time.
+NOT_ALWAYS = {'/tf', '/tf_static', '/clock'}
+# By every node's logger, and as it follows the parameters of others.
+OF_ALL = {'/rosout', '/parameter_events'}
+
+
+def allowed(repository, node: str) -> dict[str, set[str]]:
+    """Full names that a node may publish, subscribe to and reply on."""
+    policies = ElementTree.parse(repository / 'config/sros2/policies.xml')
+    (profile,) = policies.findall(f".//profile[@node='{node}']")
+    assert profile.get('ns') == '/'
+    found = {}
+    for kind in ('publish', 'subscribe', 'reply'):
+        (names,) = profile.findall(f"*[@{kind}='ALLOW']")
+        texts = [name.text.replace('~', f'/{node}') for name in names]
+        found[kind] = {text if text.startswith('/') else f'/{text}' for text in texts}
+    return found
+
+
+@pytest.mark.parametrize('name', NODES)
+def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, name):
+    node_class, values = NODES[name]
+    if name == 'run_recorder':
+        values = values | {'output_directory': str(tmp_path)}
+    node = node_class(context=ros_context, parameter_overrides=parameters(**values))
+    executor.add_node(node)
+    rules = allowed(repository, name)
+    published = {publisher.topic_name for publisher in node.publishers} | OF_ALL
+    heard = {subscription.topic_name for subscription in node.subscriptions}
+    if name == 'run_recorder':
+        # It subscribes as publishers appear.
+        heard |= {node.resolve_topic_name(topic) for topic in (*DEFAULT_TOPICS, 'part')}
+        heard |= {'/atomizer/pose', '/atomizer/state'}
+    offered = {service.service_name for service in node.services}
+    assert published | NOT_ALWAYS == rules['publish'] | NOT_ALWAYS
+    assert heard | NOT_ALWAYS | OF_ALL == rules['subscribe'] | NOT_ALWAYS | OF_ALL
+    assert offered == rules['reply']
