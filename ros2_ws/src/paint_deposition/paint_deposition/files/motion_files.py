@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_source import MotionSource
@@ -13,11 +13,13 @@ from paint_deposition.files.rapid.motion import is_rapid, program_trajectory
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, custom_data
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.transforms import StaticFrames
 from paint_deposition.files.refusals import checked
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+    from paint_deposition.files.recordings.transforms import StaticFrames
 
 PART = 'part'
 
@@ -79,6 +81,8 @@ def _robot(path: Path, source: MotionSource) -> Robot | None:
     if source.urdf and source.tf:
         raise RecordingError(f'{path}: both tf and urdf are given; leave one of them out')
     if source.urdf:
+        from paint_deposition.files.recordings.joint_states import Robot
+
         return Robot.read(Path(source.urdf), source.tip_link, source.base_link)
     if source.tip_link or source.base_link:
         raise RecordingError(f'{path}: tip_link and base_link are links of a URDF; give --urdf')
@@ -121,6 +125,8 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
 
 def _static_frames(path: Path) -> StaticFrames:
     """Only bags tell of frames."""
+    from paint_deposition.files.recordings.transforms import StaticFrames
+
     return StaticFrames() if is_rapid(path) or is_pose_table(path) else StaticFrames.of(path)
 
 
