@@ -362,7 +362,7 @@ def test_another_model_paints_from_there_on():
 
 
 def test_progress_names_the_sub_steps_done():
-    path, _ = spray_path(straight_pass(np.arange(0.0, 50.0, 0.01)))
+    path, _ = spray_path(straight_pass(np.arange(0.0, 200.0, 0.05)))
     seen = []
     FilmIntegrator(lying_plane(count=5), MODEL).add(path, seen.append)
     assert len(seen) > 1

@@ -12,6 +12,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
 from scenes import START_NS, lying_plane, stamps_ns, straight_pass, weaving
 
 MODEL = DepositionModel()
@@ -164,8 +165,11 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     assert film.flow == 0.0
     film.follow(events[half:])
     # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
-    second = straight_pass(
-        TIMES_S,
+    rest = PoseBatch.joined([event for event in events[half:] if isinstance(event, PoseBatch)])
+    second = Trajectory(
+        rest.stamps_ns,
+        rest.positions_m,
+        rest.quaternions_xyzw,
         trigger_stamps_ns=stamps_ns([2.2]),
         trigger_flow=np.array([0.8]),
     )

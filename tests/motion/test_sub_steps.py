@@ -9,6 +9,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from paint_deposition.motion.sub_steps import (
     LEVER_M,
     MOST_SUB_STEPS,
+    followed_poses,
     slerp,
     split_segments,
     write_rotation,
@@ -150,3 +151,47 @@ def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
     stamp, dwell, *_ = split([0, 10, 20], positions, np.tile([0, 0, 0, 1.0], (3, 1)))
     assert len(stamp) == 2 * MOST_SUB_STEPS
     assert dwell.sum() == pytest.approx(20e-9)
+
+
+def followed(times_s, x_m, y_m=0.0):
+    """Rows followed of poses in a plane, all looking the same way."""
+    stamps = np.round(1e9 * np.asarray(times_s)).astype(np.int64)
+    x_m, y_m = np.broadcast_arrays(x_m, y_m, times_s)[:2]
+    positions = np.column_stack([x_m, y_m, 0.0 * x_m])
+    quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(stamps), 1))
+    return followed_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
+
+
+@pytest.mark.parametrize('rate_hz', [20, 50, 125, 500, 1000])
+def test_poses_are_passed_over_until_half_a_sub_step_is_travelled(rate_hz):
+    times = np.arange(0.0, 2.0, 1.0 / rate_hz)
+    travel = np.diff(0.3 * times[followed(times, 0.3 * times)])
+    assert np.all(travel >= 0.5 * STEP_M - 1e-12)
+    assert np.all(travel < 0.5 * STEP_M + 0.3 / rate_hz + 1e-12)
+
+
+def test_a_gun_that_stands_still_is_followed_twenty_times_a_second():
+    times = np.arange(0.0, 2.0, 0.004)
+    assert np.allclose(np.diff(times[followed(times, 0.7)]), 0.052)
+
+
+def test_both_ends_of_a_gap_are_followed():
+    times = np.concatenate([np.arange(0.0, 0.101, 0.001), np.arange(0.5, 0.6, 0.001)])
+    rows = followed(times, 0.1 * times)
+    assert {100, 101} <= set(rows)
+
+
+def test_no_gap_arises_between_poses_far_apart_in_time():
+    """Each comes within the longest interval; two together would not."""
+    times = np.array([0.0, 0.04, 0.28, 0.32, 0.5])
+    assert np.all(np.diff(times[followed(times, 0.0)]) < 1e-9 * GAP_NS)
+
+
+@pytest.mark.parametrize('angle_deg', [60.0, 90.0, 180.0])
+def test_the_pose_at_a_corner_is_followed(angle_deg):
+    legs = 0.0015 * np.arange(1, 40)
+    angle = np.radians(angle_deg)
+    x = np.concatenate([legs, legs[-1] + np.cos(angle) * legs])
+    y = np.concatenate([0.0 * legs, np.sin(angle) * legs])
+    corner = len(legs) - 1
+    assert corner in followed(0.001 * np.arange(len(x)), x, y)

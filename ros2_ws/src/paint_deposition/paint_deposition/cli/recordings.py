@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
-from tqdm import tqdm
 
 from paint_deposition.cli.options import (
     BODY,
@@ -19,22 +17,9 @@ from paint_deposition.cli.options import (
     model_option,
     motion_options,
 )
-from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
-from paint_deposition.files.json_files import json_text
-from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.pose_tables.reading import (
-    PoseLayout,
-    is_pose_table,
-    read_pose_table,
-)
-from paint_deposition.files.provenance import origin
-from paint_deposition.files.rapid.motion import is_rapid, program_as_text
-from paint_deposition.files.rapid.program import read_program
-from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
-from paint_deposition.files.recordings.joint_states import JOINT_TYPE
-from paint_deposition.files.recordings.mcap_recovery import Recovery, mcap_files, recover
-from paint_deposition.files.recordings.transforms import TF_TYPES
-from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.mcap_recovery import Recovery
 
 
 @click.command('inspect')
@@ -83,18 +68,9 @@ def inspect_command(
         raise click.UsageError(
             '--out, --model and how the motion is read go with --mesh; give the part'
         )
-    if is_rapid(path):
-        program = read_program(path, gun_signal=gun_signal)
-        click.echo(_json(asdict(program), path) if as_json else program_as_text(program))
-        return
-    if is_pose_table(path):
-        MotionSource(gun_signal=gun_signal).refuse_other(path, 'a table of poses')
-        figures, lines = _told(read_pose_table(path, PoseLayout()))
-        click.echo(_json(figures, path) if as_json else lines)
-        return
-    MotionSource(gun_signal=gun_signal).refuse_other(path, 'a bag')
-    summary = summarise(path, max_pose_gap_s)
-    click.echo(_json(asdict(summary), path) if as_json else _table(summary))
+    from paint_deposition.cli.recording_contents import show_contents
+
+    show_contents(path, gun_signal, max_pose_gap_s, as_json)
 
 
 @click.command('recover')
@@ -109,6 +85,13 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
 
     RUN is a run's folder or its .mcap file.
     """
+    from tqdm import tqdm
+
+    from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S
+    from paint_deposition.files.json_files import json_text
+    from paint_deposition.files.provenance import origin
+    from paint_deposition.files.recordings.mcap_recovery import mcap_files, recover
+
     output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
     size = sum(file.stat().st_size for file in mcap_files(run))
     with tqdm(
@@ -121,7 +104,8 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     ) as bar:
         recovery = recover(run, output, on_bytes=bar.update)
     if as_json:
-        click.echo(_json(_figures(recovery), run))
+        made_from = origin(files={'recording': run})
+        click.echo(json_text(_figures(recovery) | {'provenance': made_from}))
         return
     for line in recovery.breaks:
         click.echo(line)
@@ -134,10 +118,6 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
 
 
-def _json(figures: dict, recording: Path) -> str:
-    return json_text(figures | {'provenance': origin(files={'recording': recording})})
-
-
 def _figures(recovery: Recovery) -> dict:
     return {
         'folder': str(recovery.folder),
@@ -147,40 +127,3 @@ def _figures(recovery: Recovery) -> dict:
         'breaks': recovery.breaks,
         'skipped_topics': recovery.skipped_topics,
     }
-
-
-def _told(poses: Trajectory) -> tuple[dict, str]:
-    """What was understood of a table of poses: figures, and the same in words."""
-    low, high = poses.positions_m.min(axis=0), poses.positions_m.max(axis=0)
-    figures = {
-        'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id,
-        'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
-    }  # fmt: skip
-    sides = ', '.join(
-        f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
-    )
-    frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
-    return figures, '\n'.join([line, *poses.notes])
-
-
-def _table(summary: BagSummary) -> str:
-    lines = [summary.path]
-    width = max((len(topic.name) for topic in summary.topics), default=0)
-    lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
-    lines += [
-        f"poses on {stream.topic}: {stream.poses} in frame '{stream.frame_id}' over "
-        f'{stream.duration_s:.3f} s, {stream.mean_rate_hz:.1f} a second, {stream.gaps} gaps, '
-        f'longest interval {stream.longest_gap_s:.3f} s, '
-        f'{stream.repeated_stamps} repeated and {stream.backward_stamps} backward stamps'
-        for stream in summary.pose_streams
-    ]
-    if not summary.pose_streams:
-        lines.append('no poses: there is no PoseStamped topic with messages')
-    types = {topic.type for topic in summary.topics}
-    if types & {*TF_TYPES}:
-        lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
-    if JOINT_TYPE in types:
-        lines.append('joint states: --urdf takes the motion from them')
-    lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
-    return '\n'.join(lines)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,11 +15,13 @@ from paint_deposition.files.rapid.motion import is_rapid, program_trajectory
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, custom_data
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.transforms import StaticFrames, poses_over_time
 from paint_deposition.files.refusals import checked
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+    from paint_deposition.files.recordings.transforms import StaticFrames
 
 PART = 'part'
 
@@ -81,6 +83,8 @@ def _robot(path: Path, source: MotionSource) -> Robot | None:
     if source.urdf and source.tf:
         raise RecordingError(f'{path}: both tf and urdf are given; leave one of them out')
     if source.urdf:
+        from paint_deposition.files.recordings.joint_states import Robot
+
         return Robot.read(Path(source.urdf), source.tip_link, source.base_link)
     if source.tip_link or source.base_link:
         raise RecordingError(f'{path}: tip_link and base_link are links of a URDF; give --urdf')
@@ -108,6 +112,8 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
     if place is not None:
         said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
         return _noted(at_part(recorded, place.values, part), said + words(place))
+    from paint_deposition.files.recordings.transforms import poses_over_time
+
     if _has_frames(path) and (over_time := poses_over_time(path, part, named, recorded.stamps_ns)):
         return _on_a_moving_part(recorded, part, *over_time)
     known = static.words(named)
@@ -158,6 +164,8 @@ def _on_a_moving_part(
 
 
 def _static_frames(path: Path) -> StaticFrames:
+    from paint_deposition.files.recordings.transforms import StaticFrames
+
     return StaticFrames.of(path) if _has_frames(path) else StaticFrames()
 
 

@@ -1,7 +1,6 @@
 """Surface points laid out for the kernel: neighbours together, structure of arrays."""
 
 from dataclasses import dataclass
-from itertools import pairwise
 
 import numpy as np
 
@@ -38,37 +37,43 @@ class Blocks:
     def of(positions_m: np.ndarray, normals: np.ndarray, precision: type) -> 'Blocks':
         """Sort (V, 3) positions [m] and normals into blocks."""
         origin = 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
-        local = positions_m - origin
-        size = min(LARGEST_BLOCK, max(SMALLEST_BLOCK, len(local) // 16 // LANES * LANES))
-        members = _neighbours(local, np.arange(len(local)), size)
+        local = np.ascontiguousarray((positions_m - origin).T)
+        count = len(positions_m)
+        size = min(LARGEST_BLOCK, max(SMALLEST_BLOCK, count // 16 // LANES * LANES))
+        members = _neighbours(local, np.arange(count), size)
         members = [block for first in range(SPREAD) for block in members[first::SPREAD]]
         order = np.concatenate(members)
-        bounds = np.concatenate([[0], np.cumsum([len(block) for block in members])])
-        spheres = np.empty((len(members), 4))
-        for block, (start, stop) in enumerate(pairwise(bounds)):
-            inside = local[order[start:stop]]
-            centre = 0.5 * (inside.min(axis=0) + inside.max(axis=0))
-            spheres[block, :3] = centre
-            spheres[block, 3] = np.linalg.norm(inside - centre, axis=1).max()
+        sizes = [len(block) for block in members]
+        bounds = np.concatenate([[0], np.cumsum(sizes)])
+        local = local[:, order]
+        low, high = (
+            reduce.reduceat(local, bounds[:-1], axis=1) for reduce in (np.minimum, np.maximum)
+        )
+        centre = 0.5 * (low + high)
+        away = np.linalg.norm(local - np.repeat(centre, sizes, axis=1), axis=0)
+        radius = np.maximum.reduceat(away, bounds[:-1])
         return Blocks(
             order,
             origin,
-            np.ascontiguousarray(local[order].T, dtype=precision),
+            np.ascontiguousarray(local, dtype=precision),
             np.ascontiguousarray(normals[order].T, dtype=precision),
-            spheres,
+            np.column_stack([centre.T, radius]),
             bounds,
         )
 
 
 def _neighbours(points: np.ndarray, rows: np.ndarray, size: int) -> list[np.ndarray]:
-    """Halve the rows across their longest extent until none has more than ``size``.
+    """Halve points (3, V) across their longest extent until no part has more than ``size``.
 
+    The points are handed on with their rows: gathering them anew from all would wait for memory.
     Every cut is at a multiple of ``size``: all blocks but one are full.
     """
     if len(rows) <= size:
         return [rows]
-    chosen = points[rows]
-    along = chosen[:, np.ptp(chosen, axis=0).argmax()]
+    along = points[(points.max(axis=1) - points.min(axis=1)).argmax()]
     half = -(-len(rows) // size) // 2 * size
-    split = rows[np.argpartition(along, half)]
-    return [*_neighbours(points, split[:half], size), *_neighbours(points, split[half:], size)]
+    split = np.argpartition(along, half)
+    found = []
+    for part in (split[:half], split[half:]):
+        found += _neighbours(points.take(part, axis=1), rows[part], size)
+    return found

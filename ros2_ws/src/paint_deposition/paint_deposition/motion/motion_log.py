@@ -32,9 +32,9 @@ class PoseBatch:
     def __len__(self) -> int:
         return len(self.stamps_ns)
 
-    def select(self, rows: slice | list[int]) -> 'PoseBatch':
+    def select(self, rows: slice | list[int] | np.ndarray) -> 'PoseBatch':
         """The chosen rows."""
-        chosen = rows if isinstance(rows, slice) else np.array(rows, dtype=np.int64)
+        chosen = rows if isinstance(rows, slice) else np.asarray(rows, dtype=np.int64)
         return PoseBatch(*(column[chosen] for column in vars(self).values()))
 
     def finite_axes(self) -> tuple[np.ndarray, np.ndarray]:

@@ -13,7 +13,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.screening import PoseScreen
 from paint_deposition.motion.spray_pass import first_pass, follow_passes
 from paint_deposition.motion.stroke import first_stroke, follow_strokes
-from paint_deposition.motion.sub_steps import split_segments
+from paint_deposition.motion.sub_steps import followed_poses, split_segments
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH, first_trigger, follow_trigger
 
@@ -104,7 +104,7 @@ class PathBuilder:
         going_on, *restarted = self._screen.take(batch)
         self._waiting.append(going_on)
         for stream in restarted:
-            self._cut_segments(until_ns=None)
+            self._cut_segments(until_ns=None, finish=True)
             self.counts.late_triggers -= self._flow.restart()
             self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
@@ -114,19 +114,20 @@ class PathBuilder:
         """Hand out the sub-steps that are complete.
 
         Args:
-            until_ns: leave segments that end later for the next call; None: all.
-            finish: the stream has ended; incomplete strokes are handed out too.
+            until_ns: leave poses that come later for the next call; None: take all.
+            finish: the stream has ended; the poses behind the last that was followed, and
+                incomplete strokes, are handed out too.
         """
         if finish:
             self._screen.finish()
-        self._cut_segments(until_ns)
+        self._cut_segments(until_ns, finish)
         if self._integrated_ns is not None:
             self._flow.forget(self._integrated_ns)
         path = SprayPath.joined([SprayPath.empty(), *self._finished])
         self._finished = []
         return self._whole_strokes(path, finish) if self.whole_strokes and len(path) else path
 
-    def _cut_segments(self, until_ns: int | None) -> None:
+    def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:
             return
         poses = PoseBatch.joined(self._waiting)
@@ -136,8 +137,17 @@ class PathBuilder:
             ready = int(np.searchsorted(poses.stamps_ns, until_ns, side='right'))
         if ready < 2:
             return
+        come = poses.select(slice(0, ready))
+        rows = followed_poses(
+            come.stamps_ns, come.positions_m, come.quaternions_xyzw, self.max_gap_ns,
+            self.max_step_m,
+        )  # fmt: skip
+        if finish and rows[-1] < ready - 1:
+            rows = np.append(rows, ready - 1)
+        if len(rows) < 2:
+            return
         cuts, flows, brushes = self._flow.steps()
-        now = poses.select(slice(0, ready))
+        now = come.select(rows)
         stamp, dwell, position, rotation, velocity, after_gap = split_segments(
             now.stamps_ns,
             now.positions_m,
@@ -157,7 +167,7 @@ class PathBuilder:
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
         self._integrated_ns = int(now.stamps_ns[-1])
-        self._waiting = [poses.select(slice(ready - 1, None))]
+        self._waiting = [poses.select(slice(int(rows[-1]), None))]
 
     def _followed(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""

@@ -1,5 +1,8 @@
 """Segments between poses cut into sub-steps: position linear, orientation slerped.
 
+Robots log up to a thousand poses a second, finer than sub-steps need to be: poses between are
+passed over. What a film costs follows the length of the path, not the rate of its log.
+
 Compiled one row at a time and without fast-math, so that a row's numbers do not depend on which
 other rows came in the same call: a live stream and an offline run give the same bits.
 """
@@ -13,6 +16,13 @@ from numba import njit
 LEVER_M = 0.3
 # A segment is not cut finer, however far a pose is off: that is 80 m in one go.
 MOST_SUB_STEPS = 10_000
+# Poses are passed over until the spray has travelled this share of the longest sub-step...
+LEAST_SHARE = 0.5
+# ... or this long [ns], so that the film grows under a gun that stands still.
+LEAST_NS = 50_000_000
+# A pose by which the way is longer than past it, by more than this share of such a travel, is a
+# corner and followed.
+CORNER_SHARE = 0.1
 
 
 @njit(cache=True)
@@ -48,12 +58,62 @@ def write_rotation(out, quaternion):
 
 
 @njit(cache=True)
+def _distance(p0, p1):
+    return math.sqrt((p1[0] - p0[0]) ** 2 + (p1[1] - p0[1]) ** 2 + (p1[2] - p0[2]) ** 2)
+
+
+@njit(cache=True)
+def spray_travel_m(p0, p1, q0, q1):
+    """How far the spray travels between two poses, a turn of the tool included [m]."""
+    dot = abs(q0[0] * q1[0] + q0[1] * q1[1] + q0[2] * q1[2] + q0[3] * q1[3])
+    return _distance(p0, p1) + LEVER_M * (2.0 * math.acos(min(dot, 1.0)))
+
+
+@njit(cache=True)
 def count_sub_steps(p0, p1, q0, q1, max_step_m):
     """How many sub-steps keep the spray's travel in each below the limit."""
-    travel = math.sqrt((p1[0] - p0[0]) ** 2 + (p1[1] - p0[1]) ** 2 + (p1[2] - p0[2]) ** 2)
-    dot = abs(q0[0] * q1[0] + q0[1] * q1[1] + q0[2] * q1[2] + q0[3] * q1[3])
-    turn = 2.0 * math.acos(min(dot, 1.0))
-    return int(math.ceil(min(max((travel + LEVER_M * turn) / max_step_m, 1.0), MOST_SUB_STEPS)))
+    travel = spray_travel_m(p0, p1, q0, q1)
+    return int(math.ceil(min(max(travel / max_step_m, 1.0), MOST_SUB_STEPS)))
+
+
+@njit(cache=True)
+def _detour_m(p0, p1, p2):
+    """By how much the way from p0 to p2 is longer by p1 [m]."""
+    return _distance(p0, p1) + _distance(p1, p2) - _distance(p0, p2)
+
+
+@njit(cache=True)
+def followed_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
+    """Rows of the poses that are followed, the first among them.
+
+    Each pose is decided on by the last one followed, the one before it and itself: it does not
+    matter how a stream was cut into calls, if each begins at the last pose followed.
+
+    Args:
+        stamps_ns: (N,) int64, strictly increasing.
+        positions: (N, 3) [m]. quaternions: (N, 4) unit.
+        max_gap_ns: a longer time between poses is a gap: the poses at its ends are followed.
+        max_step_m: travel limit of a sub-step [m].
+
+    Returns:
+        (K,) rows, increasing. The poses behind the last of them wait for more.
+    """
+    rows = np.zeros(len(stamps_ns), np.int64)
+    count, last = 1, 0
+    longest_ns, least_m = min(LEAST_NS, max_gap_ns), LEAST_SHARE * max_step_m
+    for i in range(1, len(stamps_ns)):
+        if last < i - 1:
+            detour_m = _detour_m(positions[last], positions[i - 1], positions[i])
+            if detour_m > CORNER_SHARE * least_m or stamps_ns[i] - stamps_ns[last] > max_gap_ns:
+                last = i - 1
+                rows[count] = last
+                count += 1
+        travel = spray_travel_m(positions[last], positions[i], quaternions[last], quaternions[i])
+        if travel >= least_m or stamps_ns[i] - stamps_ns[last] >= longest_ns:
+            last = i
+            rows[count] = last
+            count += 1
+    return rows[:count]
 
 
 @njit(cache=True)

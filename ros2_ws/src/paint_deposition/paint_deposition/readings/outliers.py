@@ -6,7 +6,7 @@ much hides every effect.
 
 import numpy as np
 from scipy.ndimage import median
-from scipy.stats import norm, t
+from scipy.special import ndtri, stdtrit
 
 from paint_deposition.readings.readings import PointMeans, Readings
 
@@ -110,7 +110,7 @@ class _Repeats:
         order = np.lexsort((self.distance, self.owner))
         # At each point one distance is redundant: half of a pair, or the median of three itself.
         own = np.diff(self.owner[order], prepend=-1) == 0
-        return float(np.median(self.distance[order][own]) / norm.ppf(0.75))
+        return float(np.median(self.distance[order][own]) / ndtri(0.75))
 
     def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
         """Pooled scale of the kept readings within points, and its degrees of freedom."""
@@ -121,7 +121,7 @@ class _Repeats:
         return np.sqrt(squares / freedom), freedom
 
     def _beyond(self, scale: float, freedom: float) -> np.ndarray:
-        sigmas = max(GROSS_SIGMAS, float(t.isf(0.5 * GROSS_CHANCE, freedom)))
+        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_CHANCE)))
         far = self.distance > sigmas * max(scale, LEAST_SCALE)
         outliers = np.bincount(self.owner, far)
         undecided = 2.0 * outliers >= self.count

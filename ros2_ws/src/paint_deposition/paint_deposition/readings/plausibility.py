@@ -1,7 +1,7 @@
 """Plausibility of readings: units, signs and coverage, checked before anything is fitted."""
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.readings.panel import Panel
@@ -96,7 +96,7 @@ def check_panel(
     weights = sigma_um**-2.0
     mean = float(weights @ measured_um) / float(weights.sum())
     scatter = float(weights @ (measured_um - mean) ** 2)
-    if chi2.sf(scatter, len(measured_um) - 1) > NO_STRUCTURE_P:
+    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
         raise ReadingsError(
             f'{readings.source}: the film varies by no more than the noise of the gauge '
             f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
 
@@ -78,7 +78,7 @@ class Residuals:
     @property
     def p_value(self) -> float:
         """Probability that noise alone gives at least this chi-square."""
-        return float(chi2.sf(self.chi_square, len(self)))
+        return float(chdtrc(len(self), self.chi_square))
 
     @property
     def worst(self) -> int:

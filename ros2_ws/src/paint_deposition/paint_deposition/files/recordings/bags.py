@@ -1,10 +1,12 @@
 """A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
 
+from __future__ import annotations
+
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from rosbags.typesys.store import Typestore
@@ -12,10 +14,12 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
-from paint_deposition.files.recordings.joint_states import JOINT_TYPE, Robot, read_joint_poses
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.files.recordings.transforms import TF_TYPES, read_tf_poses
+from paint_deposition.files.recordings.message_definitions import (
+    JOINT_TYPE,
+    STATE_TYPE,
+    TF_TYPES,
+)
 from paint_deposition.files.recordings.triggers import (
     BOOL_TYPE,
     choose_topic,
@@ -26,6 +30,9 @@ from paint_deposition.files.recordings.triggers import (
 )
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
 POSE_TOPIC = '/atomizer/pose'
@@ -65,8 +72,12 @@ def read_trajectory(
     """
     with open_bag(path) as bag:
         if tf:
+            from paint_deposition.files.recordings.transforms import read_tf_poses
+
             trajectory, log_times_ns = read_tf_poses(bag, *tf)
         elif robot:
+            from paint_deposition.files.recordings.joint_states import read_joint_poses
+
             trajectory, log_times_ns = read_joint_poses(bag, robot, pose_topic)
         else:
             trajectory, log_times_ns = _read_poses(bag, choose_pose_topic(bag, pose_topic))

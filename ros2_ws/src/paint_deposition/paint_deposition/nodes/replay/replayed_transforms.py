@@ -9,10 +9,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 
 from paint_deposition.files.recordings.bag_files import Bag, RawMessage
+from paint_deposition.files.recordings.message_definitions import TF_TYPES
 from paint_deposition.files.recordings.transforms import (
     PART_POSE_TYPE,
     STATIC,
-    TF_TYPES,
     StaticFrames,
     part_pose_topics,
 )

@@ -12,17 +12,27 @@ from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_p
 from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
 TEXT_PT = 8.0
+# A profile's charts, and the room around all of them and between [in].
+CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
+LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
 
 
 def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
     """Write the film along each column or row, and the residual below it, as PNG."""
     columns = charts_a_row(len(data.profiles))
     rows = -(-len(data.profiles) // columns)
-    figure = new_figure(3.4 * columns + 0.4, 2.9 * rows + 0.9)
-    cells = figure.add_gridspec(rows, columns)
+    width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
+    height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
+    figure = new_figure(width_in, height_in, layout=None)
+    cells = figure.add_gridspec(
+        rows, columns, left=LEFT_IN / width_in, right=1.0 - RIGHT_IN / width_in,
+        bottom=BOTTOM_IN / height_in, top=1.0 - TOP_IN / height_in,
+        wspace=GAP_IN[0] / CHARTS_IN[0], hspace=GAP_IN[1] / CHARTS_IN[1],
+    )  # fmt: skip
     film, residual = None, None
     for k, profile in enumerate(data.profiles):
-        cell = cells[k // columns, k % columns].subgridspec(2, 1, height_ratios=(3, 1))
+        place = cells[k // columns, k % columns]
+        cell = place.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.12)
         film = figure.add_subplot(cell[0], sharey=film)
         residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
         draw_profile(film, data, profile)
@@ -36,9 +46,7 @@ def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
     if film is not None:
         film.set_ylim(bottom=0.0)
     handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc='outside upper left', ncols=len(labels), fontsize=9, frameon=False
-    )
+    figure.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
     return save_picture(figure, path)
 
 

@@ -1,0 +1,41 @@
+"""How a film is written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.api.simulation import Film
+from paint_deposition.api.writers.provenance import input_files, provenance
+from paint_deposition.files.gauge_readings import write_predictions
+from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.results.film import write_film
+
+PNG = 'png'
+
+
+def film(
+    result: Film,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
+    about = result.to_dict() | dict(made_from or {})
+    models = {gun.name or 'model': gun.model for gun in result.guns}
+    motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
+    there = {what: file for what, file in motions.items() if Path(file).exists()}
+    about |= provenance(models, input_files(about) | there)
+    files = write_film(
+        folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
+    )
+    if result.readings is not None and result.predicted_um is not None:
+        files.append(Path(folder) / 'predicted.csv')
+        write_predictions(files[-1], result.readings.source, result.predicted_um)
+    names = [Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')]
+    picture = write_film_picture(
+        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
+        result.statistics, f'Film on {names[0] or "the part"}',
+        f'{names[1]}, {names[2] or "default model"}',
+    )  # fmt: skip
+    return [*files, picture]

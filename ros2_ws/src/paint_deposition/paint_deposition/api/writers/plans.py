@@ -1,0 +1,120 @@
+"""How plans and recommendations are written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.api.writers.provenance import input_files, provenance
+from paint_deposition.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.json_files import write_json
+from paint_deposition.film.spray_geometry import spray_geometry
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.part_plan import PartPlan
+from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.planning.trade_off import Point
+from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.report.pictures.geometry import write_geometry_picture
+from paint_deposition.report.pictures.improvement import write_improvement_picture
+from paint_deposition.report.pictures.measuring_points import write_measuring_picture
+from paint_deposition.report.pictures.trade_off import write_trade_off
+from paint_deposition.report.pictures.uniformity import write_uniformity
+from paint_deposition.results.improvement import write_improvement
+from paint_deposition.results.measuring import write_chosen_readings
+from paint_deposition.results.plan import write_plan
+from paint_deposition.results.trade_off import write_trade_off_table
+
+PNG = 'png'
+# What a robot's own frame is called where nobody says (REP-105 and most URDFs).
+ROBOT_FRAME = 'base_link'
+
+
+def recommendation(
+    result: Recommendation,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    model: DepositionModel | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
+    files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
+    write_json(files[0], result.to_dict() | provenance(model, input_files(made_from or {})))
+    write_uniformity(files[1], result)
+    return files
+
+
+def plan(
+    result: Plan | PartPlan,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    frame_id: str = ROBOT_FRAME,
+    pictures: str = PNG,
+    trade_off: Sequence[Point] = (),
+) -> list[Path]:
+    about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
+    about |= provenance(result.model, input_files(about))
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    files = write_plan(folder, result, result.surface, about, part)
+    picture = write_film_picture(
+        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
+        result.statistics, 'Planned passes and their film', result.sentence,
+    )  # fmt: skip
+    if isinstance(result, PartPlan):
+        # The film is seen from one side, the passes from three. That they lie aside of the one
+        # side that a part usually has is not odd here.
+        geometry = spray_geometry(result.surface, result.path, result.model, frame_id)
+        geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
+        files.append(Path(folder) / f'passes.{pictures}')
+        title = 'Planned passes over the faces'
+        write_geometry_picture(files[-1], result.surface, result.path, geometry, title)
+        return [*files, picture]
+    plain = result.plain or result
+    return [*files, picture, *_write_trade_off(Path(folder), plain.point, trade_off, pictures)]
+
+
+def improvement(
+    result: Improvement,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    frame_id: str = ROBOT_FRAME,
+    pictures: str = PNG,
+    trade_off: Sequence[Point] = (),
+) -> list[Path]:
+    about = {'notes': (*result.surface.notes, *result.given.notes)} | dict(made_from or {})
+    about |= provenance(result.model, input_files(about))
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    files = write_improvement(folder, result, about, part)
+    files.append(write_improvement_picture(Path(folder) / f'improvement.{pictures}', result))
+    return files + _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
+
+
+def _write_trade_off(
+    folder: Path, given: Point, points: Sequence[Point], pictures: str
+) -> list[Path]:
+    """Table and picture, where other weights were tried."""
+    if not points:
+        return []
+    return [
+        write_trade_off_table(folder / 'pareto.csv', points),
+        write_trade_off(folder / f'pareto.{pictures}', given, points),
+    ]
+
+
+def chosen_readings(
+    result: ChosenReadings,
+    folder: str | Path,
+    made_from: Mapping[str, Any] | None = None,
+    part_pose: Sequence[float] | None = None,
+    pictures: str = PNG,
+) -> list[Path]:
+    about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
+    about |= provenance(result.model, input_files(about))
+    part = None if part_pose is None else Rigid.of(part_pose)
+    files = write_chosen_readings(folder, result, about, part)
+    return [*files, write_measuring_picture(Path(folder) / f'points.{pictures}', result)]

@@ -1,0 +1,25 @@
+"""What the figures of a result say of its inputs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.provenance import origin
+
+
+def provenance(
+    model: DepositionModel | Mapping[str, DepositionModel] | None,
+    files: Mapping[str, str],
+    campaign: str = '',
+) -> dict[str, Any]:
+    return {'provenance': origin(model, files, campaign)}
+
+
+def input_files(about: Mapping[str, Any]) -> dict[str, str]:
+    """Of what a command says of its inputs, those that are files."""
+    keys = ('mesh_file', 'mesh', 'trajectory', 'model_file', 'model')
+    told = {key.removesuffix('_file'): str(about[key]) for key in keys if about.get(key)}
+    return {what: file for what, file in told.items() if Path(file).exists()}
