@@ -69,8 +69,8 @@ def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
         for n, planar in ((1, NARROW), (2, WIDE))
     ]
     total = sum(one.film_um for one in apart)
-    # Sub-steps are cut alike; the sums differ in their order alone.
-    assert np.abs(both.film_um - total).max() < 1e-5 * total.max()
+    # Sub-steps are not cut where both sides of a change are without paint.
+    assert np.abs(both.film_um - total).max() < 2e-4 * total.max()
     assert both.emitted_cm3 == pytest.approx(sum(one.emitted_cm3 for one in apart), rel=1e-12)
     assert min(one.film_um.max() for one in apart) > 1.0
 

@@ -177,7 +177,7 @@ def test_no_block_with_a_lit_point_is_skipped(seed, share):
 
 def test_a_thousand_small_sums_stay_accurate():
     """A long time in one place, single precision: the newest sums join the film in time."""
-    path, _ = spray_path(straight_pass(np.arange(0.0, 40.0, 0.01), (0, 0, 0.25), (0.01, 0, 0.25)))
+    path, _ = spray_path(straight_pass(np.arange(0.0, 200.0, 0.05), (0, 0, 0.25), (0.01, 0, 0.25)))
     assert len(path) > 3900
     points, model = lying_plane(count=21), DepositionModel()
     single, double = (film_um(points, path, model, p) for p in ('single', 'double'))
