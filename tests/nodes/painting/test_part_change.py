@@ -231,7 +231,8 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
 def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,
                                                  spin, wait_until, tmp_path):  # fmt: skip
     folder = tmp_path / 'films'
-    node = simulator()
+    where = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    node = simulator(part_pose=where, part_parent_frame='cell')
     recorder = RunRecorder(
         context=ros_context,
         parameter_overrides=parameters(output_directory=str(folder), name='before'),
@@ -251,7 +252,10 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
         recorded = read_trajectory(run, None, '/atomizer/state')
         assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
         with open_bag(run) as bag:
-            assert {topic.name for topic in bag.topics} >= {'/part', '/thickness/field'}
+            messages = {topic.name: topic.message_count for topic in bag.topics}
+        # Where the part stands was published once, before the first of them.
+        assert messages['/part'] == messages['/part_pose'] == 1
+        assert messages['/thickness/field']
         told = (run / 'metadata.yaml').read_text()
         assert f'serial: 47-{number}' in told
         saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]

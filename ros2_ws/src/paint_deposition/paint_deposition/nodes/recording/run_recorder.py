@@ -18,37 +18,22 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.default_topics import (
+    PART_POSE,
+    POSES,
+    STATIC_FRAMES,
+    default_topics,
+)
 from paint_deposition.nodes.recording.log_time import LogTime
+from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, notes_on
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.file_names import (
-    FILE_NAME,
-    FILE_NAME_WORDS,
-    require_file_name,
-)
+from paint_deposition.nodes.runtime.file_names import FILE_NAME, FILE_NAME_WORDS
 from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
 
-POSES = 'atomizer/pose'
-STATIC_FRAMES = '/tf_static'
-# Of each gun.
-GUN_TOPICS = (POSES, 'atomizer/state')
-# The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
-DEFAULT_TOPICS = (
-    'thickness/cloud',
-    'thickness/field',
-    'thickness/stats',
-    'comparison/stats',
-    'planned_path',
-    # Where the part stood, for poses that are not in its frame.
-    'part_pose',
-    '/tf',
-    STATIC_FRAMES,
-    '/diagnostics',
-    '/parameter_events',
-)
 DISCOVERY_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.1
 PROGRESS_PERIOD_S = 0.2
@@ -96,16 +81,12 @@ class RunRecorder(PaintNode):
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
         guns = self.values['atomizers'] or ['']
-        # Of several guns the film of each, too.
-        shares = [of_gun(gun, 'thickness/field') for gun in guns if len(guns) > 1]
-        motion = [of_gun(gun, topic) for gun in guns for topic in GUN_TOPICS]
-        wanted = self.values['topics'] or [*motion, *shares, *DEFAULT_TOPICS]
+        wanted = self.values['topics'] or default_topics(guns)
         self._part_run = ''
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
-        # What is published once, and holds for all runs.
-        self._said_once: list[tuple[str, bytes, int, int]] = []
+        self._said_once = SaidOnce(STATIC_FRAMES, self.resolve_topic_name(PART_POSE))
         self._topics: dict[str, RecordedTopic] = {}
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
@@ -185,8 +166,7 @@ class RunRecorder(PaintNode):
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
         log_time_ns = self._log_time_ns(received_ns)
-        if name == STATIC_FRAMES:
-            self._said_once.append((name, cdr, log_time_ns, sent_ns))
+        self._said_once.note((name, cdr, log_time_ns, sent_ns))
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
@@ -208,30 +188,21 @@ class RunRecorder(PaintNode):
         if self._error is not None or part.run == self._part_run:
             return
         try:
-            require_file_name('run', part.run)
+            name = free_name(Path(self.values['output_directory']), part.run)
+            following = self._new_run(name, notes_on(part, self.values['model_file']))
             self.run.finish()
             self.get_logger().info(self.summary())
-            self.run, self._part_run = self._run_of(part), part.run
-            for name, run_topic in self._run_topics.items():
-                self._topics[name].count_from_zero()
+            self.run, self._part_run = following, part.run
+            for topic, run_topic in self._run_topics.items():
+                self._topics[topic].count_from_zero()
                 self.run.add_topic(run_topic)
-            for message in self._said_once:
+            for message in self._said_once.messages:
                 self.run.write(*message)
+            self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
             self._give_up(error)
         except PaintError as error:
             self.get_logger().error(f'{self._part_topic}: {error}; the run goes on')
-
-    def _run_of(self, part: Part) -> RunWriter:
-        told = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
-        told |= {'part_pose': ' '.join(map(str, part.part_pose))} if part.part_pose else {}
-        mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
-        notes = provenance(mesh_file, self.values['model_file']) | told
-        name = part.run
-        if (Path(self.values['output_directory']) / name).exists():
-            name += time.strftime('_%Y%m%d_%H%M%S')
-            self.get_logger().warning(f'run {part.run} is there already: recorded as {name}')
-        return self._new_run(name, notes)
 
     def _flush(self) -> None:
         if not self.run.complete:
