@@ -113,6 +113,24 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
     )
 
 
+def test_poses_that_wait_belong_to_the_part_before(simulator, robot, painted, onlooker,
+                                                    wait_until):  # fmt: skip
+    """A request must not overtake the poses that were sent before it."""
+    node = simulator(pose_queue_depth=5000)
+    source, operator = robot(node), onlooker({})
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    source.send(MOTION)
+    # Nothing has been handed out yet: the request waits beside the poses.
+    future = client.call_async(ChangePart.Request(serial='1'))
+    wait_until(future.done, what='the change')
+    answer = future.result()
+    assert answer.success, answer.message
+    figures = json.loads(Path(answer.paths[2]).read_text())
+    assert figures['poses']['received'] == len(MOTION)
+    assert node.film.counts.received == 0
+
+
 def test_the_gun_stays_as_it_is(simulator, robot, painted, change, wider):
     """A gun that was closed before the change is closed after it, without another word."""
     node = simulator()

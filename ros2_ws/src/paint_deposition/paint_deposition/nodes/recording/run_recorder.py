@@ -190,6 +190,10 @@ class RunRecorder(PaintNode):
         try:
             name = free_name(Path(self.values['output_directory']), part.run)
             following = self._new_run(name, notes_on(part, self.values['model_file']))
+            # The message overtakes others that wait; they belong to the part before.
+            for recorded in self._topics.values():
+                if recorded.name != self._part_topic:
+                    recorded.drain()
             self.run.finish()
             self.get_logger().info(self.summary())
             self.run, self._part_run = following, part.run
