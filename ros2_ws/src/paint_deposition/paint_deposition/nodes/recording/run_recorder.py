@@ -157,7 +157,7 @@ class RunRecorder(PaintNode):
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
         set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns)
+        log_time_ns = self._log_time.of(received_ns, name)
         if self._log_time.set_back_ns > set_back_ns:
             step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
             self.get_logger().warning(
@@ -165,13 +165,13 @@ class RunRecorder(PaintNode):
             )
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
-        log_time_ns = self._log_time_ns(received_ns)
+        log_time_ns = self._log_time_ns(name, received_ns)
         self._said_once.note((name, cdr, log_time_ns, sent_ns))
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 
-    def _log_time_ns(self, received_ns: int) -> int:
+    def _log_time_ns(self, name: str, received_ns: int) -> int:
         """When a message is logged: as received, but never before the one before."""
         set_back_ns = self._log_time.set_back_ns
         log_time_ns = self._log_time.of(received_ns)
