@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import Part, PoseProgress
-from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -29,7 +28,11 @@ from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, note
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.file_names import FILE_NAME, FILE_NAME_WORDS
+from paint_deposition.nodes.runtime.file_names import (
+    FILE_NAME,
+    FILE_NAME_WORDS,
+    require_file_name,
+)
 from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
@@ -150,7 +153,7 @@ class RunRecorder(PaintNode):
             topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name], self._run_topics[name] = topic, run_topic
-        if topic.profile is None or _offers_less(profile, topic.profile):
+        if topic.profile is None or qos.offers_less(profile, topic.profile):
             topic.subscribe(profile)
 
     # --- writing
@@ -294,10 +297,3 @@ class RunRecorder(PaintNode):
             **{t.name: f'{t.messages} messages, {t.missed} missed, {t.gaps} gaps' for t in topics},
         }
         return Status(level, message, values)
-
-
-def _offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
-    """True when some publisher no longer matches the subscription; the weaker policy is larger."""
-    return (
-        offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
-    )
