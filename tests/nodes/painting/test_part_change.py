@@ -113,6 +113,24 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
     )
 
 
+def test_poses_that_wait_belong_to_the_part_before(simulator, robot, painted, onlooker,
+                                                    wait_until):  # fmt: skip
+    """A request must not overtake the poses that were sent before it."""
+    node = simulator(pose_queue_depth=5000)
+    source, operator = robot(node), onlooker({})
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    source.send(MOTION)
+    # Nothing has been handed out yet: the request waits beside the poses.
+    future = client.call_async(ChangePart.Request(serial='1'))
+    wait_until(future.done, what='the change')
+    answer = future.result()
+    assert answer.success, answer.message
+    figures = json.loads(Path(answer.paths[2]).read_text())
+    assert figures['poses']['received'] == len(MOTION)
+    assert node.film.counts.received == 0
+
+
 def test_the_gun_stays_as_it_is(simulator, robot, painted, change, wider):
     """A gun that was closed before the change is closed after it, without another word."""
     node = simulator()
@@ -231,7 +249,8 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
 def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,
                                                  spin, wait_until, tmp_path):  # fmt: skip
     folder = tmp_path / 'films'
-    node = simulator()
+    where = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    node = simulator(part_pose=where, part_parent_frame='cell')
     recorder = RunRecorder(
         context=ros_context,
         parameter_overrides=parameters(output_directory=str(folder), name='before'),
@@ -251,7 +270,10 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
         recorded = read_trajectory(run, None, '/atomizer/state')
         assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
         with open_bag(run) as bag:
-            assert {topic.name for topic in bag.topics} >= {'/part', '/thickness/field'}
+            messages = {topic.name: topic.message_count for topic in bag.topics}
+        # Where the part stands was published once, before the first of them.
+        assert messages['/part'] == messages['/part_pose'] == 1
+        assert messages['/thickness/field']
         told = (run / 'metadata.yaml').read_text()
         assert f'serial: 47-{number}' in told
         saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]

@@ -21,6 +21,16 @@ def test_times_that_only_go_on_stay_as_they_are():
     assert log_time.set_back_ns == 0
 
 
+def test_a_topic_that_waited_longer_than_others_is_no_step_back():
+    """On a busy machine its messages are taken seconds after those of the others."""
+    log_time = LogTime()
+    seconds = 1_000_000_000
+    taken = [('/stats', 9), ('/pose', 2), ('/pose', 3), ('/stats', 10), ('/pose', 4)]
+    found = [log_time.of(START_NS + at * seconds, topic) for topic, at in taken]
+    assert found == [START_NS + at * seconds for _, at in taken]
+    assert log_time.set_back_ns == 0
+
+
 def test_after_a_step_back_time_goes_on_at_its_pace():
     log_time = LogTime()
     log_time.of(START_NS)

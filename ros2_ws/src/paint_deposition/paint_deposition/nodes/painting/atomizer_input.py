@@ -139,6 +139,12 @@ class AtomizerInput:
         self.intervals = Intervals()
         self.jumps = Jumps()
 
+    def take_waiting(self) -> None:
+        """Take all that has come so far, also what still waits in the middleware."""
+        for topic in self._topics:
+            topic.take_waiting()
+        self.hand_on()
+
     def hand_on(self) -> None:
         """Give the receiver what has come, except poses that wait for their transform."""
         self.tf_queue.release(time.monotonic(), self._place, self._refuse)

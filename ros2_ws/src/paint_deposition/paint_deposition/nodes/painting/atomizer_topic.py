@@ -66,6 +66,11 @@ class AtomizerTopic:
         ):
             self._subscribe(profile)
 
+    def take_waiting(self) -> None:
+        """Take what has come and the executor has not handed out yet."""
+        if self._subscription is not None:
+            self._drain(self._subscription)
+
     def _best(self) -> QoSProfile:
         offered = [info.qos_profile for info in self._watch.publishers_of(self._topic)]
         if not offered:

@@ -108,12 +108,15 @@ class PartChange:
         response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
-        began_s = time.monotonic()
         node = self._node
         if self.waiting:
             raise PaintError('another part is being changed: ask again when it is there')
         following = self._asked_for(request)
+        # A request overtakes poses that wait; they belong to the part before.
+        for source in node.inputs:
+            source.take_waiting()
         node.up_to_date()
+        began_s = time.monotonic()
         notes = self._sprays()
         save = self._film_to_save() if node.film.counts.received else None
         pose = list(node.values['part_pose'] or [])

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import Part, PoseProgress
-from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -18,7 +17,14 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.default_topics import (
+    PART_POSE,
+    POSES,
+    STATIC_FRAMES,
+    default_topics,
+)
 from paint_deposition.nodes.recording.log_time import LogTime
+from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, notes_on
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
@@ -31,24 +37,6 @@ from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, 
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
 
-POSES = 'atomizer/pose'
-STATIC_FRAMES = '/tf_static'
-# Of each gun.
-GUN_TOPICS = (POSES, 'atomizer/state')
-# The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
-DEFAULT_TOPICS = (
-    'thickness/cloud',
-    'thickness/field',
-    'thickness/stats',
-    'comparison/stats',
-    'planned_path',
-    # Where the part stood, for poses that are not in its frame.
-    'part_pose',
-    '/tf',
-    STATIC_FRAMES,
-    '/diagnostics',
-    '/parameter_events',
-)
 DISCOVERY_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.1
 PROGRESS_PERIOD_S = 0.2
@@ -96,16 +84,12 @@ class RunRecorder(PaintNode):
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
         guns = self.values['atomizers'] or ['']
-        # Of several guns the film of each, too.
-        shares = [of_gun(gun, 'thickness/field') for gun in guns if len(guns) > 1]
-        motion = [of_gun(gun, topic) for gun in guns for topic in GUN_TOPICS]
-        wanted = self.values['topics'] or [*motion, *shares, *DEFAULT_TOPICS]
+        wanted = self.values['topics'] or default_topics(guns)
         self._part_run = ''
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
-        # What is published once, and holds for all runs.
-        self._said_once: list[tuple[str, bytes, int, int]] = []
+        self._said_once = SaidOnce(STATIC_FRAMES, self.resolve_topic_name(PART_POSE))
         self._topics: dict[str, RecordedTopic] = {}
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
@@ -169,14 +153,14 @@ class RunRecorder(PaintNode):
             topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name], self._run_topics[name] = topic, run_topic
-        if topic.profile is None or _offers_less(profile, topic.profile):
+        if topic.profile is None or qos.offers_less(profile, topic.profile):
             topic.subscribe(profile)
 
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
         set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns)
+        log_time_ns = self._log_time.of(received_ns, name)
         if self._log_time.set_back_ns > set_back_ns:
             step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
             self.get_logger().warning(
@@ -184,14 +168,13 @@ class RunRecorder(PaintNode):
             )
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
-        log_time_ns = self._log_time_ns(received_ns)
-        if name == STATIC_FRAMES:
-            self._said_once.append((name, cdr, log_time_ns, sent_ns))
+        log_time_ns = self._log_time_ns(name, received_ns)
+        self._said_once.note((name, cdr, log_time_ns, sent_ns))
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 
-    def _log_time_ns(self, received_ns: int) -> int:
+    def _log_time_ns(self, name: str, received_ns: int) -> int:
         """When a message is logged: as received, but never before the one before."""
         set_back_ns = self._log_time.set_back_ns
         log_time_ns = self._log_time.of(received_ns)
@@ -208,30 +191,25 @@ class RunRecorder(PaintNode):
         if self._error is not None or part.run == self._part_run:
             return
         try:
-            require_file_name('run', part.run)
+            name = free_name(Path(self.values['output_directory']), part.run)
+            following = self._new_run(name, notes_on(part, self.values['model_file']))
+            # The message overtakes others that wait; they belong to the part before.
+            for recorded in self._topics.values():
+                if recorded.name != self._part_topic:
+                    recorded.drain()
             self.run.finish()
             self.get_logger().info(self.summary())
-            self.run, self._part_run = self._run_of(part), part.run
-            for name, run_topic in self._run_topics.items():
-                self._topics[name].count_from_zero()
+            self.run, self._part_run = following, part.run
+            for topic, run_topic in self._run_topics.items():
+                self._topics[topic].count_from_zero()
                 self.run.add_topic(run_topic)
-            for message in self._said_once:
+            for message in self._said_once.messages:
                 self.run.write(*message)
+            self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
             self._give_up(error)
         except PaintError as error:
             self.get_logger().error(f'{self._part_topic}: {error}; the run goes on')
-
-    def _run_of(self, part: Part) -> RunWriter:
-        told = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
-        told |= {'part_pose': ' '.join(map(str, part.part_pose))} if part.part_pose else {}
-        mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
-        notes = provenance(mesh_file, self.values['model_file']) | told
-        name = part.run
-        if (Path(self.values['output_directory']) / name).exists():
-            name += time.strftime('_%Y%m%d_%H%M%S')
-            self.get_logger().warning(f'run {part.run} is there already: recorded as {name}')
-        return self._new_run(name, notes)
 
     def _flush(self) -> None:
         if not self.run.complete:
@@ -319,10 +297,3 @@ class RunRecorder(PaintNode):
             **{t.name: f'{t.messages} messages, {t.missed} missed, {t.gaps} gaps' for t in topics},
         }
         return Status(level, message, values)
-
-
-def _offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
-    """True when some publisher no longer matches the subscription; the weaker policy is larger."""
-    return (
-        offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
-    )

@@ -41,6 +41,13 @@ def accepting(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
     )
 
 
+def offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
+    """True when some publisher no longer matches the subscription; the weaker policy is larger."""
+    return (
+        offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
+    )
+
+
 def as_recorded(profile: QoSProfile) -> Qos:
     """A publisher's profile, as the middleware tells it, the way bags store it."""
     return Qos(
