@@ -13,7 +13,7 @@ from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
-POSES, POINTS = 40, 60
+POSES, POINTS = 25, 40
 # Of the peak: what double arithmetic must keep, and what single promises.
 DOUBLE, SINGLE = 2e-12, 1e-6
 

@@ -28,20 +28,20 @@ many = settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_sl
 LAWS = [
     (), ('incidence_attraction',), ('trigger_lag', 'air_drift'), ('corner_slowdown',),
 ]  # fmt: skip
-HALF_M, COUNT = 0.7, 71
+HALF_M, COUNT = 0.7, 72
 
 
 @st.composite
 def models(draw) -> DepositionModel:
     """A narrow pattern, so that all of it meets the part, and the laws of one of LAWS.
 
-    Eq. (1) has no one value at the centre of an uneven ring; a sum over points 20 mm apart is off
-    by 1 % there where K3 is 1 and the ring has no hole, by half of it here.
+    Eq. (1) has no one value at the centre of an uneven ring. The ring is hollow here, so that a
+    sum over points 20 mm apart is off by less than 0.4 % for it.
     """
     planar = PlanarPattern(
         K1_cm3_per_s=draw(st.floats(0.1, 10.0)), K2=draw(st.floats(0.0, 1.0)),
-        K3=draw(st.floats(0.0, 0.5)), phi_rad=draw(st.floats(-3.1, 3.1)),
-        r_m=draw(st.floats(0.0, 0.08)), sigma1_m=draw(st.floats(0.03, 0.05)),
+        K3=draw(st.floats(0.0, 1.0)), phi_rad=draw(st.floats(-3.1, 3.1)),
+        r_m=draw(st.floats(0.06, 0.08)), sigma1_m=draw(st.floats(0.03, 0.04)),
         sigma2_m=draw(st.floats(0.03, 0.05)),
     )  # fmt: skip
     plane = draw(st.floats(0.2, 0.4))
