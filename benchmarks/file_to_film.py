@@ -1,12 +1,15 @@
 """How long `paint simulate` takes from the files of a part and a motion to the film, by stages.
 
-    python benchmarks/file_to_film.py [VERTICES ...] [--json FILE]
+    python benchmarks/file_to_film.py [VERTICES ...] [--json FILE] [--no-scaling]
 
 The part is the side of a body, 4.5 m by 1.5 m, crowned, with a belt line and a window, meshed
 evenly, as a binary STL; the gun passes over it for 60 s, recorded at 250 Hz. Every size runs in a
 process of its own. Times of the processor add up all threads; memory is the most that the process
 held up to then. The stages do without the cache of parts; the command runs twice, first on a new
 part and then on the part seen before.
+
+Then what painting costs against the length of the path, the rate of its log and with lines of
+sight traced, each in a process of its own, and the powers of vertices and length that it follows.
 """
 
 import argparse
@@ -23,11 +26,15 @@ from typing import Any
 
 import numpy as np
 
-SIZES = (10_000, 100_000, 1_000_000)
+SIZES = (10_000, 100_000, 1_000_000, 2_000_000)
 LENGTH_M, HEIGHT_M = 4.5, 1.5
 SECONDS, RATE_HZ = 60.0, 250.0
 PASSES, STANDOFF_M = 4, 0.25
 COARSER_THAN_ANY_M = 1.0
+# Vertices of the runs over different paths: passes, rate of the log [Hz], and lines of sight.
+SCALED_VERTICES = 100_000
+PATHS = ((2, RATE_HZ, False), (4, RATE_HZ, False), (8, RATE_HZ, False), (16, RATE_HZ, False),
+         (4, 1000.0, False), (4, RATE_HZ, True))  # fmt: skip
 
 
 def body_side(vertices: int) -> tuple[np.ndarray, np.ndarray]:
@@ -47,8 +54,10 @@ def body_side(vertices: int) -> tuple[np.ndarray, np.ndarray]:
     return corners, quads[~window].reshape(-1, 3)
 
 
-def write_inputs(folder: Path, vertices: int) -> None:
-    """Write part.stl and the recording gun/ to the folder."""
+def write_inputs(
+    folder: Path, vertices: int, passes: int = PASSES, rate_hz: float = RATE_HZ
+) -> None:
+    """Write part.stl and the recording gun/ to the folder; all passes are equally fast."""
     from paint_deposition.files.recordings.bags import write_pose_bag
     from paint_deposition.motion.trajectory import Trajectory
 
@@ -57,14 +66,14 @@ def write_inputs(folder: Path, vertices: int) -> None:
     triangles['v'] = corners[faces]
     head = bytes(80) + np.uint32(len(faces)).tobytes()
     (folder / 'part.stl').write_bytes(head + triangles.tobytes())
-    count = int(SECONDS * RATE_HZ)
-    share = np.arange(count) / count * PASSES
+    count = int(SECONDS / PASSES * passes * rate_hz)
+    share = np.arange(count) / count * passes
     row, along = np.divmod(share, 1.0)
     x = LENGTH_M * np.where(row % 2 == 0, along, 1.0 - along)
-    z = HEIGHT_M * (row + 0.5) / PASSES
+    z = HEIGHT_M * (row + 0.5) / passes
     positions = np.stack([x, np.full(count, -STANDOFF_M), z], axis=1)
     toward_the_part = np.sqrt(0.5) * np.array([-1.0, 0.0, 0.0, 1.0])
-    stamps = (1e9 / RATE_HZ * np.arange(count)).astype(np.int64) + 1_762_246_800_000_000_000
+    stamps = (1e9 / rate_hz * np.arange(count)).astype(np.int64) + 1_762_246_800_000_000_000
     log = Trajectory(stamps, positions, np.tile(toward_the_part, (count, 1)), 'part')
     write_pose_bag(folder / 'gun', log)
 
@@ -87,14 +96,19 @@ class Stages:
         return result
 
 
-def run_stages(folder: Path) -> dict[str, Any]:
+def run_stages(folder: Path, occlusion: bool) -> dict[str, Any]:
     """What `paint simulate` does, one stage after the other, in this process."""
     stages = Stages()
     pd = stages.of('loading the libraries', _load)
     log = stages.of('reading the recording', lambda: pd.read_recording(folder / 'gun'))
     mesh = (folder / 'part.stl', 1.0, COARSER_THAN_ANY_M)
     surface = stages.of('reading the mesh', lambda: pd.read_mesh(*mesh))
-    film = stages.of('painting', lambda: pd.simulate(surface, log))
+    model = pd.DepositionModel()
+    if occlusion:
+        from paint_deposition.effects.catalogue import EFFECTS
+
+        model = model.with_effect(EFFECTS['occlusion'].typical())
+    film = stages.of('painting', lambda: pd.simulate(surface, log, model))
     stages.of('writing and drawing', lambda: pd.write(film, folder / 'film'))
     return {'vertices': len(surface.vertices_m), 'stages': stages.rows}
 
@@ -126,18 +140,64 @@ def run_command(folder: Path) -> dict[str, float]:
     }
 
 
+def stages_in_a_process(folder: Path, occlusion: bool = False) -> dict[str, Any]:
+    """The stages, without the cache of parts."""
+    inner = [sys.executable, __file__, '--stages-of', str(folder)]
+    inner += ['--occlusion'] if occlusion else []
+    environment = os.environ | {'PAINT_CACHE_DIR': ''}
+    done = subprocess.run(inner, stdout=subprocess.PIPE, check=True, env=environment)
+    return json.loads(done.stdout)
+
+
 def measure(vertices: int) -> dict[str, Any]:
     """Stages in a process, then the command on a new part and on one seen before."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        os.environ['PAINT_CACHE_DIR'] = ''
         write_inputs(folder, vertices)
-        inner = [sys.executable, __file__, '--stages-of', name]
-        told = json.loads(subprocess.run(inner, stdout=subprocess.PIPE, check=True).stdout)
+        told = stages_in_a_process(folder)
         os.environ['PAINT_CACHE_DIR'] = str(folder / 'cache')
         for which in ('new part', 'part seen before'):
             told['stages'].append({'stage': f'paint simulate, {which}', **run_command(folder)})
     return told
+
+
+def measure_paths() -> list[dict[str, Any]]:
+    """What painting costs on paths of different length and rate, and with lines of sight."""
+    rows = []
+    for passes, rate_hz, occlusion in PATHS:
+        with tempfile.TemporaryDirectory() as name:
+            write_inputs(Path(name), SCALED_VERTICES, passes, rate_hz)
+            told = stages_in_a_process(Path(name), occlusion)
+        (painting,) = (row for row in told['stages'] if row['stage'] == 'painting')
+        length_m = passes * LENGTH_M
+        about = {'passes': passes, 'length_m': length_m, 'rate_hz': rate_hz}
+        rows.append(about | {'occlusion': occlusion, **painting})
+    return rows
+
+
+def exponent(amounts: list[float], rows: list[dict[str, Any]]) -> float:
+    """The power of an amount that the processor time follows."""
+    seconds = [row['processor_s'] for row in rows]
+    return float(np.polyfit(np.log(amounts), np.log(seconds), 1)[0])
+
+
+def print_scaling(tables: list[dict[str, Any]], paths: list[dict[str, Any]]) -> None:
+    """Painting against length, rate and lines of sight, and the powers that it follows."""
+    print(
+        f'\n{"painting, " + str(SCALED_VERTICES) + " vertices":34}{"processor":>11}{"memory":>10}'
+    )
+    for row in paths:
+        name = f'{row["length_m"]:.0f} m of path, {row["rate_hz"]:.0f} Hz'
+        name += ', lines of sight' if row['occlusion'] else ''
+        print(f'{name:34}{row["processor_s"]:9.2f} s{row["memory_mb"]:7.0f} MB')
+    plain = [row for row in paths if row['rate_hz'] == RATE_HZ and not row['occlusion']]
+    print(
+        f'cost follows length to the power {exponent([r["length_m"] for r in plain], plain):.2f}'
+    )
+    for stage in ('reading the mesh', 'painting') if len(tables) > 1 else ():
+        rows = [row for t in tables for row in t['stages'] if row['stage'] == stage]
+        power = exponent([t['vertices'] for t in tables], rows)
+        print(f'{stage}: cost follows vertices to the power {power:.2f}')
 
 
 def main() -> None:
@@ -145,10 +205,12 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument('vertices', nargs='*', type=int, default=SIZES)
     parser.add_argument('--json', type=Path, help='also write the figures to this file')
+    parser.add_argument('--no-scaling', action='store_true', help='only the sizes')
     parser.add_argument('--stages-of', type=Path, help=argparse.SUPPRESS)
+    parser.add_argument('--occlusion', action='store_true', help=argparse.SUPPRESS)
     given = parser.parse_args()
     if given.stages_of:
-        print(json.dumps(run_stages(given.stages_of)))
+        print(json.dumps(run_stages(given.stages_of, given.occlusion)))
         return
     print(f'{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}')
     measure(1000)  # compiles what is not yet on disk
@@ -162,8 +224,12 @@ def main() -> None:
                 f'{row["stage"]:34}{row["wall_s"]:7.2f} s{row["processor_s"]:9.2f} s'
                 f'{row["memory_mb"]:7.0f} MB'
             )
+    paths = [] if given.no_scaling else measure_paths()
+    if paths:
+        print_scaling(tables, paths)
     if given.json:
-        given.json.write_text(json.dumps(tables, indent=1), encoding='utf-8')
+        record = {'sizes': tables, 'paths': paths}
+        given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
 
 
 if __name__ == '__main__':
