@@ -21,7 +21,7 @@ KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
     'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
-    'measure': 'measurement',
+    'measure': 'measurement', 'sweep': 'sweep',
 }  # fmt: skip
 
 
