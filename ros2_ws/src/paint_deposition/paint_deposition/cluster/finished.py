@@ -46,10 +46,8 @@ class Finished:
     def add(self, digest: str, columns: Columns) -> None:
         """Keep a case: equally long columns by name."""
         import pyarrow as pa
-        import pyarrow.parquet as pq
 
-        with replacing(self._path(digest)) as temporary:
-            pq.write_table(pa.table(dict(columns)), temporary)
+        write_parquet(self._path(digest), pa.table(dict(columns)))
 
     def table(self, digests: Iterable[str]) -> pa.Table:
         """These cases, one after the other; columns that a case has not are empty in its rows."""
@@ -61,3 +59,12 @@ class Finished:
 
     def _path(self, digest: str) -> Path:
         return self.folder / f'{digest}.parquet'
+
+
+def write_parquet(path: Path, table: pa.Table) -> Path:
+    """Write a table, whole or not at all."""
+    import pyarrow.parquet as pq
+
+    with replacing(path) as temporary:
+        pq.write_table(table, temporary)
+    return path

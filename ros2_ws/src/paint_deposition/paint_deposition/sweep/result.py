@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.cluster.finished import Finished
-from paint_deposition.files.atomic import replacing
+from paint_deposition.cluster.finished import Finished, write_parquet
 from paint_deposition.files.json_files import json_text, write_json
 from paint_deposition.files.provenance import origin
 from paint_deposition.sweep.case import FILM, PREDICTED
@@ -129,11 +128,11 @@ def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]
     """Write tables, figures and the picture; returns the paths."""
     names = sweep.table.column_names
     lists = [name for name in (FILM, PREDICTED) if name in names]
-    files = [_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
+    files = [write_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
     if FILM in names:
-        files.append(_parquet(folder / 'films.parquet', sweep.table.select(['case', FILM])))
+        files.append(write_parquet(folder / 'films.parquet', sweep.table.select(['case', FILM])))
     if PREDICTED in names:
-        files.append(_parquet(folder / 'points.parquet', _points(sweep)))
+        files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
     drawn = [(name, label) for name, label in (JUDGED | LEVELS).items() if name in names]
@@ -163,14 +162,6 @@ def _points(sweep: Sweep) -> pa.Table:
             found[f'{axis}_m'] += column.tolist()
         found[PREDICTED] += predicted
     return pa.table(found)
-
-
-def _parquet(path: Path, table: pa.Table) -> Path:
-    import pyarrow.parquet as pq
-
-    with replacing(path) as temporary:
-        pq.write_table(table, temporary)
-    return path
 
 
 def _column(values: Sequence[Any]) -> pa.Array:
