@@ -32,6 +32,10 @@ class PlanError(PaintError):
     """A request for passes or an index has no answer."""
 
 
+class ManyError(PaintError):
+    """A sweep over cases or a line of parts cannot be run."""
+
+
 def require_above_zero(**values: float) -> None:
     """Refuse what is no number above 0, by its name.
 

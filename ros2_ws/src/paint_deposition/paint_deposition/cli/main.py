@@ -27,6 +27,8 @@ COMMANDS = {
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
+    'sweep': ('sweep', 'Many variations of one job, on all cores or a cluster.'),
+    'line': ('line', 'Many parts over days: what they share and what changes.'),
     'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'runs': ('runs', 'List what a cell has painted, part by part, with figures.'),

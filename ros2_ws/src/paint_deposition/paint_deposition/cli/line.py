@@ -1,0 +1,81 @@
+"""The command `line`: many parts over days, and what changes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from paint_deposition.cli.options import (
+    FOLDER,
+    JSON,
+    PICTURES,
+    file_lines,
+    output_option,
+    say_all,
+)
+from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import results_in
+from paint_deposition.cli.sweep import SCHEDULER, WORKERS
+
+MOST_WARNINGS = 5
+
+
+@click.command('line')
+@click.argument('folder', type=FOLDER)
+@output_option('points.parquet, parts.parquet, line.json, line.png and report.html')
+@SCHEDULER
+@WORKERS
+@PICTURES
+@JSON
+def line_command(
+    folder: Path,
+    output: Path,
+    scheduler: str | None,
+    count: int | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    """Simulate and compare all runs in FOLDER, and show what they share and what changes.
+
+    FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
+    parts that were measured, under the names of their recordings. Finished runs are kept in the
+    folder `finished` of the output: the next time only new runs are computed.
+    """
+    from paint_deposition.cluster.needed import require_libraries
+
+    require_libraries('paint line')
+    from paint_deposition.cluster.finished import NAME, Finished
+    from paint_deposition.cluster.run import run
+    from paint_deposition.cluster.workers import require_alone, workers, workers_in_words
+    from paint_deposition.line.job import line_cases, shared_files
+    from paint_deposition.line.part import computed
+    from paint_deposition.line.result import Line
+    from paint_deposition.line.writing import write_line
+
+    require_alone(scheduler, count)
+    with Progress('line') as tell:
+        tell('reading')
+        cases, file, model = line_cases(folder)
+        finished, digests = Finished(output / NAME), [case.digest for case in cases]
+        done, told = 0, 'none: every run had been finished'
+        if not finished.has_all(digests):
+            tell('starting the workers')
+            with workers(scheduler, count) as client:
+                told = workers_in_words(client)
+                done = run(client, computed, cases, {}, finished, tell)
+        say_all('note', [f'workers: {told}'])
+        tell('pooling')
+        table = finished.table(digests)
+        found = Line(folder, model, shared_files(folder, file), table, done, told)
+        with results_in(output) as results:
+            files = [output / file.name for file in write_line(found, results, pictures)]
+    errors = found.errors
+    say_all('warning', (f'{name}: {error}' for name, error in errors[:MOST_WARNINGS]))
+    if len(errors) > MOST_WARNINGS:
+        say_all('warning', [f'{len(errors) - MOST_WARNINGS} more runs could not be used'])
+    if as_json:
+        click.echo((output / 'line.json').read_text(encoding='utf-8'), nl=False)
+        return
+    for line in (*found.lines, *file_lines(files)):
+        click.echo(line)

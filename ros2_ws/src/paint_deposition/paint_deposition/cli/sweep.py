@@ -1,0 +1,86 @@
+"""The command `sweep`: many variations of one job."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from paint_deposition.cli.options import (
+    FILE,
+    JSON,
+    PICTURES,
+    file_lines,
+    output_option,
+    say_all,
+)
+from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import results_in
+
+SCHEDULER = click.option(
+    '--scheduler',
+    metavar='ADDRESS',
+    help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
+    'machine.',
+)
+WORKERS = click.option(
+    '--workers', 'count', type=click.IntRange(min=1),
+    help='Processes on this machine, of one thread each; default: one a core.',
+)  # fmt: skip
+
+
+@click.command('sweep')
+@click.argument('sweep', type=FILE)
+@output_option('cases.parquet, sweep.json and sweep.png')
+@SCHEDULER
+@WORKERS
+@PICTURES
+@JSON
+def sweep_command(
+    sweep: Path,
+    output: Path,
+    scheduler: str | None,
+    count: int | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    """Compute the variations that SWEEP, a YAML file, tells of.
+
+    Each case is what `simulate` computes, or `compare` for a campaign. Finished cases are kept in
+    the folder `finished` of the output: a run that was cut off computes the rest only, and so does
+    a sweep with more cases.
+    """
+    from paint_deposition.cluster.needed import require_libraries
+
+    require_libraries('paint sweep')
+    from paint_deposition.cluster.finished import NAME, Finished
+    from paint_deposition.cluster.run import run
+    from paint_deposition.cluster.workers import require_alone, workers, workers_in_words
+    from paint_deposition.sweep.case import computed
+    from paint_deposition.sweep.job import Job
+    from paint_deposition.sweep.result import Sweep, write_sweep
+    from paint_deposition.sweep.sweep_file import read_sweep
+
+    require_alone(scheduler, count)
+    with Progress('sweep') as tell:
+        tell('reading')
+        job = Job.of(read_sweep(sweep), sweep.parent, tell)
+        finished = Finished(output / NAME)
+        say_all('note', job.notes)
+        done, told = 0, 'none: every case had been finished'
+        if not finished.has_all(case.digest for case in job.cases):
+            tell('starting the workers')
+            with workers(scheduler, count) as client:
+                told = workers_in_words(client)
+                done = run(client, computed, job.cases, job.inputs, finished, tell)
+        say_all('note', [f'workers: {told}'])
+        tell('writing and drawing')
+        found = Sweep.of(job, finished, done, told)
+        with results_in(output) as folder:
+            files = [output / file.name for file in write_sweep(found, folder, pictures)]
+    say_all('warning', (f'case {number}: {error}' for number, error in found.errors[:5]))
+    if as_json:
+        click.echo((output / 'sweep.json').read_text(encoding='utf-8'), nl=False)
+        return
+    for line in (*found.lines, *file_lines(files)):
+        click.echo(line)

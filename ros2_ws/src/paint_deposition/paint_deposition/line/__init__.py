@@ -1,0 +1,1 @@
+"""A line: many parts over days, what they have in common and what changes."""

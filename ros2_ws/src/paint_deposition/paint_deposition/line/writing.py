@@ -1,0 +1,50 @@
+"""The files of a line: tables, figures, picture and report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from paint_deposition.cluster.finished import write_parquet
+from paint_deposition.files.json_files import write_json
+from paint_deposition.line.picture import write_line_picture
+from paint_deposition.line.report import write_line_report
+from paint_deposition.line.result import DERIVATIVES, Line
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+
+def write_line(line: Line, folder: Path, pictures: str = 'png') -> list[Path]:
+    """Write everything to a folder; returns the paths."""
+    table = line.table
+    own = [name for name in DERIVATIVES if name in table.column_names]
+    files = [
+        write_parquet(folder / 'points.parquet', table.drop_columns(own)),
+        write_parquet(folder / 'parts.parquet', _parts(line)),
+        folder / 'line.json',
+    ]
+    write_json(files[-1], line.to_dict())
+    if line.series:
+        files.append(write_line_picture(folder / f'line.{pictures}', line))
+    return [*files, write_line_report(folder / 'report.html', line)]
+
+
+def _parts(line: Line) -> pa.Table:
+    """A row for each part: when, its film as computed, and what its readings say."""
+    import pyarrow as pa
+
+    place = {part.name: row for row, part in enumerate(line.parts)}
+    rows: list[dict[str, Any]] = []
+    for run in line.runs:
+        row = place.get(run['part'])
+        told: dict[str, Any] = {'readings': 0 if row is None else len(line.parts[row])}
+        for series in line.series:
+            told[series.name] = None if row is None else float(series.values[row])
+            told[f'{series.name}_sd'] = None if row is None else float(series.sd[row])
+        rows.append(run | told)
+    table = pa.Table.from_pylist(rows)
+    if 'time_s' not in table.column_names:
+        return table
+    times = pa.array([round(1e6 * run['time_s']) for run in rows], pa.timestamp('us', 'UTC'))
+    return table.append_column('time', times)

@@ -1,0 +1,1 @@
+"""A sweep: many variations of one job, each computed as `simulate` or `compare` would."""

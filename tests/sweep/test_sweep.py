@@ -1,0 +1,121 @@
+"""A sweep by worker processes: the films of single runs, whatever dies on the way."""
+
+import hashlib
+import json
+import os
+import signal
+
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+import paint_deposition as pd
+from booth import SAMPLES
+from cli.command import assert_refused, installed_paint, paint
+from paint_deposition.cluster.finished import NAME, Finished
+from paint_deposition.cluster.run import run
+from paint_deposition.cluster.workers import workers
+from paint_deposition.sweep.case import computed
+from paint_deposition.sweep.job import Job
+from paint_deposition.sweep.sweep_file import SweepFile
+from paint_deposition.sweep.varied_motion import varied_motion
+
+DOOR = SAMPLES / 'measured_door'
+EDGE_M = 0.08
+SPEEDS, K1 = [0.9, 1.0, 1.1], [1.8, 1.9]
+TOLD = {
+    'mesh': 'door.stl', 'trajectory': 'door', 'state_topic': '/atomizer/state',
+    'max_edge_length_m': EDGE_M, 'readings': 'door.csv',
+    'grid': {'planar.K1_cm3_per_s': K1, 'speed_factor': SPEEDS},
+}  # fmt: skip
+
+
+@pytest.fixture
+def sweep_file(tmp_path):
+    path = tmp_path / 'sweep.yaml'
+    inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
+    path.write_text(yaml.safe_dump(TOLD | inputs))
+    return path
+
+
+def film_by_itself(k1: float, speed: float) -> pd.Film:
+    """The same as one run."""
+    surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
+    motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
+    model = pd.DepositionModel()
+    planar = model.planar.model_copy(update={'K1_cm3_per_s': k1})
+    return pd.simulate(
+        surface, varied_motion(motion, speed), model.model_copy(update={'planar': planar}),
+        readings=pd.read_readings(DOOR / 'door.csv', surface=surface),
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
+    job = Job.of(SweepFile.model_validate(TOLD), DOOR)
+    finished = Finished(tmp_path / NAME)
+    killed = []
+
+    def kill_one(what: str, share: float) -> None:
+        if share > 0.0 and not killed:
+            killed.append(client.run(os.getpid).popitem()[1])
+            os.kill(killed[0], signal.SIGKILL)
+
+    with workers(count=2) as client:
+        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 6
+        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 0
+        assert len(killed) == 1
+        assert killed[0] not in client.run(os.getpid).values()
+    table = finished.table(case.digest for case in job.cases).to_pylist()
+    for values, row in zip(job.values, table, strict=True):
+        alone = film_by_itself(values['planar.K1_cm3_per_s'], values['speed_factor'])
+        assert row['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+        assert row['mean_um'] == alone.statistics.mean_um
+        assert row['predicted_um'] == alone.predicted_um.tolist()
+
+
+@pytest.mark.slow
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
+    output = tmp_path / 'out'
+    told = json.loads(installed_paint('sweep', sweep_file, '-o', output, '--json').stdout)
+    assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
+    assert told['judged_by'] == 'sigma_n'
+    first = pq.read_table(output / 'cases.parquet')
+    kept = sorted((output / NAME).iterdir())
+    kept[2].unlink()
+    again = json.loads(paint('sweep', sweep_file, '-o', output, '--workers', 1, '--json').stdout)
+    assert again['computed'] == 1
+    assert pq.read_table(output / 'cases.parquet').equals(first)
+    assert first['speed_factor'].to_pylist() == SPEEDS * 2
+    # The film goes as K1 over the speed.
+    film = first['painted_volume_cm3'].to_numpy()
+    assert film[3:] / film[:3] == pytest.approx(K1[1] / K1[0])
+    assert film[0] / film[2] == pytest.approx(SPEEDS[2] / SPEEDS[0], rel=1e-3)
+    assert len(pq.read_table(output / 'points.parquet')) == 6 * len(
+        pd.read_readings(DOOR / 'door.csv')
+    )
+    assert (output / 'sweep.png').stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ('changed', 'words'),
+    [
+        ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
+        ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
+        ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
+        ({'campaign': 'campaign.yaml'}, ['speed_factor varies', 'campaign']),
+    ],
+)
+def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path, changed, words):
+    path = tmp_path / 'sweep.yaml'
+    inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
+    path.write_text(yaml.safe_dump(TOLD | inputs | changed))
+    assert_refused(paint('sweep', path, '-o', tmp_path / 'out'), *words)
+    assert not (tmp_path / 'out').exists()
+
+
+def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
+    monkeypatch.setattr('paint_deposition.cluster.workers.CONNECT_S', 1)
+    address = 'tcp://127.0.0.1:9'
+    done = paint('sweep', sweep_file, '-o', tmp_path / 'out', '--scheduler', address)
+    assert_refused(done, address, 'dask scheduler')
