@@ -175,7 +175,7 @@ def launched(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_launch_file_describes_every_node():
-    nodes = wanted(bag='run', record='runs', measurements='readings.csv')
+    nodes = wanted(bag='run', record='runs', measurements='readings.csv', urdf='arm.urdf')
     assert set(nodes) == set(NODES)
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))
