@@ -149,6 +149,14 @@ def stages_in_a_process(folder: Path, occlusion: bool = False) -> dict[str, Any]
     return json.loads(done.stdout)
 
 
+def compile_first() -> None:
+    """Run what is measured on a small part, so that all compiled code is on disk."""
+    with tempfile.TemporaryDirectory() as name:
+        write_inputs(Path(name), 1000)
+        for occlusion in (False, True):
+            stages_in_a_process(Path(name), occlusion)
+
+
 def measure(vertices: int) -> dict[str, Any]:
     """Stages in a process, then the command on a new part and on one seen before."""
     with tempfile.TemporaryDirectory() as name:
@@ -213,7 +221,7 @@ def main() -> None:
         print(json.dumps(run_stages(given.stages_of, given.occlusion)))
         return
     print(f'{os.cpu_count()} cores, load {os.getloadavg()[0]:.1f}')
-    measure(1000)  # compiles what is not yet on disk
+    compile_first()
     tables = []
     for vertices in given.vertices:
         table = measure(vertices)
