@@ -3,21 +3,22 @@
 from datetime import datetime, timezone
 from pathlib import Path
 
+from matplotlib.axes import Axes
+
 from paint_deposition.line.result import Line
 from paint_deposition.line.series import Series
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK
 
-MOST_SHOWN = 4
+MOST_SHOWN = 6
 
 
 def write_line_picture(path: Path, line: Line) -> Path:
     """Draw the charts of values; line has at least one series."""
-    changed = {change.series for change in line.changes}
-    told = {c.effect + '.' + c.parameter for c in (line.pooled.causes if line.pooled else ())}
-    order = sorted(line.series, key=lambda one: one.name not in {'level', 'misfit'} | changed)
-    order = sorted(order, key=lambda one: one.name not in {'level'} | changed | told)
-    shown = order[:MOST_SHOWN]
+    causes = line.pooled.causes if line.pooled else ()
+    told = {f'{cause.effect}.{cause.parameter}' for cause in causes}
+    told |= {'level', 'misfit'} | {change.series for change in line.changes}
+    shown = [one for one in line.series if one.name in told][:MOST_SHOWN]
     figure = new_figure(9.0, 2.4 * len(shown) + 0.4)
     rows = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
     for axes, series in zip(rows, shown, strict=True):
@@ -27,7 +28,7 @@ def write_line_picture(path: Path, line: Line) -> Path:
     return save_picture(figure, path)
 
 
-def _draw(axes, line: Line, series: Series) -> None:  # type: ignore[no-untyped-def]
+def _draw(axes: Axes, line: Line, series: Series) -> None:
     times = [datetime.fromtimestamp(t, timezone.utc) for t in line.times_s]
     limit = series.charts.shewhart_limit * series.deviation
     axes.fill_between(
