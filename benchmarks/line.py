@@ -121,6 +121,16 @@ def _cpu_s(pid: int) -> float:
     return sum(map(int, fields[11:13])) / os.sysconf('SC_CLK_TCK')
 
 
+def repeated(parts: list[Measured], count: int) -> list[Measured]:
+    """A longer line of the same parts over and over; what is predicted of them stays."""
+    whole = len(parts) - len(parts) % (POINTS // A_PART)
+    apart_s = parts[1].time_s - parts[0].time_s
+    return [
+        replace(parts[k % whole], name=f'part_{k}', time_s=parts[0].time_s + apart_s * k)
+        for k in range(count)
+    ]
+
+
 def redrawn(parts: list[Measured], job: Job, hidden: Hidden, seed: int) -> list[Measured]:
     """The same parts measured anew, with what ``hidden`` tells."""
     found, points = [], job.experiments[0].readings.point
@@ -156,9 +166,10 @@ def score(parts: list[Measured], step_at: int) -> dict:
 
 @click.command()
 @click.option('--parts', 'count', default=500, show_default=True)
+@click.option('--redrawn-parts', 'length', default=500, show_default=True)
 @click.option('--redraws', default=20, show_default=True)
 @click.option('--seed', default=3, show_default=True)
-def main(count: int, redraws: int, seed: int) -> None:
+def main(count: int, length: int, redraws: int, seed: int) -> None:
     shutil.rmtree(FOLDER, ignore_errors=True)
     FOLDER.mkdir(parents=True)
     job = smooth(painted_job(seed, HIDDEN, AMPLITUDE_M, POINTS, PARCELS), FOLDER / 'one')
@@ -179,15 +190,17 @@ def main(count: int, redraws: int, seed: int) -> None:
               f'part, {cause["all_parts"]:.1f} in all')  # fmt: skip
     cases, _, _ = line_cases(folder)
     table = Finished(output / 'finished').table(case.digest for case in cases)
-    parts = measured_parts(table.to_pydict())
+    parts = repeated(measured_parts(table.to_pydict()), length)
+    step_at = 3 * length // 5
+    hidden = replace(hidden, step_at=step_at)
     began = time.process_time()
-    steady = [score(redrawn(parts, job, Hidden(first=0.0, last=0.0), k), count)
+    steady = [score(redrawn(parts, job, Hidden(first=0.0, last=0.0), k), length)
               for k in range(redraws)]  # fmt: skip
     stepped = [score(redrawn(parts, job, hidden, redraws + k), step_at) for k in range(redraws)]
     each = (time.process_time() - began) / (2 * redraws)
     print(f'{redraws} lines without step or effect: '
           f'{sum(one["false_alarms"] for one in steady)} alarms and '
-          f'{sum(one["other_changes"] for one in steady)} changes in {redraws * count} parts; '
+          f'{sum(one["other_changes"] for one in steady)} changes in {redraws * length} parts; '
           f'an effect was pooled in {sum(bool(one["first"]) for one in steady)}')  # fmt: skip
     delays = sorted(one['delay'] for one in stepped if one['delay'])
     print(f'{redraws} lines with both: {sum(one["dated"] for one in stepped)} steps dated, off by '
@@ -195,7 +208,7 @@ def main(count: int, redraws: int, seed: int) -> None:
           f'alarm after {np.median(delays):.0f} parts (median), {max(delays)} at most; '
           f'{sum(one["false_alarms"] for one in stepped)} alarms before; '
           f'{HIDDEN} among the causes in {sum(one["found"] for one in stepped)}')  # fmt: skip
-    print(f'pooling, charts and changes of {count} parts: {each:.1f} s of the processor')
+    print(f'pooling, charts and changes of {length} parts: {each:.1f} s of the processor')
 
 
 if __name__ == '__main__':

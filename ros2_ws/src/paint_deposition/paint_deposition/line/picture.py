@@ -1,10 +1,10 @@
 """The level, the misfit and what changed most, part after part."""
 
-from datetime import datetime, timezone
 from pathlib import Path
 
 from matplotlib.axes import Axes
 
+from paint_deposition.line.change_points import SECONDS_A_DAY
 from paint_deposition.line.result import Line
 from paint_deposition.line.series import Series
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
@@ -29,7 +29,8 @@ def write_line_picture(path: Path, line: Line) -> Path:
 
 
 def _draw(axes: Axes, line: Line, series: Series) -> None:
-    times = [datetime.fromtimestamp(t, timezone.utc) for t in line.times_s]
+    times = line.times_s / SECONDS_A_DAY  # as matplotlib counts dates
+    axes.xaxis_date()
     limit = series.charts.shewhart_limit * series.deviation
     axes.fill_between(
         times, series.centre - limit, series.centre + limit, color=BEFORE, alpha=0.2, linewidth=0
@@ -37,7 +38,7 @@ def _draw(axes: Axes, line: Line, series: Series) -> None:
     axes.axhline(series.centre, color=BEFORE, linewidth=1.0)
     axes.plot(times, series.values, '.', color=ACCENT, markersize=4)
     for change in (one for one in line.changes if one.series == series.name):
-        begin = datetime.fromtimestamp(change.time_s, timezone.utc)
+        begin = change.time_s / SECONDS_A_DAY
         first = change.before if change.kind == 'drift' else change.after
         axes.plot([begin, times[-1]], [first, change.after], color=COMPONENTS[0], linewidth=2.0)
         axes.axvline(begin, color=COMPONENTS[0], linewidth=1.0, linestyle=':')
