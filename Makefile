@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure fuzz soak reliability numbers lint format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -57,6 +57,9 @@ bench-next: build  ## count how often the first proposed spray settles a diagnos
 
 bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
 	@$(IN_ENVIRONMENT) python benchmarks/loop.py $(ARGS)
+
+bench-line: build  ## watch 500 virtual parts for a step and an effect too small for one, a worker killed
+	@$(IN_ENVIRONMENT) python benchmarks/line.py $(ARGS)
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .

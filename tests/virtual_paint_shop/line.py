@@ -11,10 +11,12 @@ import yaml
 
 from .draw import stream
 from .files import STATE_TOPIC, write_bag, write_readings
-from .gauge import GaugeNoise, measure
+from .gauge import GaugeNoise, Readings, measure
 from .shop import PARCELS, Campaign, generate
 
 FIRST = datetime(2026, 11, 2, 6, 0, tzinfo=timezone.utc)
+# Every so many of the controller's poses is recorded.
+THINNED = 3
 # Parts of a line differ less in their level than the panels of many jobs.
 LINE_NOISE = GaugeNoise(level=0.015)
 
@@ -51,6 +53,20 @@ def painted_job(
     )  # fmt: skip
 
 
+def film_um(job: Campaign, row: int, count: int, hidden: Hidden) -> np.ndarray:
+    """(n,) film at the job's points on one part of the line, before its own level [um]."""
+    readings = job.experiments[0].readings
+    marks = readings.expected_um - readings.clean_um
+    factor = hidden.step if row >= hidden.step_at else 1.0
+    return factor * (readings.clean_um + hidden.amount(row, count) * marks)
+
+
+def taken_on(row: int, points: int, points_a_part: int | None) -> np.ndarray:
+    """Which of the job's points the gauge takes on a part: all, or some in rotation."""
+    turns = 1 if points_a_part is None else points // points_a_part
+    return np.arange(points)[row % turns :: turns]
+
+
 def write_line(
     job: Campaign,
     folder: Path,
@@ -60,11 +76,12 @@ def write_line(
     seed: int = 0,
     noise: GaugeNoise = LINE_NOISE,
     minutes: float = 90.0,
-    measured_every: int = 1,
+    points_a_part: int | None = None,
 ) -> list[str]:
     """Write ``count`` runs with their readings, line.yaml and a model; returns the runs' names.
 
-    The model is the true bell as a calibration finds it: a little off.
+    The model is the true bell as a calibration finds it: a little off. With ``points_a_part`` the
+    gauge takes so many of the job's points on each part, in rotation.
     """
     folder.mkdir(parents=True)
     (part,) = job.experiments
@@ -87,16 +104,16 @@ def write_line(
         names.append(f'{when:%Y-%m-%d_%H%M}_door_{row + 1:03d}')
         moved_ns = int(begun) * 10**9 - int(part.log.stamps_ns[0])
         log = replace(
-            part.log, stamps_ns=part.log.stamps_ns + moved_ns,
+            part.log, stamps_ns=part.log.stamps_ns[::THINNED] + moved_ns,
+            positions_m=part.log.positions_m[::THINNED],
+            quaternions_xyzw=part.log.quaternions_xyzw[::THINNED],
             trigger_stamps_ns=part.log.trigger_stamps_ns + moved_ns,
         )  # fmt: skip
         write_bag(log, folder / names[-1], part.plan.flow)
-        if row % measured_every:
-            continue
-        factor = hidden.step if row >= hidden.step_at else 1.0
-        marks = readings.expected_um - readings.clean_um
-        film = factor * (readings.clean_um + hidden.amount(row, count) * marks)
+        film = film_um(job, row, count, hidden)
         shown = measure(readings.point, film, film, noise, stream(1000 * seed + row, 80))
         table = replace(readings, thickness_um=shown.thickness_um)
+        taken = taken_on(row, len(readings), points_a_part)
+        table = Readings(*(column[taken] for column in vars(table).values()))
         write_readings(table, folder / f'{names[-1]}.csv', False)
     return names

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timezone
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from paint_deposition.line.series import Series
 
 # A segment has at least so many parts.
 SHORTEST = 3
-# One part counts as no more than this: a single bad part is no change [standard deviations].
+# One part is no further from its neighbours: a single bad part is no change [standard deviations].
 MOST_OF_ONE = 4.0
+NEIGHBOURS = 5
 # A change may have been wherever the squared error is larger by no more (95 %, two parameters).
 LIKELY = 5.99
 SECONDS_A_DAY = 86400.0
@@ -31,6 +33,7 @@ class Change:
         before, after: means (of a drift: at its beginning and at the end). sd: of their
             difference. per_day: of a drift, else None.
         strength: the difference in standard deviations of it.
+        also: weaker series that changed with it; their amplitudes share its mark on the film.
     """
 
     series: str
@@ -46,6 +49,7 @@ class Change:
     sd: float
     per_day: float | None
     strength: float
+    also: tuple[str, ...] = ()
 
     @property
     def sentence(self) -> str:
@@ -60,15 +64,17 @@ class Change:
         way = 'rose' if self.after > self.before else 'fell'
         size = f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {self.unit}'
         within = f'between {date(self.earliest_s)} and {date(self.latest_s)}'
+        others = f'; {len(self.also)} other charts changed with it' if self.also else ''
         if self.kind == 'drift':
-            return f'{what} {way} since {date(self.time_s)} by {size} in all ({within})'
-        return f'{what} {way} by {size} on {date(self.time_s)} ({within})'
+            return f'{what} {way} since {date(self.time_s)} by {size} in all ({within}){others}'
+        return f'{what} {way} by {size} on {date(self.time_s)} ({within}){others}'
 
     def to_dict(self) -> dict[str, Any]:
         """All figures by name, with dates."""
         named = {key: getattr(self, key) for key in self.__dataclass_fields__}
         dates = {name: date(named.pop(f'{name}_s')) for name in ('time', 'earliest', 'latest')}
-        return named | dates | {'members': list(self.members), 'sentence': self.sentence}
+        lists = {'members': list(self.members), 'also': list(self.also)}
+        return named | dates | lists | {'sentence': self.sentence}
 
 
 def date(time_s: float) -> str:
@@ -77,29 +83,47 @@ def date(time_s: float) -> str:
 
 
 def changes_of(series: Sequence[Series], times_s: np.ndarray) -> list[Change]:
-    """All changes, oldest first.
+    """All changes, oldest first; those that come with a stronger one are named by it.
 
     A change has to lower the squared error by twice the logarithm of the parts, which pays for
     looking at all places (BIC), and of the series, which pays for looking at all of them.
     """
     penalty = 2.0 * np.log(len(times_s)) + 2.0 * np.log(len(series))
     found = [change for one in series for change in _of_series(one, times_s, penalty)]
-    return sorted(found, key=lambda change: change.time_s)
+    return sorted(_led(found), key=lambda change: change.time_s)
+
+
+def _led(found: Sequence[Change]) -> list[Change]:
+    """Changes at the same time as one, the strongest leading: effects share marks on the film.
+
+    The misfit leads only where nothing else changed, for it has no name.
+    """
+    leaders: list[Change] = []
+    for change in sorted(found, key=lambda one: (one.series == 'misfit', -one.strength)):
+        for row, leader in enumerate(leaders):
+            ends = leader.latest_s if leader.kind == 'step' else np.inf
+            if change.latest_s >= leader.earliest_s and change.earliest_s <= ends:
+                also = tuple(dict.fromkeys((*leader.also, change.series)))
+                leaders[row] = replace(leader, also=also)
+                break
+        else:
+            leaders.append(change)
+    return leaders
 
 
 def _of_series(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
     from ruptures import KernelCPD
 
-    values = np.clip(series.standard, -MOST_OF_ONE, MOST_OF_ONE)
+    values = _tamed(series.standard)
     if len(values) < 2 * SHORTEST:
         return []
     ends = KernelCPD(kernel='linear', min_size=SHORTEST).fit(values).predict(pen=penalty)
     starts = [0, *ends[:-1]]
     steps_cost = sum(_scatter(values[a:b]) for a, b in zip(starts, ends, strict=True))
     steps_cost += penalty * (len(ends) - 1)
-    drift = _drift(values, times_s)
-    if drift[0] + penalty < min(steps_cost, _scatter(values)):
-        return [_as_drift(series, times_s, drift[1], penalty)]
+    errors = _drift_errors(values, times_s)
+    if errors.min() + penalty < min(steps_cost, _scatter(values)):
+        return [_as_drift(series, times_s, errors)]
     return [
         _as_step(series, values, times_s, starts[k - 1], starts[k], ends[k])
         for k in range(1, len(starts))
@@ -110,36 +134,30 @@ def _scatter(values: np.ndarray) -> float:
     return float(np.sum((values - values.mean()) ** 2))
 
 
-def _hinge(times_s: np.ndarray, row: int) -> np.ndarray:
-    """(n, 2) level, and time since a part."""
-    return np.column_stack([np.ones(len(times_s)), np.maximum(times_s - times_s[row], 0.0)])
+def _tamed(values: np.ndarray) -> np.ndarray:
+    """The values with single ones kept near their neighbours."""
+    middle = median_filter(values, NEIGHBOURS, mode='nearest')
+    return np.clip(values, middle - MOST_OF_ONE, middle + MOST_OF_ONE)
 
 
-def _drift(values: np.ndarray, times_s: np.ndarray) -> tuple[float, int]:
-    """Least squared error of a line that leaves the level at a part, and that part's row."""
-    rows = range(len(values) - SHORTEST)
-    errors = [_line_error(_hinge(times_s, row), values) for row in rows]
-    best = int(np.argmin(errors))
-    return float(errors[best]), best
+def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """(n - SHORTEST,) least squared error of a line that leaves the level at each part."""
+    began = times_s[: len(times_s) - SHORTEST]
+    since = np.maximum(times_s[:, np.newaxis] - began, 0.0)
+    since -= since.mean(axis=0)
+    left = values - values.mean()
+    return left @ left - (left @ since) ** 2 / np.sum(since**2, axis=0)
 
 
-def _line_error(columns: np.ndarray, values: np.ndarray) -> float:
-    scaled = columns / np.maximum(np.abs(columns).max(axis=0), 1e-30)
-    fitted = scaled @ np.linalg.lstsq(scaled, values, rcond=None)[0]
-    return float(np.sum((values - fitted) ** 2))
-
-
-def _as_drift(series: Series, times_s: np.ndarray, row: int, penalty: float) -> Change:
+def _as_drift(series: Series, times_s: np.ndarray, errors: np.ndarray) -> Change:
+    row = int(np.argmin(errors))
     weight = 1.0 / series.deviation
-    columns = _hinge(times_s, row)
-    columns[:, 1] /= SECONDS_A_DAY
-    scaled = columns * weight[:, np.newaxis]
+    since = np.maximum(times_s - times_s[row], 0.0) / SECONDS_A_DAY
+    scaled = np.column_stack([np.ones(len(since)), since]) * weight[:, np.newaxis]
     (level, slope), *_ = np.linalg.lstsq(scaled, series.values * weight, rcond=None)
     sd = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
-    days = float(columns[-1, 1])
-    values = np.clip(series.standard, -MOST_OF_ONE, MOST_OF_ONE)
-    errors = [_line_error(_hinge(times_s, k), values) for k in range(len(values) - SHORTEST)]
-    likely = np.flatnonzero(np.array(errors) <= min(errors) + LIKELY)
+    days = float(since[-1])
+    likely = np.flatnonzero(errors <= errors.min() + LIKELY)
     return Change(
         series.name, series.unit, series.members, 'drift', row, float(times_s[row]),
         float(times_s[likely[0]]), float(times_s[likely[-1]]), float(level),

@@ -91,9 +91,10 @@ def shewhart_limit(run_length: float) -> float:
 
 def cusum_limit(run_length: float) -> float:
     """Decision interval h of the two-sided CUSUM, in standard deviations."""
-    return _solved(lambda h: _cusum_run_length(h), run_length, 1.0, 40.0)
+    return _solved(_cusum_run_length, run_length, 1.0, 40.0)
 
 
+@lru_cache(maxsize=256)
 def ewma_limit(run_length: float) -> float:
     """In standard deviations of the settled EWMA."""
     return _solved(_ewma_run_length, run_length, 1.5, 7.0)
@@ -104,7 +105,6 @@ def _cusum_run_length(h: float) -> float:
     return (np.exp(2.0 * REFERENCE * b) - 2.0 * REFERENCE * b - 1.0) / (4.0 * REFERENCE**2)
 
 
-@lru_cache(maxsize=256)
 def _ewma_run_length(limit: float) -> float:
     edge = limit * np.sqrt(WEIGHT / (2.0 - WEIGHT))
     half = edge / STATES
