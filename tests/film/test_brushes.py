@@ -30,8 +30,10 @@ CHANGES = switched(
 )  # fmt: skip
 
 
-def painted(motion: Trajectory, model: DepositionModel, points=None, precision='single'):
-    path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
+def painted(
+    motion: Trajectory, model: DepositionModel, points=None, precision='single', step_m=None
+):
+    path, _ = spray_path(motion, 0.25, step_m or model.max_step_m, model.needs_whole_strokes)
     integrator = FilmIntegrator(points or lying_plane(), model, precision)
     integrator.add(path)
     return integrator
