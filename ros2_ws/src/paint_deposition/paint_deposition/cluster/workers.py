@@ -48,7 +48,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             with (
                 LocalCluster(
                     n_workers=count or len(os.sched_getaffinity(0)), threads_per_worker=1,
-                    processes=True, dashboard_address=None, silence_logs=logging.CRITICAL,
+                    processes=True, dashboard_address='127.0.0.1:0', silence_logs=logging.CRITICAL,
                 ) as cluster,
                 Client(cluster) as client,
             ):  # fmt: skip
