@@ -341,3 +341,11 @@ def test_paint_runs_from_anywhere(repository, tmp_path):
         [link, '--help'], cwd=tmp_path, capture_output=True, text=True, timeout=60, check=True
     )
     assert 'simulate' in done.stdout
+
+
+def test_every_node_has_a_group_of_the_aggregator(repository):
+    folder = repository / 'ros2_ws/src/paint_deposition/config'
+    told = yaml.safe_load((folder / 'diagnostic_aggregator.yaml').read_text())
+    groups = told['analyzers']['ros__parameters'].values()
+    named = [name for group in groups if isinstance(group, dict) for name in group['contains']]
+    assert sorted(named) == sorted(f'{node}:' for node in NODES)
