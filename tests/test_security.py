@@ -13,7 +13,8 @@ from nodes.cell import parameters
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.recording.run_recorder import DEFAULT_TOPICS, RunRecorder
+from paint_deposition.nodes.recording.default_topics import default_topics
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
@@ -59,8 +60,7 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, nam
     heard = {subscription.topic_name for subscription in node.subscriptions}
     if name == 'run_recorder':
         # It subscribes as publishers appear.
-        heard |= {node.resolve_topic_name(topic) for topic in (*DEFAULT_TOPICS, 'part')}
-        heard |= {'/atomizer/pose', '/atomizer/state'}
+        heard |= {node.resolve_topic_name(topic) for topic in (*default_topics(['']), 'part')}
     offered = {service.service_name for service in node.services}
     assert published | NOT_ALWAYS == rules['publish'] | NOT_ALWAYS
     assert heard | NOT_ALWAYS | OF_ALL == rules['subscribe'] | NOT_ALWAYS | OF_ALL

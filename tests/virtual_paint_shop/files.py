@@ -101,7 +101,7 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0) -> None:
                 message = bool_type(on)
             else:
                 header = header_type(time_type(stamp // 10**9, stamp % 10**9), '')
-                message = types.types[STATE_TYPE](header, on, flow=flow * on, **NOT_KNOWN)
+                message = types.types[STATE_TYPE](header, on, flow=flow * on, brush=0, **NOT_KNOWN)
             queue.append((stamp, states, types.serialize_cdr(message, state_type)))
         for stamp, connection, data in sorted(queue, key=lambda entry: entry[0]):
             bag.write(connection, stamp, data)

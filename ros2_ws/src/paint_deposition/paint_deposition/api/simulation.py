@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import GunOnPart, look_at_guns
+from paint_deposition.api.geometry import GunOnPart, look_at_guns, require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
@@ -189,6 +189,8 @@ def simulate(
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
+    for motion, its_model in zip(motions, models, strict=True):
+        require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     common = _painted(surface.points(), seen, models, surface, 'single', progress)
