@@ -3,7 +3,7 @@
 Starts the real nodes as processes, replays the sample trajectory onto the sample door, records
 the run, checks it against the offline film, asks the planner, diagnoses the measured door,
 settles another diagnosis by the spray that it proposes, and makes a door more even by what a
-diagnosis found. Takes eight minutes.
+diagnosis found. Takes two minutes.
 """
 
 import json
