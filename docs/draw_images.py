@@ -14,7 +14,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'
 IMAGES = ROOT / 'docs/images'
 LARGEST_BYTES = 300_000
-WIDEST_PX = 1300
+WIDEST_PX = 1250
 
 
 def main() -> None:

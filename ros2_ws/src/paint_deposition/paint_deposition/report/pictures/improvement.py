@@ -22,7 +22,7 @@ from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 # The colours span this share of both films about the target, to the next 5 %.
 SHOWN, STEP = 0.98, 0.05
 MOST_CHARTS, SAMPLES = 12, 120
-FILM_IN, CHART_IN = (6.2, 6.0), (3.0, 1.9)
+FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
 
 
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
@@ -40,8 +40,9 @@ def improvement_picture(result: Improvement) -> Figure:
     columns = min(len(openings), 4)
     rows = math.ceil(len(openings) / columns)
     width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
-    figure = new_figure(max(2.0 * width + 2.6, 10.0), height + 1.4 + rows * CHART_IN[1])
-    top, bottom = figure.subfigures(2, 1, height_ratios=[height + 1.4, rows * CHART_IN[1]])
+    above, below = height + AROUND_IN[1], rows * CHART_IN[1]
+    figure = new_figure(max(2.0 * width + AROUND_IN[0], 10.0), above + below)
+    top, bottom = figure.subfigures(2, 1, height_ratios=[above, below])
     axes = top.subplots(1, 2, sharex=True, sharey=True)
     scale = _scale(result)
     films = zip(axes, result.paths, (result.before, result.after), strict=True)
@@ -54,7 +55,7 @@ def improvement_picture(result: Improvement) -> Figure:
         ScalarMappable(
             Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
         ),
-        ax=axes, shrink=0.7, aspect=25, pad=0.02,
+        ax=axes, location='bottom', shrink=0.4, aspect=40, pad=0.04,
     )  # fmt: skip
     bar.set_label('film [µm]', color=MUTED)
     bar.outline.set_visible(False)
