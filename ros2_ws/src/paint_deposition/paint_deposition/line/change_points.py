@@ -63,11 +63,12 @@ class Change:
             what = f'{self.series}{others}'
         way = 'rose' if self.after > self.before else 'fell'
         size = f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {self.unit}'
-        within = f'between {date(self.earliest_s)} and {date(self.latest_s)}'
+        ends = date(self.earliest_s), date(self.latest_s)
+        within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
         others = f'; {len(self.also)} other charts changed with it' if self.also else ''
         if self.kind == 'drift':
-            return f'{what} {way} since {date(self.time_s)} by {size} in all ({within}){others}'
-        return f'{what} {way} by {size} on {date(self.time_s)} ({within}){others}'
+            return f'{what} {way} since {date(self.time_s)} by {size} in all{within}{others}'
+        return f'{what} {way} by {size} on {date(self.time_s)}{within}{others}'
 
     def to_dict(self) -> dict[str, Any]:
         """All figures by name, with dates."""
