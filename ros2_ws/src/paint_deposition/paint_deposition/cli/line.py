@@ -46,8 +46,8 @@ def line_command(
 
     require_libraries('paint line')
     from paint_deposition.cluster.finished import NAME, Finished
-    from paint_deposition.cluster.run import run
-    from paint_deposition.cluster.workers import require_alone, workers, workers_in_words
+    from paint_deposition.cluster.run import finish
+    from paint_deposition.cluster.workers import require_alone
     from paint_deposition.line.job import line_cases, shared_files
     from paint_deposition.line.part import computed
     from paint_deposition.line.result import Line
@@ -58,12 +58,8 @@ def line_command(
         tell('reading')
         cases, file, model = line_cases(folder)
         finished, digests = Finished(output / NAME), [case.digest for case in cases]
-        done, told = 0, 'none: every run had been finished'
-        if not finished.has_all(digests):
-            tell('starting the workers')
-            with workers(scheduler, count) as client:
-                told = workers_in_words(client)
-                done = run(client, computed, cases, {}, finished, tell)
+        done, told = finish(scheduler, count, computed, cases, {}, finished, tell)
+        told = told or 'none: every run had been finished'
         say_all('note', [f'workers: {told}'])
         tell('pooling')
         table = finished.table(digests)

@@ -54,8 +54,8 @@ def sweep_command(
 
     require_libraries('paint sweep')
     from paint_deposition.cluster.finished import NAME, Finished
-    from paint_deposition.cluster.run import run
-    from paint_deposition.cluster.workers import require_alone, workers, workers_in_words
+    from paint_deposition.cluster.run import finish
+    from paint_deposition.cluster.workers import require_alone
     from paint_deposition.sweep.case import computed
     from paint_deposition.sweep.job import Job
     from paint_deposition.sweep.result import Sweep, write_sweep
@@ -67,12 +67,8 @@ def sweep_command(
         job = Job.of(read_sweep(sweep), sweep.parent, tell)
         finished = Finished(output / NAME)
         say_all('note', job.notes)
-        done, told = 0, 'none: every case had been finished'
-        if not finished.has_all(case.digest for case in job.cases):
-            tell('starting the workers')
-            with workers(scheduler, count) as client:
-                told = workers_in_words(client)
-                done = run(client, computed, job.cases, job.inputs, finished, tell)
+        done, told = finish(scheduler, count, computed, job.cases, job.inputs, finished, tell)
+        told = told or 'none: every case had been finished'
         say_all('note', [f'workers: {told}'])
         tell('writing and drawing')
         found = Sweep.of(job, finished, done, told)

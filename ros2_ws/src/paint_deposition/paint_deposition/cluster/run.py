@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from paint_deposition.cluster.finished import Columns, Finished
+from paint_deposition.cluster.workers import workers, workers_in_words
 from paint_deposition.errors import ManyError
 
 if TYPE_CHECKING:
@@ -32,6 +33,32 @@ class Case:
     digest: str
     given: Mapping[str, Any]
     inputs: tuple[str, ...] = ()
+
+
+def finish(
+    scheduler: str | None,
+    count: int | None,
+    work: Callable[..., Columns],
+    cases: Sequence[Case],
+    inputs: Mapping[str, Any],
+    finished: Finished,
+    progress: Callable[..., None],
+) -> tuple[int, str]:
+    """Start workers if a case is left, compute it, and stop them.
+
+    Args:
+        scheduler, count: of ``workers``.
+        work, cases, inputs, finished, progress: of ``run``.
+
+    Returns:
+        How many cases were computed, and the workers in words, '' where none was needed.
+    """
+    if finished.has_all(case.digest for case in cases):
+        return 0, ''
+    progress('starting the workers')
+    with workers(scheduler, count) as client:
+        told = workers_in_words(client)  # before any of them may end
+        return run(client, work, cases, inputs, finished, progress), told
 
 
 def run(

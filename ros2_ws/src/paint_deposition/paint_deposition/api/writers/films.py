@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.simulation import Film
-from paint_deposition.api.writers.provenance import input_files, provenance
+from paint_deposition.api.writers.provenance import with_provenance
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.report.pictures.film import write_film_picture
 from paint_deposition.results.film import write_film
@@ -21,11 +21,10 @@ def film(
     made_from: Mapping[str, Any] | None = None,
     pictures: str = PNG,
 ) -> list[Path]:
-    about = result.to_dict() | dict(made_from or {})
     models = {gun.name or 'model': gun.model for gun in result.guns}
     motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
     there = {what: file for what, file in motions.items() if Path(file).exists()}
-    about |= provenance(models, input_files(about) | there)
+    about = with_provenance(result.to_dict() | dict(made_from or {}), models, there)
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
     )

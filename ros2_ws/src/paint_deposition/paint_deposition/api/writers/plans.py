@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from paint_deposition.api.writers.provenance import input_files, provenance
+from paint_deposition.api.writers.provenance import input_files, provenance, with_provenance
 from paint_deposition.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
@@ -56,8 +56,8 @@ def plan(
     pictures: str = PNG,
     trade_off: Sequence[Point] = (),
 ) -> list[Path]:
-    about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
-    about |= provenance(result.model, input_files(about))
+    of_part = {'down': result.surface.down, 'notes': result.surface.notes}
+    about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_plan(folder, result, result.surface, about, part)
     picture = write_film_picture(
@@ -86,8 +86,8 @@ def improvement(
     pictures: str = PNG,
     trade_off: Sequence[Point] = (),
 ) -> list[Path]:
-    about = {'notes': (*result.surface.notes, *result.given.notes)} | dict(made_from or {})
-    about |= provenance(result.model, input_files(about))
+    notes = {'notes': (*result.surface.notes, *result.given.notes)}
+    about = with_provenance(notes | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_improvement(folder, result, about, part)
     files.append(write_improvement_picture(Path(folder) / f'improvement.{pictures}', result))
@@ -113,8 +113,8 @@ def chosen_readings(
     part_pose: Sequence[float] | None = None,
     pictures: str = PNG,
 ) -> list[Path]:
-    about = {'down': result.surface.down, 'notes': result.surface.notes} | dict(made_from or {})
-    about |= provenance(result.model, input_files(about))
+    of_part = {'down': result.surface.down, 'notes': result.surface.notes}
+    about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
     files = write_chosen_readings(folder, result, about, part)
     return [*files, write_measuring_picture(Path(folder) / f'points.{pictures}', result)]
