@@ -176,7 +176,7 @@ class DepositionSimulator(PaintingNode):
                 self._outputs[topic].publish(field.message(stamp_ns, share_um))
         if not with_latched:
             return
-        figures = figures_of(self.values, self.surface, film)
+        figures = figures_of(self.values, self.surface, film_um, film.emitted_cm3)
         laid_cm3 = laid_by(self.gun_names, self.surface, film)
         self._stats = stats_message(self.frame.frame_id, stamp_ns, figures, laid_cm3)
         self._stats.run = self.parts.part.run

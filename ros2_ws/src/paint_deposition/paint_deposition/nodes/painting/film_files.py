@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.film_messages import shares
@@ -16,12 +18,14 @@ if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 
-def figures_of(values: Mapping[str, Any], surface: Surface, film: CommonFilm) -> FilmStatistics:
-    """The film's figures with the target and the limit that the parameters set."""
+def figures_of(
+    values: Mapping[str, Any], surface: Surface, film_um: np.ndarray, emitted_cm3: float
+) -> FilmStatistics:
+    """The figures of a film (V,) with the target and the limit that the parameters set."""
     return film_statistics(
-        film.film_um,
+        film_um,
         surface.vertex_areas_m2,
-        film.emitted_cm3,
+        emitted_cm3,
         painted_above_um=values['painted_above_um'],
         target_um=values['target_um'],
         target_tolerance_um=values['target_tolerance_um'],
@@ -74,13 +78,14 @@ def film_to_save(
                 shares(laid_cm3).items(), files, film.guns, counts, strict=True
             )
         ]
-        figures = figures_of(values, surface, film)
+        film_um = film.film_um
+        figures = figures_of(values, surface, film_um, film.emitted_cm3)
         if any(gun.model.brushes for gun in film.guns):
             details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
         return write_film(
             folder,
             surface,
-            film.film_um,
+            film_um,
             figures,
             stem=stem,
             statistics_file=f'{stem}.json',
