@@ -19,7 +19,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # Modules are only loaded when their command is used, so that help comes at once.
 COMMANDS = {
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('planning', "Fit the bell's pattern to gauge readings."),
+    'calibrate': ('calibrate', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
     'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
