@@ -18,7 +18,7 @@ from paint_deposition.files.gauge_readings import read_readings, write_predictio
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.part.surface import Surface
 from surfaces import triangulated
-from workbook import write_workbook
+from workbook import open_document, open_row, write_workbook
 
 POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
 
@@ -170,6 +170,21 @@ def test_spreadsheet(tmp_path):
     ):
         read_readings(twice)
     require_the_four_readings(read_readings(twice, layout=Layout(sheet='right')))
+
+
+def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
+    """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
+    rows = [
+        ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
+        ('A1', 100.0, 0.0, 50.0, 21.5),
+        ('A1', 100.0, 0.0, 50.0, 22.1),
+        ('A2', 100.0, 0.0, 200.0, 24.0),
+        ('A3', 250.0, 0.0, 350.0, 19.4),
+    ]
+    rest = open_row(rows=1_048_571, empty=16_384)
+    path = tmp_path / 'tuer.ods'
+    path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
+    require_the_four_readings(read_readings(path))
 
 
 def test_measuring_robot(file):

@@ -14,6 +14,7 @@ from fuzz.seeds import RAPID
 from fuzz.targets import targets
 from paint_deposition.errors import PaintError
 from paint_deposition.files import surface_cache
+from workbook import open_document, open_row
 
 CLAIMED = 1_000_000_000
 MEMORY_BYTES = 500_000_000
@@ -81,10 +82,13 @@ def _bag(head: int, data: int) -> bytes:
     return b'#ROSBAG V2.0\n' + record + struct.pack('<I', data) + bytes(100)
 
 
-def _far_cell() -> bytes:
+def _far_cell(cell: bytes = b'<c r="XFD1048576">') -> bytes:
     sheet = targets()['worksheet']
-    far = b'<row r="1048576"><c r="XFD1048576"><v>1</v></c></row></sheetData>'
+    far = b'<row r="1048576">' + cell + b'<v>1</v></c></row></sheetData>'
     return sheet.around(sheet.seeds()[0].replace(b'</sheetData>', far))
+
+
+HEADINGS = open_row('x_m', 'y_m', 'z_m', 'thickness_um')
 
 
 CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
@@ -112,6 +116,18 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'the data of a ROS 1 record': ('ros1', lambda: _bag(8, 4_000_000_000)),
     'transforms of a message': ('mcap', lambda: _many_transforms()),
     'a cell of a workbook': ('workbook', _far_cell),
+    'a cell of a workbook in single quotes': (
+        'workbook', lambda: _far_cell(b"<c r='XFD1048576'>"),
+    ),
+    'a row of .ods that repeats': (
+        'workbook', lambda: open_document(HEADINGS + open_row(1.0, rows=CLAIMED, last=100)),
+    ),
+    'a cell of .ods that repeats, and a row after many empty ones': (
+        'workbook',
+        lambda: open_document(
+            open_row('x_m', last=CLAIMED) + open_row(rows=CLAIMED, empty=3) + open_row(1.0)
+        ),
+    ),
     'an array of RAPID': ('rapid', lambda: RAPID.replace(b'n{2}:=', b'n{1000000000}:=[[')),
 }  # fmt: skip
 

@@ -200,7 +200,7 @@ def test_the_log_paints_the_motion_again_with_another_model():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = _painted(_events(motion, 10, state_delay_s=0.05))
     again = LiveFilm(lying_plane(), LAGGING)
-    again.follow(film.log.events)
+    again.follow(film.log.events())
     assert np.array_equal(again.up_to_date().film_um, _offline(motion, LAGGING).film_um)
     assert again.counts == film.counts
 
@@ -226,7 +226,7 @@ def test_memory_is_bounded_and_says_so():
     motion = straight_pass(TIMES_S)
     film = _painted(_events(motion, 100), limit_poses=500)
     assert not film.log.complete
-    assert film.log.events == []
+    assert list(film.log.events()) == []
     assert np.array_equal(film.up_to_date().film_um, _offline(motion).film_um)
     # Too late to be taken back: the gun is off from the first state on, not before.
     film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))

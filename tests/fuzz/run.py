@@ -1,7 +1,9 @@
 """Fuzzes the readers one after the other: `make fuzz`, `make fuzz ARGS='--seconds 600 rapid ply'`.
 
-Corpus and findings stay in `runs/fuzz`, so that every run goes on where the last one ended. Ends
-with 1 where something was found. Atheris, the fuzzer, is there for Linux on x86-64 only.
+Corpus, findings and counts stay in `runs/fuzz`, so that every run goes on where the last one
+ended. A count is of inputs that were made by change: the corpus, which each process reads again
+first, is none of them. Ends with 1 where something was found. Atheris, the fuzzer, is there for
+Linux on x86-64 only.
 """
 
 from __future__ import annotations
@@ -9,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import io
+import json
 import os
 import re
 import sys
@@ -18,7 +21,8 @@ from typing import NoReturn
 
 import click
 
-COUNTED = re.compile(r'number_of_executed_units: (\d+)|^#(\d+)', re.MULTILINE)
+READ = re.compile(r'number_of_executed_units: (\d+)|^#(\d+)', re.MULTILINE)
+OF_CORPUS = re.compile(r'^#(\d+)\s+INITED', re.MULTILINE)
 
 
 @click.command()
@@ -42,35 +46,43 @@ def main(names: tuple[str, ...], seconds: float, inputs: int, seed: int, place: 
         known = ' '.join(readers)
         raise click.ClickException(f'no reader {" ".join(unknown)}; there are: {known}')
     place.mkdir(parents=True, exist_ok=True)
-    found = 0
+    counts_file = place / 'counts.json'
+    counts = json.loads(counts_file.read_text()) if counts_file.exists() else {}
+    before, found = sum(counts.values()), 0
     for name in names or readers:
         count = _fuzz_in_processes(name, place, seconds, inputs, seed)
+        counts[name] = counts.get(name, 0) + count
+        counts_file.write_text(json.dumps(counts, indent=2))
         findings = sorted((place / 'findings' / name).glob('*[!t]'))
         print(f'{name}: {count} inputs, {len(findings)} findings', flush=True)
         for path in findings:
             print(f'  {path}', flush=True)
         found += len(findings)
+    total = sum(counts.values())
+    print(f'total: {total - before} inputs, {found} findings; {total} inputs since {place} began')
     sys.exit(1 if found else 0)
 
 
 def _fuzz_in_processes(name: str, place: Path, seconds: float, inputs: int, seed: int) -> int:
-    """The number of inputs read; a process that hangs or crashes is followed by another."""
-    deadline, count = time.monotonic() + seconds, 0
-    while (left_s := round(deadline - time.monotonic())) > 0 and (inputs < 0 or count < inputs):
+    """The number of new inputs; a process that hangs or crashes is followed by another."""
+    deadline, read, known = time.monotonic() + seconds, 0, 0
+    while (left_s := round(deadline - time.monotonic())) > 0 and (inputs < 0 or read < inputs):
         log = place / f'{name}.log'
-        limits = [f'-max_total_time={left_s}', f'-runs={inputs - count if inputs > 0 else -1}']
+        limits = [f'-max_total_time={left_s}', f'-runs={inputs - read if inputs > 0 else -1}']
         process = os.fork()
         if not process:
             _fuzz_here(name, place, log, [*limits, f'-seed={seed}'])
         _, status = os.waitpid(process, 0)
-        told = COUNTED.findall(log.read_text(errors='replace'))
-        numbers = [int(unit or mark) for unit, mark in told]
+        told = log.read_text(errors='replace')
+        numbers = [int(unit or mark) for unit, mark in READ.findall(told)]
         if not numbers:
             raise click.ClickException(f'{name} does not start; see {log}')
-        count += max(numbers)
+        of_corpus = OF_CORPUS.search(told)
+        read += max(numbers)
+        known += int(of_corpus[1]) if of_corpus else max(numbers)
         if not status:
             break
-    return count
+    return read - known
 
 
 def _fuzz_here(name: str, place: Path, log: Path, arguments: list[str]) -> NoReturn:

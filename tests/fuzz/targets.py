@@ -34,7 +34,7 @@ from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import urdf
-from workbook import write_workbook
+from workbook import open_document, open_row, write_workbook
 
 # Fine enough for a small part, and no work worth speaking of for the largest that is taken.
 EDGE_M = 5.0
@@ -210,6 +210,16 @@ def _sheet() -> tuple[bytes, bytes]:
         return book, package.read('xl/sheet1.xml')
 
 
+def _open_book() -> bytes:
+    rows = (('x_m', 'y_m', 'z_m', 'thickness_um'), (0.1, 0.0, 0.2, 24.5), (0.2, 0.0, 0.2, 'n/a'))
+    return open_document(''.join(open_row(*row, empty=16_380) for row in rows))
+
+
+def _open_sheet() -> bytes:
+    with zipfile.ZipFile(BytesIO(_open_book())) as package:
+        return package.read('content.xml')
+
+
 def _kept_part() -> list[bytes]:
     """A prepared part as it is kept on disk, though a small one."""
     part = read_mesh(sample_folder() / 'panel.stl', max_edge_length_m=0.2)
@@ -244,6 +254,12 @@ def targets() -> dict[str, Target]:
             '.xlsx', read_readings, lambda: [_sheet()[1]],
             ('<c r="A1">', '<v>', '</v>', 't="s"', 't="d"', 'AAAAA99999999'),
             _in_zip(_sheet()[0], 'sheet1.xml'),
+        ),
+        'ods': Target(
+            '.ods', read_readings, lambda: [_open_sheet()],
+            (' table:number-columns-repeated="999999"', ' table:number-rows-repeated="1048576"',
+             'office:value="', 'office:value-type="date"', '<text:p>', '<table:table-row>'),
+            _in_zip(_open_book(), 'content.xml'),
         ),
         'stl': Target('.stl', _mesh, _stl_seeds, ('solid', 'facet normal', 'vertex', 'endfacet')),
         'ply': Target(

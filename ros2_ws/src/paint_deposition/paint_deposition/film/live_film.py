@@ -14,7 +14,6 @@ from paint_deposition.motion.motion_log import (
     MotionLog,
     PoseBatch,
     TriggerChange,
-    merged,
 )
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.trajectory import PoseCounts
@@ -167,7 +166,7 @@ class LiveFilm:
 
     def follow(self, events: Iterable[TriggerChange | PoseBatch]) -> None:
         """Take what was logged."""
-        for event in merged(events):
+        for event in events:
             if isinstance(event, TriggerChange):
                 self.add_trigger(event)
             else:
@@ -208,10 +207,10 @@ class LiveFilm:
         _ = unpainted.gauge_um
 
     def _begin_again(self, first_change: TriggerChange) -> None:
-        events = self.log.events
+        log = self.log
         self._clear()
         self._take_change(first_change)
-        self.follow(events)
+        self.follow(log.events())
 
     def _carry_on(self, stamp_ns: int) -> None:
         """After a reset, keep the trigger of a motion that goes on, drop that of an older one."""

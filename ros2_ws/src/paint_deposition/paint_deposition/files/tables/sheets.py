@@ -2,15 +2,13 @@
 
 import csv
 import re
-import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import reduce
 from io import BytesIO, StringIO
 from pathlib import Path
-from zipfile import BadZipFile, ZipFile
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.tables.far_cells import refuse_far_cells
 from paint_deposition.files.text import decoded
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
@@ -20,12 +18,6 @@ SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', '|': 'bars'}
 # Columns of a printed list stand apart by blanks; headings of two words by one only.
 BLANKS = (re.compile(r'\s{2,}|\t'), re.compile(r'\s+'))
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-# Members of a workbook with cells, and how they tell where each stands.
-SHEET = re.compile(r'\.xml$', re.IGNORECASE)
-PLACE = re.compile(rb'\br="([A-Z]{1,3})(\d{1,7})"')
-# A reader of workbooks keeps all between the first and the last cell, some 30 bytes each.
-MOST_CELLS = 10_000_000
-MOST_BYTES = 300_000_000
 EXPECTED = 'give gauge readings as CSV, TSV or TXT, or a workbook (.xlsx, .xls, .ods)'
 
 
@@ -95,7 +87,7 @@ def _separated(path: Path, text: str, separator: str) -> Iterator[tuple[int, lis
 def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
     from python_calamine import CalamineError, CalamineWorkbook
 
-    _refuse_far_cells(path, content)
+    refuse_far_cells(path, content)
     try:
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
         tables = {
@@ -111,28 +103,6 @@ def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
         )
         for name, rows in tables.items()
     ]
-
-
-def _refuse_far_cells(path: Path, content: bytes) -> None:
-    """One cell far away would take memory for all between, and end the process without a word."""
-    try:
-        with ZipFile(BytesIO(content)) as package:
-            members = [info for info in package.infolist() if SHEET.search(info.filename)]
-            if sum(info.file_size for info in members) > MOST_BYTES:
-                raise ReadingsError(f'{path}: is too large for a table of readings; {EXPECTED}')
-            sheets = [package.read(info) for info in members]
-    except (BadZipFile, NotImplementedError, RuntimeError, OSError, ValueError, zlib.error):
-        return  # an older workbook, or damaged: its reader says so
-    for sheet in sheets:
-        last_row, last_column, cell = 0, 0, ''
-        for letters, digits in PLACE.findall(sheet):
-            column = reduce(lambda sum_, letter: 26 * sum_ + letter - 64, letters, 0)
-            last_row, last_column = max(last_row, int(digits)), max(last_column, column)
-            if last_row * last_column > MOST_CELLS:
-                cell = (letters + digits).decode()
-                raise ReadingsError(
-                    f'{path}: a sheet reaches to cell {cell}; delete what lies outside the table'
-                )
 
 
 def _cell(value: object) -> Cell:

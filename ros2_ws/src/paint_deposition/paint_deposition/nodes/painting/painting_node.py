@@ -283,7 +283,7 @@ class PaintingNode(PaintNode, ABC):
         models = [gun.model for gun in self.film.guns]
         turned = self._film_on(self.surface, self.points, models)
         for new, old in zip(turned.guns, self.film.guns, strict=True):
-            new.follow(old.log.events)
+            new.follow(old.log.events())
         self.film = turned
         if self.repainting is not None:
             self._repaint()

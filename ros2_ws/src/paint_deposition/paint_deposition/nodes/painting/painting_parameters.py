@@ -66,7 +66,7 @@ PAINTING = dict(
         ),
         pose_memory=NodeParameter(
             DEFAULT_LIMIT_POSES,
-            'Poses kept, about 100 bytes each, to paint the motion again with another model; '
+            'Poses kept, 64 bytes each, to paint the motion again with another model; '
             'beyond, a new model paints from then on only [poses]',
             (10_000, 100_000_000),
         ),

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import Future
 
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import MotionLog, merged
+from paint_deposition.motion.motion_log import MotionLog, PoseBatch, TriggerChange
 
 # So few poses are left to the thread that paints on: it must not be held up.
 REST_POSES = 250
@@ -36,7 +36,6 @@ class Repainting:
         self._make = make
         self._from_start = from_start
         self._given_up = threading.Event()
-        self._followed = [0] * len(self._logs)
         self._prepared: Future[LiveFilms] = Future()
         sys.setswitchinterval(min(SWITCH_INTERVAL_S, sys.getswitchinterval()))
         threading.Thread(target=self._run, name='repainting', daemon=True).start()
@@ -68,8 +67,8 @@ class Repainting:
             return current
         if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
             return None
-        for film, log, followed in zip(films.guns, self._logs, self._followed, strict=True):
-            film.follow(log.events[followed:])
+        for film, log in zip(films.guns, self._logs, strict=True):
+            film.follow(_not_in(film, log))
         return films
 
     @property
@@ -81,19 +80,20 @@ class Repainting:
             films = self._make()
             films.warm_up()
             if self._from_start:
-                for gun, film in enumerate(films.guns):
-                    self._paint(gun, film, self._logs[gun])
+                for film, log in zip(films.guns, self._logs, strict=True):
+                    self._paint(film, log)
             self._prepared.set_result(films)
         except BaseException as error:  # it is raised again where the films are taken over
             self._prepared.set_exception(error)
 
-    def _paint(self, gun: int, film: LiveFilm, log: MotionLog) -> None:
-        while not self._given_up.is_set() and self._complete:
-            events = log.events[self._followed[gun] :]
-            if log.poses - film.log.poses <= REST_POSES:
-                return
-            for event in merged(events):
+    def _paint(self, film: LiveFilm, log: MotionLog) -> None:
+        while log.poses - film.log.poses > REST_POSES and self._complete:
+            for event in _not_in(film, log):
                 if self._given_up.is_set():
                     return
                 film.follow([event])
-            self._followed[gun] += len(events)
+
+
+def _not_in(film: LiveFilm, log: MotionLog) -> Iterator[TriggerChange | PoseBatch]:
+    """What a film that follows a log has not followed yet."""
+    return log.events(film.log.poses, film.log.changes)
