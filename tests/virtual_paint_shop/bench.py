@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from .flight import Air, Landings, Slices, film_um, fly
@@ -15,11 +17,24 @@ POOL = 1 << 19
 class Bench:
     """Paints one job with any truths, always with the same parcels."""
 
-    def __init__(self, seed: int, job: Job, pattern: Pattern, parcels: int) -> None:
+    def __init__(
+        self,
+        seed: int,
+        job: Job,
+        pattern: Pattern,
+        parcels: int,
+        brushes: Mapping[int, Pattern] | None = None,
+    ) -> None:
+        """Where the plan names brushes, each paints its own passes with its pattern."""
         self.scene = Scene(job.part, pattern, job.motion)
         self.parcels_total = parcels
         self.plume = conner_plume(pattern, POOL, seed=seed)
         self._clean_landings = {}
+        numbers = sorted(set(job.plan.brushes))
+        self._brushes = [
+            Bench(seed + n, job.of_brush(n), (brushes or {})[n], parcels // len(numbers))
+            for n in numbers
+        ]
 
     def readings(
         self, truths: list[Truth], x: np.ndarray, z: np.ndarray
@@ -36,6 +51,8 @@ class Bench:
 
     def film_at(self, truths: list[Truth], x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Film of the parcels that land and stay, um."""
+        if self._brushes:
+            return sum(brush.film_at(truths, x, z) for brush in self._brushes)
         landings = self._landings(truths, x, z)
         kept = 1.0
         for truth in truths:

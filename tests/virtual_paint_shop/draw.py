@@ -78,6 +78,16 @@ def solids_cm3_per_s(rng: np.random.Generator) -> float:
     return rng.uniform(120.0, 300.0) / 60.0 * rng.uniform(0.35, 0.50) * rng.uniform(0.7, 0.9)
 
 
+def brush_beside(pattern: Pattern, width: float) -> Pattern:
+    """Another brush of the same bell: its width and flow times so much, and more in the middle."""
+    return replace(
+        pattern.scaled(width),
+        K1_cm3_per_s=width * pattern.K1_cm3_per_s,
+        K2=pattern.K2 + 0.15,
+        K3=0.7 * pattern.K3,
+    )
+
+
 def timed(part: Part, plan: Plan, rng: np.random.Generator) -> tuple[Plan, Motion]:
     """The motion, and the plan with a logging cycle that gives 1,000 to 3,000 poses."""
     motion = drive(part, plan, rng)

@@ -38,7 +38,9 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
         trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
             folder / mesh
         )
-        write_bag(experiment.log, folder / experiment.name, experiment.plan.flow)
+        write_bag(
+            experiment.log, folder / experiment.name, experiment.plan.flow, experiment.plan.brushes
+        )
         write_readings(experiment.readings, folder / f'{experiment.name}.csv', sigma_column)
         write_readings(
             experiment.heldout, folder / 'truth' / f'heldout_{experiment.name}.csv', sigma_column
@@ -68,10 +70,10 @@ def _otherwise(plan: Plan) -> dict:
     return found | ({'switched_off': list(plan.switched_off)} if plan.switched_off else {})
 
 
-def write_bag(log: Log, folder: Path, flow: float = 1.0) -> None:
+def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...] = ()) -> None:
     """A rosbag2 folder (MCAP): PoseStamped poses; triggers as Bool at their log time.
 
-    A flow other than the usual one is written with each trigger, as AtomizerState.
+    A flow other than the usual one, and brushes, are written with each trigger, as AtomizerState.
     """
     types = get_typestore(Stores.ROS2_JAZZY)
     types.register(get_types_from_msg(ATOMIZER_STATE.read_text(), STATE_TYPE))
@@ -85,7 +87,8 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0) -> None:
     queue = []
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         poses = bag.add_connection(POSE_TOPIC, pose_type.__msgtype__, typestore=types)
-        state_type = bool_type.__msgtype__ if flow == 1.0 else STATE_TYPE
+        plain = flow == 1.0 and not brushes
+        state_type = bool_type.__msgtype__ if plain else STATE_TYPE
         states = bag.add_connection(STATE_TOPIC, state_type, typestore=types)
         for stamp, p, q in zip(
             log.stamps_ns.tolist(),
@@ -96,12 +99,17 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0) -> None:
             header = header_type(time_type(stamp // 10**9, stamp % 10**9), 'part')
             message = pose_type(header, inner(point(*p), quaternion(*q)))
             queue.append((stamp, poses, types.serialize_cdr(message, pose_type.__msgtype__)))
+        number = 0
         for stamp, on in zip(log.trigger_stamps_ns.tolist(), log.trigger_on.tolist(), strict=True):
-            if flow == 1.0:
+            if plain:
                 message = bool_type(on)
             else:
                 header = header_type(time_type(stamp // 10**9, stamp % 10**9), '')
-                message = types.types[STATE_TYPE](header, on, flow=flow * on, brush=0, **NOT_KNOWN)
+                brush = brushes[number % len(brushes)] if brushes and on else 0
+                number += on
+                message = types.types[STATE_TYPE](
+                    header, on, flow=flow * on, brush=brush, **NOT_KNOWN
+                )
             queue.append((stamp, states, types.serialize_cdr(message, state_type)))
         for stamp, connection, data in sorted(queue, key=lambda entry: entry[0]):
             bag.write(connection, stamp, data)

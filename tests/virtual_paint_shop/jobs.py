@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,6 +40,7 @@ class Plan:
     flow: float = 1.0  # times the usual flow
     upside_down: bool = False  # the part hangs upside down; the passes are turned with it
     switched_off: tuple[str, ...] = ()  # of the cell: 'voltage', 'draught'
+    brushes: tuple[int, ...] = ()  # numbers that the passes take in turn; none: one, unnumbered
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,11 @@ class Motion:
         last = np.searchsorted(self.trigger_s, time_s, side='right') - 1
         return np.where(last < 0, False, self.trigger_on[np.maximum(last, 0)]).astype(float)
 
+    def of_passes(self, chosen: Callable[[int], bool]) -> Motion:
+        """The same motion with the gun open on some passes only."""
+        kept = np.repeat([chosen(n) for n in range(len(self.trigger_s) // 2)], 2)
+        return replace(self, trigger_s=self.trigger_s[kept], trigger_on=self.trigger_on[kept])
+
 
 @dataclass(frozen=True)
 class Log:
@@ -84,6 +91,12 @@ class Job:
     part: Part
     plan: Plan
     motion: Motion
+
+    def of_brush(self, number: int) -> Job:
+        """The passes of one brush only."""
+        turns = self.plan.brushes
+        motion = self.motion.of_passes(lambda n: turns[n % len(turns)] == number)
+        return replace(self, plan=replace(self.plan, brushes=()), motion=motion)
 
 
 def draw_plan(

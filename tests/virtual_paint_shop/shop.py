@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .bench import Bench
 from .doors import Part, flat_panel
-from .draw import EXPERIMENTS, draw_jobs, solids_cm3_per_s, stream, timed
+from .draw import EXPERIMENTS, brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
 from .gauge import GaugeNoise, Readings, Spots, keep_clear, layout, scatter, tabulate
 from .jobs import Job, Log, Plan, record
 from .parcels import Pattern, conner_plume, draw_pattern, half_width_m
@@ -60,6 +60,7 @@ def generate(
     follow: float | None = None,
     parcels: int = PARCELS,
     mesh_edge_m: float = 0.012,
+    second_brush: float | None = None,
 ) -> Campaign:
     """A campaign; the same seed gives the same doors, paths, layout and noise for any truth.
 
@@ -68,18 +69,20 @@ def generate(
     style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
     follow: how much the tool axis follows the surface, 0 fixed to 1 normal; None for U(0.3, 0.9).
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
-    a drawn one. Raises ValueError for a name that does not exist.
+    a drawn one. second_brush: every other pass is painted with a brush 2, so many times as wide.
+    Raises ValueError for a name that does not exist.
     """
     strange = set(experiments) - set(EXPERIMENTS)
     if strange:
         raise ValueError(f'no experiment {strange.pop()!r}; there are: {", ".join(EXPERIMENTS)}')
     truths = choose(truth, stream(seed, 1), amplitude, scale)
     pattern, jobs = draw_jobs(seed, truths, experiments, emission_offset_m, gun, follow)
+    brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
     painted = [
         _paint(
             seed,
             n,
-            job,
+            replace(job, plan=replace(job.plan, brushes=tuple(brushes))),
             pattern,
             truths,
             readings,
@@ -89,10 +92,11 @@ def generate(
             noise,
             parcels,
             mesh_edge_m,
+            brushes,
         )
         for n, job in enumerate(jobs)
     ]
-    return _campaign(seed, pattern, painted, truths)
+    return _campaign(seed, pattern, painted, truths, brushes)
 
 
 def panel_study(
@@ -151,6 +155,7 @@ def _paint(
     noise: GaugeNoise,
     parcels: int,
     mesh_edge_m: float = 0.012,
+    brushes: dict[int, Pattern] | None = None,
 ) -> Experiment:
     rng = stream(seed, 40 + number)
     style = style or str(rng.choice(['columns', 'rows', 'random']))
@@ -159,7 +164,7 @@ def _paint(
     others = keep_clear(job.part, Spots(x, z, np.full(x.size, ''), np.ones(x.size, int)))
     at_x = np.concatenate([spots.x_m, others.x_m])
     at_z = np.concatenate([spots.z_m, others.z_m])
-    bench = Bench(seed, job, pattern, parcels)
+    bench = Bench(seed, job, pattern, parcels, brushes)
     clean, _ = bench.readings([], at_x, at_z)
     film, expected = bench.readings(truths, at_x, at_z)
     first = len(spots.x_m)
@@ -199,7 +204,11 @@ def _paint(
 
 
 def _campaign(
-    seed: int, pattern: Pattern, painted: list[Experiment], truths: list[Truth]
+    seed: int,
+    pattern: Pattern,
+    painted: list[Experiment],
+    truths: list[Truth],
+    brushes: dict[int, Pattern] | None = None,
 ) -> Campaign:
     hidden = [
         {**t.as_dict(), 'visible_rms_um': {e.name: e.visible_um[t.id] for e in painted}}
@@ -210,6 +219,7 @@ def _campaign(
         'id': '+'.join(t.id for t in truths) or 'clean',
         'hidden': hidden,
         'pattern': pattern.as_dict(),
+        'brushes': {number: each.as_dict() for number, each in (brushes or {}).items()},
         'half_width_m': half_width_m(conner_plume(pattern, 1 << 15, seed=1)),
         'experiments': {e.name: _facts(e) for e in painted},
     }

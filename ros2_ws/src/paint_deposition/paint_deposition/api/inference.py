@@ -20,6 +20,7 @@ from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.calibration import calibrate as calibrated
 from paint_deposition.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.fitting.panel_reach import Reach, short_reaches
+from paint_deposition.fitting.posterior import of_brushes
 from paint_deposition.fitting.sifting import sifted
 from paint_deposition.readings.campaign import Campaign
 from paint_deposition.readings.geometry import require_paint
@@ -174,9 +175,9 @@ def _start(
         file = read_model_file(campaign.model_file)
         model, posterior = file.model, posterior or file.posterior
     given = model or DepositionModel()
-    model = given.of_numbers(campaign.brushes).single('a diagnosis')
-    require_paint(campaign, model)
-    return model, posterior if len(given.brushes) <= 1 else None
+    start = with_brushes_of(campaign, given)
+    require_paint(campaign, start)
+    return start, of_brushes(posterior, given, start)
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:

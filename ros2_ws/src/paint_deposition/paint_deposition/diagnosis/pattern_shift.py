@@ -8,12 +8,10 @@ import numpy as np
 from scipy.stats import chi2
 
 from paint_deposition.fitting.least_squares import Fit
-from paint_deposition.model.coordinates import PATTERN
 
 # Of jobs that differ as assumed this share lies nearer than what is told as usual, and this share
 # nearer than what is warned of.
 USUAL, ALARMING = 0.95, 0.999
-FREEDOM = len(PATTERN)
 
 
 @dataclass(frozen=True)
@@ -31,14 +29,15 @@ class PatternShift:
 
     @staticmethod
     def of(fit: Fit) -> PatternShift | None:
-        """Of a fit; None where nothing was known before."""
-        if fit.parameters.known is None:
+        """Of a fit; None where no readings told of the pattern before."""
+        known, pattern = fit.parameters.known, fit.parameters.pattern
+        if known is None or not known.readings:
             return None
-        prior = fit.parameters.prior
+        prior, count = fit.parameters.prior, len(pattern)
         # The pattern comes first, and the factor is lower triangular: this is its marginal.
-        away = prior.whiten(fit.vector)[:FREEDOM]
-        single = ((fit.vector - prior.centre) / prior.width)[:FREEDOM]
-        names = (coordinate.name for coordinate in PATTERN)
+        away = prior.whiten(fit.vector)[:count]
+        single = ((fit.vector - prior.centre) / prior.width)[:count]
+        names = (coordinate.name for coordinate in pattern.coordinates)
         return PatternShift(
             float(np.linalg.norm(away)), dict(zip(names, map(float, single), strict=True))
         )
@@ -46,12 +45,12 @@ class PatternShift:
     @property
     def usual(self) -> float:
         """Distance that 95 % of jobs stay below if they differ as assumed."""
-        return float(np.sqrt(chi2.ppf(USUAL, FREEDOM)))
+        return float(np.sqrt(chi2.ppf(USUAL, len(self.by_coordinate))))
 
     @property
     def is_alarming(self) -> bool:
         """Whether hardly any job differs as much."""
-        return bool(self.distance > np.sqrt(chi2.ppf(ALARMING, FREEDOM)))
+        return bool(self.distance > np.sqrt(chi2.ppf(ALARMING, len(self.by_coordinate))))
 
     def __str__(self) -> str:
         name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))

@@ -143,7 +143,7 @@ class Rivals:
         """What an explanation predicts, its amounts being 0."""
         if rival.name == FOOTPRINT:
             (*_, every) = footprint_kinds()
-            basis = footprint_along(rays, self.fit.model.planar)
+            basis = footprint_along(rays, self.fit.model.patterns)
             random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], every)
             return _shapeless(random.change_um / sigma_um[:, np.newaxis])
         values = (

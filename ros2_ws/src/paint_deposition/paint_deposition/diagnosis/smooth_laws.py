@@ -225,18 +225,19 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
 
 def footprint_basis(study: Study, model: DepositionModel) -> Basis:
     """Deviations of the pattern from eq. (1) at the points of a study."""
-    return footprint_along(study.rays(model), model.planar)
+    return footprint_along(study.rays(model), model.patterns)
 
 
-def footprint_along(parts: Sequence[Rays], planar: PlanarPattern) -> Basis:
+def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) -> Basis:
     """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
 
-    Each harmonic of the angle is a random function of the radius by itself.
+    Each harmonic of the angle is a random function of the radius by itself, the same for all
+    brushes.
 
     Args:
-        parts: rays of each part. planar: the pattern that they come from.
+        parts: rays of each part. patterns: those that they come from.
     """
-    reach = planar.r_m + WIDTHS * max(planar.sigma1_m, planar.sigma2_m)
+    reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
     for rays in parts:
         near = hat_weights(np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1), RADII)

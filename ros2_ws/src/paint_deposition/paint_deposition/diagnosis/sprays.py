@@ -67,6 +67,14 @@ def _on_path(change: Callable[[SprayPath], SprayPath]) -> Callable[[Experiment],
     return lambda experiment: replace(experiment, path=change(experiment.path))
 
 
+def _of_the_nearest_opening(path: SprayPath) -> SprayPath:
+    """Closed sub-steps with the brush of the opening that is nearest in time."""
+    opened = np.flatnonzero(path.flow > 0.0)
+    following = np.minimum(np.searchsorted(opened, np.arange(len(path))), len(opened) - 1)
+    before = (path.flow == 0.0) & (path.until_on_s < path.since_off_s)
+    return path.with_(brush=np.where(before, path.brush[opened[following]], path.brush))
+
+
 def _rolled(angle_deg: float) -> Callable[[SprayPath], SprayPath]:
     cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
@@ -75,6 +83,7 @@ def _rolled(angle_deg: float) -> Callable[[SprayPath], SprayPath]:
 
 def _other_way(path: SprayPath) -> SprayPath:
     """Each pass from its end to its begin, the passes in the same order."""
+    path = _of_the_nearest_opening(path)
     time_s = path.time_s.copy()
     for number in np.unique(path.spray_pass[path.spray_pass >= 0]):
         rows = path.spray_pass == number
@@ -130,6 +139,7 @@ def _speed(factor: float) -> Callable[[SprayPath], SprayPath]:
 
 def _open_longer(path: SprayPath) -> SprayPath:
     """The gun opens earlier and closes later, where the path goes on that long."""
+    path = _of_the_nearest_opening(path)
     closed = path.flow == 0.0
     early = closed & (path.until_on_s < LONGER_OPEN_S)
     late = closed & (path.since_off_s < LONGER_OPEN_S)

@@ -31,6 +31,7 @@ class Stand:
         across: (3,) unit vector of the tool's x axis.
         standoff_m: of the TCP. dwell_s: for which the gun is open. flow: relative to calibrated.
         film_um: measured there now. peak_um: thickest film to expect.
+        brush: number of the brush, that which sprayed the part longest.
     """
 
     position_m: np.ndarray
@@ -41,6 +42,7 @@ class Stand:
     flow: float
     film_um: float
     peak_um: float
+    brush: int
 
     @staticmethod
     def before(
@@ -69,13 +71,17 @@ class Stand:
             return None
         projection = model.projection
         away_m = standoff + projection.emission_offset_m
-        rate = flow * model.planar.peak_flux_um_per_s * (projection.model_plane_m / away_m) ** 2
+        numbers = np.unique(path.brush[spraying])
+        times_s = [path.dwell_s[spraying & (path.brush == number)].sum() for number in numbers]
+        brush = int(numbers[np.argmax(times_s)])
+        peak = model.painting_with(brush).planar.peak_flux_um_per_s
+        rate = flow * peak * (projection.model_plane_m / away_m) ** 2
         dwell = STEP_S * math.floor(most_um / rate / STEP_S + 1e-9)
         if not SHORTEST_S <= dwell <= LONGEST_S:
             return None
         return Stand(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
-            flow, float(experiment.means.mean_um[row]), rate * dwell,
+            flow, float(experiment.means.mean_um[row]), rate * dwell, brush,
         )  # fmt: skip
 
     def sprayed(self, experiment: Experiment) -> Experiment:
@@ -91,6 +97,7 @@ class Stand:
                 [round(1e9 * CLOSED_S), round(1e9 * (CLOSED_S + self.dwell_s))], dtype=np.int64
             ),
             trigger_flow=np.array([self.flow, 0.0]),
+            trigger_brush=np.full(2, self.brush),
         )
         path, _ = spray_path(motion)
         return replace(experiment, path=path)

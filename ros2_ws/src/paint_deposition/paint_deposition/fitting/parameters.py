@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -167,17 +168,15 @@ class FreeParameters:
         centre[own] = (known.centre[of_known] - self.offset[own]) / scale
         covariance[np.ix_(own, own)] = (
             known.matrix[np.ix_(of_known, of_known)] / np.outer(scale, scale)
-            + np.diag(self._between_jobs[own] ** 2)
+            + self._between_jobs[np.ix_(own, own)]
         )  # fmt: skip
         return Prior(centre, np.linalg.cholesky(covariance))
 
     @property
     def _between_jobs(self) -> np.ndarray:
-        """(k,) standard deviations of the entries between jobs."""
-        return np.array(
-            [c.between_jobs for c in self.pattern.coordinates]
-            + [EFFECT_BETWEEN_JOBS] * len(self.varied)
-        )
+        """(k, k) covariance of the entries between jobs."""
+        of_effects = EFFECT_BETWEEN_JOBS**2 * np.eye(len(self.varied))
+        return block_diag(self.pattern.between_jobs, of_effects)
 
     def encode(self, model: DepositionModel) -> np.ndarray:
         """The vector of a model that has the varied effects, kept inside the bounds."""

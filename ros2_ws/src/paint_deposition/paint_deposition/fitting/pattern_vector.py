@@ -2,7 +2,8 @@
 
 One pattern has the coordinates of ``model/coordinates.py``. Of several brushes the first has them
 all. Each other has its own too, but the phase of the asymmetry is the bell's and shared: in its
-place stands the logarithm of its K3 over that of the first.
+place stands the logarithm of its K3 over that of the first. From job to job brushes change nearly
+alike: what is known of one job makes its brushes move together in the next.
 """
 
 from collections.abc import Sequence
@@ -18,6 +19,9 @@ PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigm
 COS, SIN = 2, 3
 # Weak: between brushes the asymmetry keeps its order of magnitude.
 RATIO = Coordinate('log_K3_ratio', 0.0, 0.5, -2.0, 2.0, 0.06)
+# Share of the variance between jobs that all brushes have in common: batch, viscosity and the wear
+# of the cup are theirs alike, the settings are each one's own. An assumption.
+IN_COMMON = 0.9
 # A ratio has no value where the first brush has less asymmetry.
 LEAST_K3 = 1e-3
 
@@ -71,6 +75,22 @@ class PatternVector:
         """Entry of the ratio of a pattern that is not the first."""
         return int(self.entries(row)[1]) + 1
 
+    def in_common(self, deviations: np.ndarray) -> np.ndarray:
+        """(k, k) covariance with these standard deviations (k,) if all brushes change alike.
+
+        A ratio to the first brush changes by itself.
+        """
+        names = np.array([c.name.rpartition('.')[2] for c in self.coordinates])
+        same = (names[:, np.newaxis] == names) & (names != RATIO.name)
+        return np.outer(deviations, deviations) * (same | np.eye(len(names), dtype=bool))
+
+    @property
+    def between_jobs(self) -> np.ndarray:
+        """(k, k) covariance of the entries between jobs, most of it in all brushes alike."""
+        deviations = np.array([c.between_jobs for c in self.coordinates])
+        own = np.diag(deviations**2)
+        return IN_COMMON * self.in_common(deviations) + (1.0 - IN_COMMON) * own
+
     def of_patterns(self, vectors: np.ndarray) -> np.ndarray:
         """(n, B, 7) coordinates of each pattern for vectors (n, k); K3 may exceed 1."""
         found = np.stack([vectors[:, self.entries(row)] for row in range(self.count)], axis=1)
@@ -91,6 +111,32 @@ class PatternVector:
                 asymmetry[:, self._ratio(row)] = own[[COS, SIN]]
             block[[COS, SIN]] = _slopes_of_asymmetry(own[[COS, SIN]]) @ asymmetry
         return found
+
+    def out_of(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all.
+
+        Args:
+            whole: with these brushes and others.
+            vector: (n,) its entries.
+        """
+        rows = [whole.brushes.index(number) for number in self.brushes]
+        slope = np.zeros((len(self), len(whole)))
+        for row, there in enumerate(rows):
+            slope[self.entries(row), whole.entries(there)] = 1.0
+            if row:
+                slope[self._ratio(row), whole._ratio(there)] = 1.0
+        entries = slope @ vector
+        if rows[0]:
+            # Asymmetries that were told beside that of a brush which is left out.
+            left_out = whole._ratio(rows[0])
+            ratios = [self._ratio(row) for row in range(1, self.count)]
+            entries[ratios] -= vector[left_out]
+            slope[ratios, left_out] = -1.0
+            growth = np.exp(vector[left_out])
+            entries[[COS, SIN]] *= growth
+            slope[[COS, SIN]] *= growth
+            slope[[COS, SIN], left_out] = entries[[COS, SIN]]
+        return entries, slope
 
     def encode(self, patterns: Sequence[PlanarPattern]) -> list[float]:
         """The entries of these patterns."""

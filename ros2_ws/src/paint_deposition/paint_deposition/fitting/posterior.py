@@ -1,10 +1,13 @@
 """What a fit has learned, in the form in which the next one takes it as its prior."""
 
 import numpy as np
+from scipy.linalg import block_diag
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.estimates import scaled_covariance
 from paint_deposition.fitting.least_squares import Fit
+from paint_deposition.fitting.pattern_vector import PatternVector
 from paint_deposition.readings.campaign import Campaign
 
 # Settings that differ by a larger share than this are others.
@@ -25,6 +28,52 @@ def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None)
         readings=(*known, *fingerprints(campaign)),
         process=campaign.settings,
     )
+
+
+def of_brushes(
+    known: Posterior | None, given: DepositionModel, start: DepositionModel
+) -> Posterior | None:
+    """What is known of the brushes that painted a campaign.
+
+    Where nothing was calibrated, a model with several brushes still tells how they differ: their
+    level and size are open, and each may differ from the others as much as jobs do.
+
+    Args:
+        known: of the given model, or None. given: as it was read.
+        start: with the brushes of the campaign only.
+    """
+    kept = PatternVector(tuple(brush.number for brush in start.brushes))
+    whole = PatternVector(tuple(brush.number for brush in given.brushes))
+    if known is not None and {c.name for c in whole.coordinates} <= set(known.names):
+        return _select(known, whole, kept)
+    if kept.count == 1 or not given.brushes:
+        return None
+    deviations = np.array([c.between_jobs for c in kept.coordinates])
+    width = np.array([c.width for c in kept.coordinates])
+    covariance = kept.in_common(width) + np.diag(deviations**2)
+    names = [c.name for c in kept.coordinates]
+    return Posterior(
+        mean=dict(zip(names, map(float, kept.encode(start.patterns)), strict=True)),
+        covariance=dict(zip(names, covariance.tolist(), strict=True)),
+    )
+
+
+def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Posterior:
+    """The posterior of some brushes out of that of all; what else it tells stays."""
+    if whole.brushes == kept.brushes:
+        return known
+    names = [c.name for c in whole.coordinates]
+    of_effects = [name for name in known.names if name not in names]
+    entries, slope = kept.out_of(whole, np.array([known.mean[name] for name in names]))
+    mean = np.concatenate([entries, [known.mean[name] for name in of_effects]])
+    linear = block_diag(slope, np.eye(len(of_effects)))
+    order = [known.names.index(name) for name in (*names, *of_effects)]
+    matrix = linear @ known.matrix[np.ix_(order, order)] @ linear.T
+    new = [*(c.name for c in kept.coordinates), *of_effects]
+    return known.model_copy(update={
+        'mean': dict(zip(new, mean.tolist(), strict=True)),
+        'covariance': dict(zip(new, matrix.tolist(), strict=True)),
+    })  # fmt: skip
 
 
 def usable(

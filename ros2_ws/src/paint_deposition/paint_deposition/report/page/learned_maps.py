@@ -80,29 +80,35 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
 
 
 def footprint_figure(data: ReportData) -> dict[str, Any] | None:
-    """The pattern of eq. (1), the pattern as learned, and the factor between the two."""
+    """The patterns of eq. (1), the patterns as learned, and the factor between the two."""
     laws = [effect for effect in data.model.effects if isinstance(effect, LearnedFootprint)]
     if not laws:
         return None
-    reach = data.model.planar.radius_of_flux_m(FAINT)
+    patterns, brushes = data.model.patterns, data.model.brushes
+    reach = max(planar.radius_of_flux_m(FAINT) for planar in patterns)
     along = np.linspace(-reach, reach, CELLS)
     x, y = np.meshgrid(along, along)
-    plain = data.model.planar.flux_um_per_s(x, y)
+    plain = [planar.flux_um_per_s(x, y) for planar in patterns]
     factor = np.maximum(1.0 + laws[0].h(x, y), LEAST_FACTOR)
-    top = float(max(plain.max(), (plain * factor).max()))
-    panels = [
-        _Panel(title, 'tool x [m]', 'tool y [m]', along, along, values, FILM_COLOURS, 0.0, top)
+    of = [f' of brush {brush.number}' for brush in brushes] if len(brushes) > 1 else ['']
+    panels = []
+    for flux, whose in zip(plain, of, strict=True):
+        top = float(max(flux.max(), (flux * factor).max()))
         for title, values in (
-            ('pattern of eq. (1) [µm/s]', plain),
-            ('pattern as learned [µm/s]', plain * factor),
-        )
-    ]
-    title = 'factor, with contours of eq. (1)'
+            (f'pattern of eq. (1){whose} [µm/s]', flux),
+            (f'pattern as learned{whose} [µm/s]', flux * factor),
+        ):
+            panels.append(
+                _Panel(
+                    title, 'tool x [m]', 'tool y [m]', along, along, values, FILM_COLOURS, 0.0, top
+                )
+            )
+    title = f'factor, with contours of eq. (1){of[0]}'
     contours = [
         {
-            'type': 'contour', 'x': along, 'y': along, 'z': plain, 'showscale': False,
+            'type': 'contour', 'x': along, 'y': along, 'z': plain[0], 'showscale': False,
             'autocontour': False, 'hoverinfo': 'skip', 'line': {'color': MUTED, 'width': 1},
-            'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain.max()},
+            'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain[0].max()},
             'showlegend': False,
         }
         for share in CONTOURS
