@@ -54,6 +54,13 @@ def body_side(vertices: int) -> tuple[np.ndarray, np.ndarray]:
     return corners, quads[~window].reshape(-1, 3)
 
 
+def write_stl(path: Path, corners: np.ndarray, faces: np.ndarray) -> None:
+    """A binary STL of corners (V, 3) [m] and faces (F, 3)."""
+    triangles = np.zeros(len(faces), dtype=[('n', '<f4', 3), ('v', '<f4', (3, 3)), ('a', '<u2')])
+    triangles['v'] = corners[faces]
+    path.write_bytes(bytes(80) + np.uint32(len(faces)).tobytes() + triangles.tobytes())
+
+
 def write_inputs(
     folder: Path, vertices: int, passes: int = PASSES, rate_hz: float = RATE_HZ
 ) -> None:
@@ -62,10 +69,7 @@ def write_inputs(
     from paint_deposition.motion.trajectory import Trajectory
 
     corners, faces = body_side(vertices)
-    triangles = np.zeros(len(faces), dtype=[('n', '<f4', 3), ('v', '<f4', (3, 3)), ('a', '<u2')])
-    triangles['v'] = corners[faces]
-    head = bytes(80) + np.uint32(len(faces)).tobytes()
-    (folder / 'part.stl').write_bytes(head + triangles.tobytes())
+    write_stl(folder / 'part.stl', corners, faces)
     count = int(SECONDS / PASSES * passes * rate_hz)
     share = np.arange(count) / count * passes
     row, along = np.divmod(share, 1.0)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,9 +31,9 @@ class CommonFilm:
 
     guns: tuple[FilmIntegrator, ...]
 
-    @property
+    @cached_property
     def shares_um(self) -> tuple[np.ndarray, ...]:
-        """(V,) what each gun laid, before effects on the film [um]."""
+        """(V,) what each gun had laid when this was first asked for, as it arrived [um]."""
         return tuple(gun.raw_um for gun in self.guns)
 
     @property

@@ -24,7 +24,8 @@ from paint_deposition.nodes.painting.film_files import (
     film_to_save,
     laid_by,
 )
-from paint_deposition.nodes.painting.film_messages import ShownFilm, stats_message
+from paint_deposition.nodes.painting.film_messages import FilmChanges, ShownFilm, stats_message
+from paint_deposition.nodes.painting.large_topic import LargeTopic
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -57,7 +58,8 @@ SIMULATOR = dict(
     target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
     publish_mesh=NodeParameter(
         True,
-        'Whether the coloured mesh goes out; of 275,000 vertices it takes 65 MB each time [-]',
+        'Whether the coloured mesh goes out to whoever listens; of 275,000 vertices it takes 65 MB '
+        'each time [-]',
     ),
     output_directory=NodeParameter(
         'runs',
@@ -70,8 +72,8 @@ SIMULATOR = dict(
 class DepositionSimulator(PaintingNode):
     """Paints a mesh from `atomizer/pose` and `atomizer/state` and publishes the film.
 
-    Mesh (a Marker), legend and statistics are latched; cloud and field go out as the film
-    changes, and once more when somebody new listens. Everything shows all poses received.
+    Statistics and legend are latched. Mesh (a Marker), cloud, field and changes go to whoever
+    listens, as often as the link takes them. Everything shows all poses received.
     """
 
     PARAMETERS = SIMULATOR
@@ -82,13 +84,19 @@ class DepositionSimulator(PaintingNode):
         self._share_topics = [
             of_gun(name, 'thickness/field') for name in self.gun_names if len(self.gun_names) > 1
         ]
-        self._outputs = {
-            topic: self.watch.publisher(message, topic, profile)
+        self._legend, self._figures = (
+            self.watch.publisher(message, topic, qos.LATCHED)
+            for message, topic in (
+                (MarkerArray, 'thickness/legend'),
+                (ThicknessStats, 'thickness/stats'),
+            )
+        )
+        self._large = {
+            topic: LargeTopic(self.watch, message, topic, profile)
             for topic, message, profile in (
                 ('thickness/mesh', Marker, qos.LATCHED),
-                ('thickness/legend', MarkerArray, qos.LATCHED),
-                ('thickness/stats', ThicknessStats, qos.LATCHED),
                 ('thickness/cloud', PointCloud2, qos.RESULTS),
+                ('thickness/changes', PointCloud2, qos.RESULTS),
                 ('thickness/field', ThicknessField, qos.RESULTS),
                 *((topic, ThicknessField, qos.RESULTS) for topic in self._share_topics),
             )
@@ -99,7 +107,9 @@ class DepositionSimulator(PaintingNode):
         self._scale: ColourScale | None = None
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
-        self._greeted = 0
+        # Counts what has been shown: another film, or the same in other colours.
+        self._edition = 0
+        self._film_um = np.empty(0)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
         self.parts = PartChange(self, saving)
@@ -121,6 +131,7 @@ class DepositionSimulator(PaintingNode):
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
         self.shown_as = ShownFilm(surface, self.frame.frame_id)
+        self._changes = FilmChanges(self.shown_as)
 
     def prepared_part(self, mesh_file: str) -> PreparedPart:
         """Read a part that is to come; in a thread of its own."""
@@ -135,6 +146,7 @@ class DepositionSimulator(PaintingNode):
     def show_anew(self) -> None:
         """The part is another one."""
         self._shown = self._scale = None
+        self._changes = FilmChanges(self.shown_as)
 
     # --- parameters
 
@@ -153,45 +165,62 @@ class DepositionSimulator(PaintingNode):
     # --- publishing
 
     def publish(self) -> None:
-        """Publish the film if it has changed, or somebody new listens."""
+        """Publish the film if it has changed, or somebody has not heard of it yet."""
         began_s = time.monotonic()
         self.up_to_date()
         film = self.film.up_to_date()
-        newcomers = self.watch.newcomers
-        news = film != self._shown
-        if news or newcomers > self._greeted:
-            self._publish_film(film, with_latched=news)
+        changed = film != self._shown
+        if changed:
+            self._sum_up(film)
+        self._shown = film
+        self._offer(film, at_rest=not changed)
+        if changed:
             self._publish_s = time.monotonic() - began_s
-        self._shown, self._greeted = film, newcomers
         self._publish_stats()
 
-    def _publish_film(self, film: CommonFilm, with_latched: bool) -> None:
-        film_um = film.film_um
-        stamp_ns = self.film.newest_ns or 0
-        cloud, field = self.shown_as.cloud, self.shown_as.field
-        self._outputs['thickness/cloud'].publish(cloud.message(stamp_ns, film_um))
-        self._outputs['thickness/field'].publish(field.message(stamp_ns, film_um))
-        if self._share_topics:
-            for topic, share_um in zip(self._share_topics, film.shares_um, strict=True):
-                self._outputs[topic].publish(field.message(stamp_ns, share_um))
-        if not with_latched:
-            return
+    def _sum_up(self, film: CommonFilm) -> None:
+        """Take a film as the one that is shown, with its figures and its legend."""
+        self._edition += 1
+        self._film_um = film_um = film.film_um
         figures = figures_of(self.values, self.surface, film_um, film.emitted_cm3)
         laid_cm3 = laid_by(self.gun_names, self.surface, film)
+        stamp_ns = self.film.newest_ns or 0
         self._stats = stats_message(self.frame.frame_id, stamp_ns, figures, laid_cm3)
         self._stats.run = self.parts.part.run
         self._counts_shown = None
+        before = self._scale
         scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
-        rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
+        self._scale = scale
+        if before is None or (scale.low, scale.high) != (before.low, before.high):
+            self._legend.publish(legend(scale, 'µm', self.surface, self.frame.frame_id))
+
+    def _offer(self, film: CommonFilm, at_rest: bool) -> None:
+        """Let those who listen have the film that is shown."""
+        film_um, shown_as = self._film_um, self.shown_as
+        stamp_ns = self.film.newest_ns or 0
+
+        def mesh() -> bytes:
+            shown = film_um > self.values['painted_above_um']
+            rows = self._scale.rows(film_um, shown)
+            return shown_as.mesh.serialised(stamp_ns, self._scale.palette, rows)
+
         if self.values['publish_mesh']:
-            self._outputs['thickness/mesh'].publish(
-                self.shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
+            self._large['thickness/mesh'].offer(self._edition, lambda _: mesh())
+        self._large['thickness/cloud'].offer(
+            self._edition, lambda _: shown_as.cloud.message(stamp_ns, film_um)
+        )
+        self._large['thickness/field'].offer(
+            self._edition, lambda _: shown_as.field.message(stamp_ns, film_um)
+        )
+        for number, topic in enumerate(self._share_topics):
+            self._large[topic].offer(
+                self._edition,
+                lambda _, gun=number: shown_as.field.message(stamp_ns, film.shares_um[gun]),
             )
-        if self._scale is None or (scale.low, scale.high) != (self._scale.low, self._scale.high):
-            self._scale = scale
-            self._outputs['thickness/legend'].publish(
-                legend(scale, 'µm', self.surface, self.frame.frame_id)
-            )
+        self._large['thickness/changes'].offer(
+            (self._edition, at_rest),
+            lambda anew: self._changes.message(stamp_ns, film_um, anew, at_rest),
+        )
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""
@@ -209,7 +238,7 @@ class DepositionSimulator(PaintingNode):
         message = self._stats
         message.poses_received, message.poses_rejected, message.pose_gaps = shown[:3]
         message.longest_gap_s = shown[3]
-        self._outputs['thickness/stats'].publish(message)
+        self._figures.publish(message)
 
     # --- services
 

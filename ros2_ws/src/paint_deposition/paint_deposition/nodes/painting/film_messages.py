@@ -5,19 +5,21 @@ from __future__ import annotations
 import sys
 from array import array
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.part.surface import Surface
 
 
 class ShownFilm:
-    """A part as the simulator shows it: mesh, cloud and field, ready to be filled.
+    """A part as the simulator shows it: its messages, each made when it is first asked for.
 
     Attributes:
         mesh_id: digest of the refined mesh.
@@ -25,9 +27,20 @@ class ShownFilm:
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
         self.mesh_id = surface.mesh_id
-        self.mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
-        self.cloud = FilmCloud(surface.vertices_m, frame_id)
-        self.field = FilmField(len(surface.vertices_m), self.mesh_id, frame_id)
+        self._surface, self._frame_id = surface, frame_id
+
+    @cached_property
+    def mesh(self) -> ColouredMesh:
+        surface = self._surface
+        return ColouredMesh(surface.vertices_m, surface.faces, self._frame_id, 'thickness')
+
+    @cached_property
+    def cloud(self) -> FilmCloud:
+        return FilmCloud(self._surface.vertices_m, self._frame_id)
+
+    @cached_property
+    def field(self) -> FilmField:
+        return FilmField(len(self._surface.vertices_m), self.mesh_id, self._frame_id)
 
 
 def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
@@ -36,35 +49,86 @@ def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
     return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
+def _cloud(frame_id: str, layout: np.dtype, points: int) -> tuple[PointCloud2, np.ndarray]:
+    """A cloud of so many points, and its (points,) values to fill; four bytes each field."""
+    kinds = {np.dtype(np.float32): PointField.FLOAT32, np.dtype(np.uint32): PointField.UINT32}
+    message = PointCloud2(
+        height=1,
+        width=points,
+        fields=[
+            PointField(name=name, offset=offset, datatype=kinds[kind], count=1)
+            for name, (kind, offset) in layout.fields.items()
+        ],
+        is_bigendian=sys.byteorder == 'big',
+        point_step=layout.itemsize,
+        row_step=layout.itemsize * points,
+        data=array('B', bytes(layout.itemsize * points)),
+        is_dense=True,
+        header=header(frame_id, 0),
+    )
+    return message, np.frombuffer(message.data, layout)
+
+
 class FilmCloud:
     """A PointCloud2 with x, y, z [m] and thickness_um, filled in place."""
 
-    FIELDS = ('x', 'y', 'z', 'thickness_um')
+    LAYOUT = np.dtype([(name, np.float32) for name in ('x', 'y', 'z', 'thickness_um')])
 
     def __init__(self, positions_m: np.ndarray, frame_id: str) -> None:
-        size = 4 * len(self.FIELDS)
-        self._message = PointCloud2(
-            height=1,
-            width=len(positions_m),
-            fields=[
-                PointField(name=name, offset=4 * k, datatype=PointField.FLOAT32, count=1)
-                for k, name in enumerate(self.FIELDS)
-            ],
-            is_bigendian=sys.byteorder == 'big',
-            point_step=size,
-            row_step=size * len(positions_m),
-            data=array('B', bytes(size * len(positions_m))),
-            is_dense=True,
-            header=header(frame_id, 0),
-        )
-        self._values = np.frombuffer(self._message.data, np.float32).reshape(-1, len(self.FIELDS))
-        self._values[:, :3] = positions_m
+        self.frame_id, self.positions_m = frame_id, positions_m
+        self._message, self._values = _cloud(frame_id, self.LAYOUT, len(positions_m))
+        for name, column in zip('xyz', positions_m.T, strict=True):
+            self._values[name] = column
 
     def message(self, stamp_ns: int, film_um: np.ndarray) -> PointCloud2:
         """The one message that is filled; publish it before the next call."""
         self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self._values[:, 3] = film_um
+        self._values['thickness_um'] = film_um
         return self._message
+
+
+class FilmChanges:
+    """Clouds of the points whose film has changed since they were last in one.
+
+    The first holds the whole film, a point for each vertex in their order. The others have one
+    more field, the number of the vertex.
+
+    Args:
+        shown_as: the part, its cloud used for the whole film.
+    """
+
+    LAYOUT = np.dtype([*FilmCloud.LAYOUT.descr, ('vertex', np.uint32)])
+
+    def __init__(self, shown_as: ShownFilm) -> None:
+        self._shown_as = shown_as
+        self._told_um: np.ndarray | None = None
+
+    def message(
+        self, stamp_ns: int, film_um: np.ndarray, whole: bool, exact: bool
+    ) -> PointCloud2 | None:
+        """What has changed, None if nothing has; publish it before the next call.
+
+        Args:
+            film_um: (V,) the film as it is now [um].
+            whole: tell all of it, as the first time.
+            exact: tell every change, also what no gauge would show.
+        """
+        cloud = self._shown_as.cloud
+        if whole or self._told_um is None:
+            self._told_um = film_um.astype(np.float32)
+            return cloud.message(stamp_ns, film_um)
+        now_um = film_um.astype(np.float32)
+        change_um = np.abs(now_um - self._told_um)
+        vertices = np.flatnonzero(change_um > (0.0 if exact else NO_PAINT_UM))
+        if not len(vertices):
+            return None
+        message, values = _cloud(cloud.frame_id, self.LAYOUT, len(vertices))
+        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
+        for name, column in zip('xyz', cloud.positions_m[vertices].T, strict=True):
+            values[name] = column
+        values['thickness_um'] = self._told_um[vertices] = now_um[vertices]
+        values['vertex'] = vertices
+        return message
 
 
 class FilmField:

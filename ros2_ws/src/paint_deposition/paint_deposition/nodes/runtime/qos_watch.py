@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
@@ -18,7 +20,8 @@ class QosWatch:
 
     Attributes:
         lost_messages: messages that the middleware says it lost.
-        newcomers: subscribers that the publishers have found so far, also those that left since.
+        newcomers: subscribers that each topic's publisher has found so far, also those that left
+            since.
     """
 
     def __init__(self, node: Node) -> None:
@@ -27,7 +30,7 @@ class QosWatch:
         self._outputs: dict[str, Publisher] = {}
         self._told: dict[str, str] = {}
         self.lost_messages = 0
-        self.newcomers = 0
+        self.newcomers: Counter[str] = Counter()
 
     def subscription(
         self, message: type, topic: str, take: Callable[..., None], profile: QoSProfile
@@ -49,7 +52,7 @@ class QosWatch:
     def publisher(self, message: type, topic: str, profile: QoSProfile) -> Publisher:
         """Make a publisher, and watch its subscribers."""
         callbacks = PublisherEventCallbacks(
-            matched=self._count_newcomers, use_default_callbacks=False
+            matched=partial(self._count_newcomers, topic), use_default_callbacks=False
         )
         self._outputs[topic] = self._node.create_publisher(
             message, topic, profile, event_callbacks=callbacks
@@ -87,8 +90,8 @@ class QosWatch:
     def _asked(self, topic: str) -> QoSProfile:
         return self._inputs[topic].qos_profile
 
-    def _count_newcomers(self, event: Any) -> None:
-        self.newcomers += event.total_count_change
+    def _count_newcomers(self, topic: str, event: Any) -> None:
+        self.newcomers[topic] += event.total_count_change
 
     def _count_lost(self, event: Any) -> None:
         self.lost_messages += event.total_count_change

@@ -1,0 +1,278 @@
+"""A cell of two guns on a large part: what the simulator takes, and how old its figures are.
+
+    python benchmarks/live.py [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
+
+The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are processes
+of their own on one machine; messages go through the real middleware. The simulator starts twice, on
+a new part and on one seen before, and then runs once for each way to watch: nobody, or somebody who
+takes a topic as bytes. A pose's age is the time from its stamp, which is when it is sent, to the
+arrival of the first statistics that are no older. Processor time is that of the simulator, all
+threads, until it has painted everything, over the time of the motion.
+"""
+
+import argparse
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from file_to_film import COARSER_THAN_ANY_M, HEIGHT_M, LENGTH_M, STANDOFF_M, body_side, write_stl
+
+GUNS = ('robot_1', 'robot_2')
+RATE_HZ = 250
+SPEED_M_PER_S = 0.5
+WATCHED = ('', 'thickness/changes', 'thickness/field', 'thickness/cloud', 'thickness/mesh')
+# Poses before are not counted: queues and caches fill.
+WARM_S = 2.0
+READY_WITHIN_S = 120.0
+HEARD_WITHIN_S = 30.0
+CLOCK_HZ = os.sysconf('SC_CLK_TCK')
+
+
+def cpu_s(process: subprocess.Popen) -> float:
+    """Processor time of a process so far [s]."""
+    fields = Path(f'/proc/{process.pid}/stat').read_text().rsplit(')', 1)[1].split()
+    return (int(fields[11]) + int(fields[12])) / CLOCK_HZ
+
+
+def peak_mb(process: subprocess.Popen) -> float:
+    """Most memory that a process held so far [MB]."""
+    status = Path(f'/proc/{process.pid}/status').read_text()
+    return int(re.search(r'VmHWM:\s+(\d+)', status)[1]) / 1024
+
+
+def start_simulator(running: ExitStack, folder: Path) -> tuple[subprocess.Popen, float]:
+    """The simulator on the folder's part, and the time to `ready` in its log [s]."""
+    arguments = {
+        'mesh_file': folder / 'part.stl',
+        'max_edge_length_m': COARSER_THAN_ANY_M,
+        'atomizers': f'[{", ".join(GUNS)}]',
+        'output_directory': folder,
+    }
+    given = [part for name, value in arguments.items() for part in ('-p', f'{name}:={value}')]
+    log = folder / 'simulator.log'
+    with log.open('wb') as file:
+        began_s = time.monotonic()
+        process = subprocess.Popen(
+            ['deposition_simulator', '--ros-args', *given], stdout=file, stderr=file
+        )
+    running.callback(process.wait, 60)
+    running.callback(process.terminate)
+    while b': ready' not in log.read_bytes():
+        if process.poll() is not None or time.monotonic() - began_s > READY_WITHIN_S:
+            raise SystemExit(f'the simulator does not get ready:\n{log.read_text()}')
+        time.sleep(0.002)
+    return process, time.monotonic() - began_s
+
+
+def start_watching(running: ExitStack, topic: str) -> subprocess.Popen:
+    """A process that takes a topic as bytes until it is told to stop."""
+    process = subprocess.Popen(
+        [sys.executable, __file__, '--watch-only', topic],
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+    )  # fmt: skip
+    running.callback(process.kill)
+    process.stdout.readline()
+    return process
+
+
+def watch(topic: str) -> None:
+    """Take a topic's messages as bytes; say how many there were, and how large, in the end."""
+    import threading
+
+    import rclpy
+    from paint_msgs.msg import ThicknessField
+    from rclpy.qos import QoSProfile
+    from sensor_msgs.msg import PointCloud2
+    from visualization_msgs.msg import Marker
+
+    types = {'thickness/field': ThicknessField, 'thickness/mesh': Marker}
+    sizes: list[int] = []
+    stop = threading.Event()
+    rclpy.init()
+    node = rclpy.create_node('watcher')
+    node.create_subscription(
+        types.get(topic, PointCloud2), topic, lambda data: sizes.append(len(data)),
+        QoSProfile(depth=10), raw=True,
+    )  # fmt: skip
+    threading.Thread(target=lambda: (sys.stdin.readline(), stop.set()), daemon=True).start()
+    print('watching', flush=True)
+    while not stop.is_set():
+        rclpy.spin_once(node, timeout_sec=0.1)
+    print(json.dumps({'messages': len(sizes), 'bytes': sum(sizes)}))
+    rclpy.try_shutdown()
+
+
+class Robots:
+    """Publishes the poses of both guns, and notes when statistics arrive."""
+
+    def __init__(self) -> None:
+        import rclpy
+        from geometry_msgs.msg import PoseStamped
+        from paint_msgs.msg import AtomizerState, ThicknessStats
+        from rclpy.qos import DurabilityPolicy, QoSProfile
+
+        rclpy.init()
+        self._node = rclpy.create_node('robots')
+        profile = QoSProfile(depth=2000)
+        self._poses, self._states = (
+            [self._node.create_publisher(kind, f'{gun}/atomizer/{topic}', profile) for gun in GUNS]
+            for kind, topic in ((PoseStamped, 'pose'), (AtomizerState, 'state'))
+        )
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._node.create_subscription(ThicknessStats, 'thickness/stats', self._note, latched)
+        self.arrived: list[tuple[int, int]] = []
+        self.received = 0
+
+    def __enter__(self) -> 'Robots':
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        import rclpy
+
+        self._node.destroy_node()
+        rclpy.try_shutdown()
+
+    def _note(self, stats: Any) -> None:
+        stamp = stats.header.stamp
+        self.arrived.append((stamp.sec * 1_000_000_000 + stamp.nanosec, time.time_ns()))
+        self.received = stats.poses_received
+
+    def _spin(self, seconds: float) -> None:
+        import rclpy
+
+        rclpy.spin_once(self._node, timeout_sec=max(0.0, seconds))
+
+    def wait_until_heard(self) -> None:
+        """Wait until the simulator listens to everything."""
+        deadline = time.monotonic() + HEARD_WITHIN_S
+        while not all(each.get_subscription_count() for each in (*self._poses, *self._states)):
+            if time.monotonic() > deadline:
+                raise SystemExit('the simulator does not listen')
+            self._spin(0.05)
+        for _ in range(10):
+            self._spin(0.05)
+
+    def paint(self, seconds: float) -> np.ndarray:
+        """Both guns to and fro, one on the upper and one on the lower half; the stamps [ns]."""
+        from geometry_msgs.msg import PoseStamped
+        from paint_msgs.msg import AtomizerState
+        from rclpy.time import Time
+
+        message = PoseStamped()
+        message.header.frame_id = 'part'
+        q, p = message.pose.orientation, message.pose.position
+        q.x, q.w, p.y = -float(np.sqrt(0.5)), float(np.sqrt(0.5)), -STANDOFF_M
+        began_s, stamps = time.monotonic(), []
+        for row in range(round(seconds * RATE_HZ)):
+            at_s = row / RATE_HZ
+            while (early_s := began_s + at_s - time.monotonic()) > 0.0:
+                self._spin(early_s)
+            now = time.time_ns()
+            message.header.stamp = Time(nanoseconds=now).to_msg()
+            stamps.append(now)
+            number, along = divmod(at_s * SPEED_M_PER_S / LENGTH_M, 1.0)
+            for gun, publisher in enumerate(self._poses):
+                p.x = LENGTH_M * (along if (number + gun) % 2 == 0 else 1.0 - along)
+                p.z = HEIGHT_M / 2 * (gun + (0.15 + 0.2 * number) % 1.0)
+                if row == 0:
+                    state = AtomizerState(spraying=True)
+                    state.header.stamp = message.header.stamp
+                    self._states[gun].publish(state)
+                publisher.publish(message)
+        return np.array(stamps)
+
+    def wait_for_all(self, count: int) -> None:
+        """Wait for statistics of so many poses."""
+        deadline = time.monotonic() + HEARD_WITHIN_S
+        while self.received < count and time.monotonic() < deadline:
+            self._spin(0.05)
+
+
+def ages_s(stamps_ns: np.ndarray, arrived: list[tuple[int, int]]) -> np.ndarray:
+    """From each pose to the first statistics that are no older [s]; inf where none came."""
+    newest, came = np.array(arrived).T
+    first = np.searchsorted(np.maximum.accumulate(newest), stamps_ns)
+    came = np.append(came.astype(float), np.inf)
+    return (came[first] - stamps_ns) * 1e-9
+
+
+def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
+    """One run of the cell with somebody who takes a topic, '' for nobody."""
+    with ExitStack() as running:
+        simulator, ready_s = start_simulator(running, folder)
+        robots = running.enter_context(Robots())
+        robots.wait_until_heard()
+        watcher = start_watching(running, topic) if topic else None
+        began_s, began_cpu_s = time.monotonic(), cpu_s(simulator)
+        stamps = robots.paint(seconds)
+        lasted_s = time.monotonic() - began_s
+        robots.wait_for_all(len(GUNS) * len(stamps))
+        share = (cpu_s(simulator) - began_cpu_s) / lasted_s
+        ages = ages_s(stamps[stamps > stamps[0] + WARM_S * 1e9], robots.arrived)
+        seen = {'messages': 0, 'bytes': 0}
+        if watcher:
+            seen = json.loads(watcher.communicate('stop\n', timeout=60)[0])
+        return {
+            'watched': topic or 'nobody',
+            'ready_s': ready_s,
+            'processor_share': share,
+            'age_median_s': float(np.median(ages)),
+            'age_95_s': float(np.quantile(ages, 0.95, method='higher')),
+            'poses_sent': len(GUNS) * len(stamps),
+            'poses_received': robots.received,
+            'messages_per_s': seen['messages'] / lasted_s,
+            'mb_per_s': seen['bytes'] / lasted_s * 1e-6,
+            'memory_mb': peak_mb(simulator),
+        }
+
+
+def main() -> None:
+    """Measure all ways to watch."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('--vertices', type=int, default=500_000)
+    parser.add_argument('--seconds', type=float, default=20.0, help='of motion in each run')
+    parser.add_argument('--watch', nargs='*', default=WATCHED, help="topics; '' is nobody")
+    parser.add_argument('--json', type=Path, help='also write the figures to this file')
+    parser.add_argument('--watch-only', help=argparse.SUPPRESS)
+    given = parser.parse_args()
+    if given.watch_only:
+        watch(given.watch_only)
+        return
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        os.environ['PAINT_CACHE_DIR'] = str(folder / 'cache')
+        corners, faces = body_side(given.vertices)
+        write_stl(folder / 'part.stl', corners, faces)
+        with ExitStack() as running:
+            new_s = start_simulator(running, folder)[1]
+        print(
+            f'{len(np.unique(faces))} vertices, two guns at {RATE_HZ} Hz; ready after '
+            f'{new_s:.1f} s on a new part\n{"watched":20}{"ready":>8}{"processor":>11}'
+            f'{"age of a pose, 50, 95 %":>25}{"messages/s":>12}{"MB/s":>8}{"memory":>10}{"lost":>6}'
+        )
+        rows = []
+        for topic in given.watch:
+            row = measure(folder, given.seconds, topic)
+            rows.append(row)
+            print(
+                f'{row["watched"]:20}{row["ready_s"]:6.2f} s{row["processor_share"]:9.0%}  '
+                f'{row["age_median_s"] * 1e3:13.0f}, {row["age_95_s"] * 1e3:.0f} ms'
+                f'{row["messages_per_s"]:12.1f}{row["mb_per_s"]:8.1f}{row["memory_mb"]:7.0f} MB'
+                f'{row["poses_sent"] - row["poses_received"]:6}',
+                flush=True,
+            )
+    if given.json:
+        record = {'vertices': given.vertices, 'new_part_ready_s': new_s, 'runs': rows}
+        given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
+
+
+if __name__ == '__main__':
+    main()
