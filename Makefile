@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-next bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -33,6 +33,9 @@ bench: build  ## measure the speed of the film integral, of simulate and of the 
 
 bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
+
+bench-brushes: build  ## count false alarms and effects found on parts that two brushes painted
+	@$(IN_ENVIRONMENT) python benchmarks/brushes.py $(ARGS)
 
 bench-measure: build  ## count the readings that chosen points save
 	@$(IN_ENVIRONMENT) python benchmarks/measure.py $(ARGS)

@@ -26,6 +26,7 @@ def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
     return Posterior(
         mean=dict(zip(parameters.coordinates, centre.tolist(), strict=True)),
         covariance=dict(zip(parameters.coordinates, covariance.tolist(), strict=True)),
+        readings=('those of another job',),
     )
 
 

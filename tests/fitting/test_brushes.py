@@ -15,10 +15,12 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.fitting.least_squares import derivatives
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.pattern_vector import PATTERN_NAMES, PatternVector
+from paint_deposition.fitting.posterior import of_brushes
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.brush import Brush
 from paint_deposition.model.coordinates import PATTERN
@@ -193,5 +195,83 @@ def test_models_without_the_brushes_of_a_campaign_are_refused(campaign):
         calibrate(campaign, two_brushes())
     with pytest.raises(ModelError, match='brushes 1, 4 are used and the model has the pattern of'):
         compare(campaign, DepositionModel())
-    with pytest.raises(ModelError, match='a diagnosis is for one brush and the model has 1, 4'):
-        diagnose(campaign, TRUTH)
+    with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
+        diagnose(campaign, two_brushes())
+
+
+# --- what is known of one job, for the next
+
+THREE = PatternVector((1, 4, 7))
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(st.floats(-0.5, 0.5), min_size=19, max_size=19),
+    st.sampled_from([(1,), (4,), (7,), (1, 7), (4, 7), (1, 4, 7)]),
+)
+def test_some_brushes_out_of_all_keep_their_patterns(shifts, numbers):
+    kept = PatternVector(numbers)
+    centre = np.array(THREE.encode([FIRST, SECOND, FIRST]))
+
+    def patterns(vector: PatternVector, entries: np.ndarray) -> np.ndarray:
+        return vector.of_patterns(entries[np.newaxis])[0]
+
+    vector = centre + 0.3 * np.array(shifts)
+    entries, slope = kept.out_of(THREE, vector)
+    rows = [THREE.brushes.index(number) for number in numbers]
+    np.testing.assert_allclose(patterns(kept, entries), patterns(THREE, vector)[rows], rtol=1e-12)
+    steps = 1e-6 * np.eye(19)
+    found = [
+        (kept.out_of(THREE, vector + s)[0] - kept.out_of(THREE, vector - s)[0]) for s in steps
+    ]
+    np.testing.assert_allclose(slope, np.array(found).T / 2e-6, atol=1e-8)
+
+
+def known_of(model: DepositionModel, deviation: float = 0.02) -> Posterior:
+    """A calibration of these brushes, each entry known by itself."""
+    vector = PatternVector(tuple(brush.number for brush in model.brushes))
+    names = [c.name for c in vector.coordinates]
+    mean = dict(zip(names, map(float, vector.encode(model.patterns)), strict=True))
+    rows = (deviation**2 * np.eye(len(names))).tolist()
+    return Posterior(mean=mean, covariance=dict(zip(names, rows, strict=True)), readings=('a',))
+
+
+def spread(known: Posterior, model: DepositionModel, first: str, second: str) -> tuple[float, ...]:
+    """Prior deviations in a job of two coordinates, and of the difference of the two."""
+    parameters = FreeParameters.of(model, known=known)
+    factor = parameters.prior.factor
+    i, j = (parameters.coordinates.index(name) for name in (first, second))
+    covariance = factor @ factor.T
+    apart = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
+    return tuple(np.sqrt([covariance[i, i], covariance[j, j], apart]).tolist())
+
+
+def test_brushes_change_together_from_job_to_job():
+    """Level and widths go with the paint and the cup; the brushes' ratio hardly changes."""
+    known = of_brushes(known_of(TRUTH), TRUTH, TRUTH)
+    one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
+    assert one == other == pytest.approx(np.hypot(0.1, 0.02))
+    # The calibration's own uncertainty of each, and a tenth of the variance between jobs.
+    assert apart == pytest.approx(np.sqrt(2.0 * (0.02**2 + 0.1 * 0.1**2)))
+
+
+def test_a_model_without_a_calibration_tells_how_its_brushes_differ():
+    """Their level is open, and their ratio is known as well as jobs differ."""
+    known = of_brushes(None, TRUTH, TRUTH)
+    one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
+    assert one == other > 2.0
+    assert apart == pytest.approx(np.sqrt(2.0 * (0.1**2 + 0.1 * 0.1**2)), rel=1e-6)
+    assert of_brushes(None, DepositionModel(), TRUTH) is None
+
+
+def test_a_job_of_one_brush_rests_on_the_calibration_of_all():
+    second = TRUTH.of_numbers({4})
+    known = of_brushes(known_of(TRUTH), TRUTH, second)
+    assert known.names == tuple(c.name for c in PATTERN)
+    assert known.readings == ('a',)
+    np.testing.assert_allclose(known.centre, PatternVector((4,)).encode([SECOND]), rtol=1e-12)
+    # The size of its asymmetry is told beside the first's: both are uncertain.
+    size = np.hypot(known.matrix[2, 2], known.matrix[3, 3])
+    ratio = SECOND.K3 / FIRST.K3
+    assert size > 0.02**2 * ratio**2
+    assert of_brushes(None, TRUTH, second) is None
