@@ -51,6 +51,8 @@ class PaintingNode(PaintNode, ABC):
         model_problem: why the last models that were set are not used, '' if they are.
     """
 
+    catching_up: CatchingUp | None = None
+
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.watch = QosWatch(self)
@@ -72,7 +74,6 @@ class PaintingNode(PaintNode, ABC):
         self._held: list[tuple[int, PoseBatch | TriggerChange]] | None = None
         self.model_problem = ''
         self.repainting: Repainting | None = None
-        self.catching_up: CatchingUp | None = None
         self._outward = OutwardSide(len(self.gun_names))
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
