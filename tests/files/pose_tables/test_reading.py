@@ -190,6 +190,10 @@ QUATERNION = 'qx,qy,qz,qw\n0,0,0,0,0,0,0,1'
         ('t,x,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0,1\n', 'x x could all be x; keep one'),
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
         ('t,x,y,z,qx,qy,qz,qw\nnan,0,0,0,0,0,0,1\n', 'not finite'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1e3081,0,0,0,0,0,0,1\n', 'not finite'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1e300,0,0,0,0,0,0,1\n', 'spans 1e+300 s'),
+        ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
+        ('t,x,y,z,qx,qy,qz,"qw\n0,0,0,0,0,0,0,1\n', 'quotation mark in it is not closed'),
         ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],
 )  # fmt: skip

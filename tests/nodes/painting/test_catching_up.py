@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 pytest.importorskip('rclpy')
 
 from paint_msgs.msg import ThicknessStats
+from paint_msgs.srv import ChangePart
+from std_srvs.srv import Trigger
 
 from nodes.cell import Robot, offline_um, two_passes, write_panel
 from nodes.processes import NodeProcess
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import qos
 
 POSES = 900
@@ -54,3 +60,52 @@ def test_a_recording_that_is_not_there_is_told_and_the_live_poses_are_painted(
     film, expected = painted(node, POSES), offline_um(node, MOTION)
     assert np.array_equal(film, expected)
     assert f'not caught up: {tmp_path}/nowhere does not exist' in capfd.readouterr().err
+
+
+def poses_of(motion: Trajectory, rows: slice) -> Trajectory:
+    """Some of the poses, and the trigger as far as they go."""
+    stamps = motion.stamps_ns[rows]
+    sent = motion.trigger_stamps_ns <= stamps[-1]
+    return replace(
+        motion,
+        stamps_ns=stamps,
+        positions_m=motion.positions_m[rows],
+        quaternions_xyzw=motion.quaternions_xyzw[rows],
+        trigger_stamps_ns=motion.trigger_stamps_ns[sent],
+        trigger_flow=motion.trigger_flow[sent],
+    )
+
+
+def test_another_part_does_not_come_while_the_film_is_caught_up(
+    simulator, robot, painted, call, onlooker, tmp_path
+):
+    """The answer says so; the film is whole, and then the next part may come."""
+    run = write_pose_bag(tmp_path / 'run', poses_of(MOTION, slice(0, AGAIN_AT)))
+    node = simulator(catch_up=str(run), pose_queue_depth=2000)
+    operator, cell = onlooker({}), robot(node)
+
+    def change() -> ChangePart.Response:
+        request = ChangePart.Request(serial='next')
+        return call(operator, ChangePart, '/deposition_simulator/change_part', request)
+
+    refused = change()
+    assert not refused.success
+    assert refused.message.startswith(f'the film is being caught up from {run}: ask again')
+    cell.send(MOTION, slice(AGAIN_AT, POSES))
+    assert np.array_equal(painted(node, POSES), offline_um(node, MOTION))
+    assert change().success
+    assert node.film.counts.received == 0
+
+
+def test_a_reset_gives_up_what_was_to_be_caught_up(
+    simulator, robot, painted, call, onlooker, tmp_path, capfd
+):
+    motion = two_passes(poses=POSES, trigger=False)
+    run = write_pose_bag(tmp_path / 'run', poses_of(motion, slice(0, AGAIN_AT)))
+    node = simulator(catch_up=str(run), pose_queue_depth=2000)
+    cell = robot(node)
+    assert call(onlooker({}), Trigger, '/deposition_simulator/reset', Trigger.Request()).success
+    assert f'not caught up from {run}: it was reset' in capfd.readouterr().err
+    rest = poses_of(motion, slice(AGAIN_AT, POSES))
+    cell.send(rest)
+    assert np.array_equal(painted(node, len(rest)), offline_um(node, rest))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
@@ -70,6 +71,8 @@ class PoseTable:
             raise RecordingError(f'{path}: one column only; separate columns by commas')
         texts = list(csv.reader((lines[k] for k in used), delimiter=separator))
         rows = [[cell.strip() for cell in row] for row in texts]
+        if len(rows) < 2:
+            raise RecordingError(f'{path}: no poses; a quotation mark in it is not closed')
         headings = Headings([Heading.of(text) for text in rows[0]])
         comma = separator != ',' and any(',' in cell for row in rows[1:] for cell in row)
         return PoseTable(headings, rows[1:], [k + 1 for k in used[1:]], comma)
@@ -105,21 +108,21 @@ class PoseTable:
         unit = self.headings.all[column].unit or 's'
         if unit not in h.TIMES:
             raise RecordingError(f"{self.headings.written([column])}: '{unit}' is no unit of time")
-        self.numbers([column])
-        scale = Decimal(round(h.UNITS[unit] * 1e9))
+        written, scale = self.headings.written([column]), round(h.UNITS[unit] * 1e9)
+        times = self.numbers([column])[:, 0].tolist()
+        if not all(map(math.isfinite, times)):
+            raise RecordingError(f'{written} has a time that is not finite')
+        # Written out, a time of a few letters may have a thousand million digits.
+        span_s = (max(times) - min(times)) * h.UNITS[unit]
+        if span_s > LONGEST_RUN_S or max(map(abs, times)) * scale >= 2**63:
+            raise RecordingError(
+                f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
+            )
         try:
             cells = [row[column].replace(',', '.') for row in self.rows]
             stamps = [round(Decimal(cell) * scale) for cell in cells]
-        except (InvalidOperation, ValueError, OverflowError):
-            raise RecordingError(
-                f'{self.headings.written([column])} has a time that is not finite'
-            ) from None
-        span_s = (max(stamps) - min(stamps)) * 1e-9
-        if span_s > LONGEST_RUN_S or max(map(abs, stamps)) >= 2**63:
-            raise RecordingError(
-                f'{self.headings.written([column])} spans {span_s:.3g} s; write its unit in the '
-                'heading, as in time [ms]'
-            )
+        except InvalidOperation:
+            raise RecordingError(f'{written} has a word for a number; give numbers') from None
         return np.array(stamps, dtype=np.int64), unit
 
     @cached_property

@@ -30,27 +30,41 @@ class CatchingUp:
     Args:
         node: that has just been made.
         folder: of the running recording.
+
+    Attributes:
+        folder: the same.
+        under_way: whether what is recorded is still to be painted.
     """
 
     def __init__(self, node: PaintingNode, folder: str) -> None:
         self._node = node
-        self._folder = Path(folder)
+        self.folder = Path(folder)
+        self.under_way = True
         self._live = node.hold()
         self._timer = node.create_steady_timer(WAIT_S, self._catch_up)
 
+    def give_up(self) -> None:
+        """Paint only what comes from now on."""
+        if self.under_way:
+            self.under_way = False
+            self._node.destroy_timer(self._timer)
+            self._node.get_logger().warning(f'not caught up from {self.folder}: it was reset')
+            self._node.release()
+
     def _catch_up(self) -> None:
+        self.under_way = False
         self._node.destroy_timer(self._timer)
         for source in self._node.inputs:
             source.hand_on()
         log = self._node.get_logger()
         try:
             with tempfile.TemporaryDirectory() as place:
-                run = recover(self._folder, Path(place) / 'run').folder
+                run = recover(self.folder, Path(place) / 'run').folder
                 told = [self._take(number, name, run) for number, name in self._guns()]
         except PaintError as error:
             log.error(f'not caught up: {error}')
         else:
-            log.info(f'caught up from {self._folder}: {"; ".join(told)}')
+            log.info(f'caught up from {self.folder}: {"; ".join(told)}')
         self._node.release()
 
     def _guns(self) -> list[tuple[int, str]]:

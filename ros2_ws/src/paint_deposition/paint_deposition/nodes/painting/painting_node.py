@@ -46,9 +46,12 @@ class PaintingNode(PaintNode, ABC):
         inputs: what comes from the cell, one for each gun.
         watch: publishers and subscribers whose quality of service does not fit.
         real_time_factors: how long painting takes beside the motion, one for each gun.
+        catching_up: with the recording of a run in which the node was started, if it was.
         repainting: the changed models that are being prepared, if any are.
         model_problem: why the last models that were set are not used, '' if they are.
     """
+
+    catching_up: CatchingUp | None = None
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
@@ -57,7 +60,7 @@ class PaintingNode(PaintNode, ABC):
             AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
         ]
         if self.values['catch_up']:
-            CatchingUp(self, self.values['catch_up'])
+            self.catching_up = CatchingUp(self, self.values['catch_up'])
         self._shown: CommonFilm | None = None
         self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
@@ -131,7 +134,11 @@ class PaintingNode(PaintNode, ABC):
         """Back to bare metal, all counts to zero."""
         for source in self.inputs:
             source.reset()
+        if self._held is not None:
+            self._held[:] = [item for item in self._held if isinstance(item[1], TriggerChange)]
         self.film.reset()
+        if self.catching_up is not None:
+            self.catching_up.give_up()
         if self.repainting is not None:
             self._repaint()
 

@@ -111,6 +111,12 @@ class PartChange:
         node = self._node
         if self.waiting:
             raise PaintError('another part is being changed: ask again when it is there')
+        if node.catching_up is not None and node.catching_up.under_way:
+            # Nobody could tell which of the poses that wait are the part's before.
+            raise PaintError(
+                f'the film is being caught up from {node.catching_up.folder}: ask again when that '
+                'is done, in 2 s'
+            )
         following = self._asked_for(request)
         # A request overtakes poses that wait; they belong to the part before.
         for source in node.inputs:

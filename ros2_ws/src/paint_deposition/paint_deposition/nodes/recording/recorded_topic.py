@@ -54,6 +54,11 @@ class RecordedTopic:
         self.messages = self.missed = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
 
+    @property
+    def losses(self) -> str:
+        """What never arrived, in words."""
+        return 'losses cannot be counted' if self.unnumbered else f'{self.missed} missed'
+
     def subscribe(self, profile: QoSProfile) -> None:
         """Subscribe, or subscribe anew, with this quality of service."""
         if self._subscription:

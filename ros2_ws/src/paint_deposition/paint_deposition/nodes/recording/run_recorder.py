@@ -294,6 +294,6 @@ class RunRecorder(PaintNode):
             'bytes': size,
             'disk free bytes': free,
             'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,
-            **{t.name: f'{t.messages} messages, {t.missed} missed, {t.gaps} gaps' for t in topics},
+            **{t.name: f'{t.messages} messages, {t.losses}, {t.gaps} gaps' for t in topics},
         }
         return Status(level, message, values)

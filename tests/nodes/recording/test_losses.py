@@ -1,0 +1,88 @@
+"""What was lost on the way to a recorder is counted, or it says that it cannot be."""
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile
+from rclpy.serialization import serialize_message
+from rclpy.utilities import get_rmw_implementation_identifier
+from std_msgs.msg import String
+
+from files.recorded import START_NS
+from nodes.recording.runs import pose
+from paint_deposition.nodes.runtime import qos
+
+# CycloneDDS numbers none.
+NUMBERED = get_rmw_implementation_identifier() != 'rmw_cyclonedds_cpp'
+UNCOUNTED = ' (losses cannot be counted: this middleware does not number messages)'
+
+
+def test_gaps_and_missed_messages_are_counted(record, publisher, wait_until):
+    recorder = record(topics=['atomizer/pose'], max_pose_gap_s=0.1)
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
+    stamps_ns = START_NS + np.array([0, 4, 8, 508, 512, 612, 613]) * 1_000_000
+    for stamp in stamps_ns.tolist():
+        poses.publish(pose(stamp))
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 7, what='the poses')
+    recorder.close()
+    # 500 ms is a gap, 100 ms is just none.
+    told = f'7 messages{"" if NUMBERED else UNCOUNTED}, 1 gaps'
+    assert recorder.summary() == f'{told}, file complete: {recorder.run.folder}'
+
+
+def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_until):
+    """A hundred strings fit into the queue; what the middleware dropped before is counted."""
+    recorder = record(topics=['chatter'])
+    chatter = publisher(String, 'chatter', QoSProfile(depth=1000))
+    chatter.publish(String(data='first'))
+    wait_until(lambda: recorder.run.message_count == 1, what='the first message')
+    # Nobody runs the recorder's callbacks meanwhile.
+    for k in range(300):
+        chatter.publish(String(data=str(k)))
+    chatter.wait_for_all_acked()
+    wait_until(lambda: recorder.run.message_count >= 101, what='what is left')
+    recorder.close()
+    lost = 301 - recorder.run.message_count
+    assert lost > 0
+    missed = f', {lost} missed' if NUMBERED else UNCOUNTED
+    assert f'{recorder.run.message_count} messages{missed}' in recorder.summary()
+
+
+@pytest.mark.skipif(not NUMBERED, reason='no message has a number here')
+def test_losses_that_cannot_be_counted_are_not_called_none(record, publisher, wait_until):
+    """Some middlewares number no messages; the second one comes as from them."""
+    recorder = record(topics=['chatter'])
+    sender = publisher(String, 'chatter', QoSProfile(depth=10))
+    sender.publish(String(data='numbered'))
+    topic = recorder.resolve_topic_name('chatter')
+    wait_until(lambda: recorder._topics[topic].messages == 1, what='the message')
+    assert 'cannot be counted' not in recorder.summary()
+    times = {'received_timestamp': 1, 'source_timestamp': 1}
+    cdr = serialize_message(String(data='without a number'))
+    recorder._topics[topic]._on_message(cdr, times | {'publication_sequence_number': None})
+    assert '2 messages (losses cannot be counted: ' in recorder.summary()
+    recorder.close()
+
+
+def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
+    record()
+    got = []
+    cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
+    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
+    poses.publish(pose(START_NS))
+
+    def told() -> bool:
+        values = {v.key: v.value for v in got[-1].status[0].values} if got else {}
+        losses = '0 missed' if NUMBERED else 'losses cannot be counted'
+        return values.get('/atomizer/pose') == f'1 messages, {losses}, 0 gaps'
+
+    wait_until(told, what='diagnostics of the pose')
+    status = got[-1].status[0]
+    values = {v.key: v.value for v in status.values}
+    assert status.name == 'run_recorder: recording'
+    assert int(values['bytes']) > 0
+    assert int(values['disk free bytes']) > 0
