@@ -3,11 +3,11 @@
     python benchmarks/live.py [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
 
 The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are processes
-of their own on one machine; messages go through the real middleware. The simulator starts twice, on
-a new part and on one seen before, and then runs once for each way to watch: nobody, or somebody who
-takes a topic as bytes. A pose's age is the time from its stamp, which is when it is sent, to the
-arrival of the first statistics that are no older. Processor time is that of the simulator, all
-threads, until it has painted everything, over the time of the motion.
+of their own on one machine; messages go through the real middleware. The simulator starts on a new
+part, and then on the part seen before for each way to watch: nobody, or somebody who takes a topic
+as bytes. A pose's age is the time from its stamp, which is when it is sent, to the arrival of the
+first statistics that are no older. Processor time is that of the simulator, all threads, until it
+has painted everything, over the time of the motion.
 """
 
 import argparse
@@ -256,7 +256,8 @@ def main() -> None:
         print(
             f'{len(np.unique(faces))} vertices, two guns at {RATE_HZ} Hz; ready after '
             f'{new_s:.1f} s on a new part\n{"watched":20}{"ready":>8}{"processor":>11}'
-            f'{"age of a pose, 50, 95 %":>25}{"messages/s":>12}{"MB/s":>8}{"memory":>10}{"lost":>6}'
+            f'{"age of a pose, 50, 95 %":>25}{"messages/s":>12}{"MB/s":>8}{"memory":>10}'
+            f'{"lost":>6}'
         )
         rows = []
         for topic in given.watch:

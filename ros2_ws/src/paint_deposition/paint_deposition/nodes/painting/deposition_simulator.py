@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.colour_scales import ColourScale, film_scale
+from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
 from paint_deposition.nodes.painting.film_files import (
@@ -58,8 +59,7 @@ SIMULATOR = dict(
     target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
     publish_mesh=NodeParameter(
         True,
-        'Whether the coloured mesh goes out to whoever listens; of 275,000 vertices it takes 65 MB '
-        'each time [-]',
+        'Whether who listens gets the coloured mesh; of 275,000 vertices it takes 65 MB each [-]',
     ),
     output_directory=NodeParameter(
         'runs',
@@ -104,12 +104,13 @@ class DepositionSimulator(PaintingNode):
         # In a group of its own: while it waits for the disk, poses must not wait for it.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
-        self._scale: ColourScale | None = None
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
         # Counts what has been shown: another film, or the same in other colours.
         self._edition = 0
         self._film_um = np.empty(0)
+        self._scale = film_scale(self._film_um)
+        self._legend_ends: tuple[float, float] | None = None
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
         self.parts = PartChange(self, saving)
@@ -145,7 +146,7 @@ class DepositionSimulator(PaintingNode):
 
     def show_anew(self) -> None:
         """The part is another one."""
-        self._shown = self._scale = None
+        self._shown = self._legend_ends = None
         self._changes = FilmChanges(self.shown_as)
 
     # --- parameters
@@ -188,39 +189,40 @@ class DepositionSimulator(PaintingNode):
         self._stats = stats_message(self.frame.frame_id, stamp_ns, figures, laid_cm3)
         self._stats.run = self.parts.part.run
         self._counts_shown = None
-        before = self._scale
         scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
         self._scale = scale
-        if before is None or (scale.low, scale.high) != (before.low, before.high):
+        if (scale.low, scale.high) != self._legend_ends:
+            self._legend_ends = scale.low, scale.high
             self._legend.publish(legend(scale, 'µm', self.surface, self.frame.frame_id))
 
     def _offer(self, film: CommonFilm, at_rest: bool) -> None:
         """Let those who listen have the film that is shown."""
-        film_um, shown_as = self._film_um, self.shown_as
+        film_um, shown_as, scale = self._film_um, self.shown_as, self._scale
         stamp_ns = self.film.newest_ns or 0
 
-        def mesh() -> bytes:
-            shown = film_um > self.values['painted_above_um']
-            rows = self._scale.rows(film_um, shown)
-            return shown_as.mesh.serialised(stamp_ns, self._scale.palette, rows)
+        def mesh(_: bool) -> bytes:
+            rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
+            return shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
+
+        def cloud(_: bool) -> PointCloud2:
+            return shown_as.cloud.message(stamp_ns, film_um)
+
+        def changes(anew: bool) -> PointCloud2 | None:
+            return self._changes.message(stamp_ns, film_um, whole=anew, exact=at_rest)
+
+        def field(_: bool) -> ThicknessField:
+            return shown_as.field.message(stamp_ns, film_um)
+
+        def share(_: bool, gun: int) -> ThicknessField:
+            return shown_as.field.message(stamp_ns, film.shares_um[gun])
 
         if self.values['publish_mesh']:
-            self._large['thickness/mesh'].offer(self._edition, lambda _: mesh())
-        self._large['thickness/cloud'].offer(
-            self._edition, lambda _: shown_as.cloud.message(stamp_ns, film_um)
-        )
-        self._large['thickness/field'].offer(
-            self._edition, lambda _: shown_as.field.message(stamp_ns, film_um)
-        )
-        for number, topic in enumerate(self._share_topics):
-            self._large[topic].offer(
-                self._edition,
-                lambda _, gun=number: shown_as.field.message(stamp_ns, film.shares_um[gun]),
-            )
-        self._large['thickness/changes'].offer(
-            (self._edition, at_rest),
-            lambda anew: self._changes.message(stamp_ns, film_um, anew, at_rest),
-        )
+            self._large['thickness/mesh'].offer(self._edition, mesh)
+        self._large['thickness/cloud'].offer(self._edition, cloud)
+        self._large['thickness/changes'].offer((self._edition, at_rest), changes)
+        self._large['thickness/field'].offer(self._edition, field)
+        for gun, topic in enumerate(self._share_topics):
+            self._large[topic].offer(self._edition, partial(share, gun=gun))
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""

@@ -51,13 +51,13 @@ def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
 
 def _cloud(frame_id: str, layout: np.dtype, points: int) -> tuple[PointCloud2, np.ndarray]:
     """A cloud of so many points, and its (points,) values to fill; four bytes each field."""
-    kinds = {np.dtype(np.float32): PointField.FLOAT32, np.dtype(np.uint32): PointField.UINT32}
+    kinds = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
     message = PointCloud2(
         height=1,
         width=points,
         fields=[
-            PointField(name=name, offset=offset, datatype=kinds[kind], count=1)
-            for name, (kind, offset) in layout.fields.items()
+            PointField(name=name, offset=4 * k, datatype=kinds[layout[name].kind], count=1)
+            for k, name in enumerate(layout.names or ())
         ],
         is_bigendian=sys.byteorder == 'big',
         point_step=layout.itemsize,

@@ -176,7 +176,7 @@ class PaintingNode(PaintNode, ABC):
     def up_to_date(self) -> None:
         """Paint all poses that have come, and take over films that have been prepared."""
         for source in self.inputs:
-            source.hand_on()
+            source.take_waiting()
         self._tend()
 
     # --- the part and the model
