@@ -12,7 +12,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange

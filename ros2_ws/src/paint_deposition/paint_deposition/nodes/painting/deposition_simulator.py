@@ -20,6 +20,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.nodes.painting.early import look_at_once
 from paint_deposition.nodes.painting.film_files import (
     figures_of,
     film_to_save,
@@ -38,35 +39,40 @@ from paint_deposition.nodes.runtime.diagnostics import Diagnostics
 from paint_deposition.nodes.runtime.file_names import require_file_name
 from paint_deposition.nodes.runtime.messages import of_gun
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-SIMULATOR = dict(
-    **PAINTING,
-    precision=NodeParameter(
+SIMULATOR = PAINTING | {
+    'publish_rate_hz': NodeParameter(
+        5.0,
+        'How often statistics go out while the film changes, and large messages at the most [Hz]',
+        (0.1, 30.0),
+    ),
+    'precision': NodeParameter(
         'single',
         'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
         choices=('single', 'double'),
         fixed_because='the film so far was summed in it; restart the node',
     ),
-    color_min_um=thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
-    color_max_um=thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
-    painted_above_um=thickness(
+    'color_min_um': thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
+    'color_max_um': thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
+    'painted_above_um': thickness(
         'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
     ),
-    target_um=thickness('Film wanted; 0: none [µm]'),
-    target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
-    publish_mesh=NodeParameter(
+    'target_um': thickness('Film wanted; 0: none [µm]'),
+    'target_tolerance_um': thickness(
+        'Difference from the target that is allowed [µm]'
+    ),
+    'publish_mesh': NodeParameter(
         True,
         'Whether who listens gets the coloured mesh; of 275,000 vertices it takes 65 MB each [-]',
     ),
-    output_directory=NodeParameter(
+    'output_directory': NodeParameter(
         'runs',
         'Where ~/save_film writes [path]',
         fixed_because='the network does not choose where files are written; restart the node',
     ),
-)
+}
 
 
 class DepositionSimulator(PaintingNode):
@@ -140,8 +146,7 @@ class DepositionSimulator(PaintingNode):
         points = self._points_on(surface)
         film = self._film_on(surface, points, self._models)
         film.warm_up()
-        # What is looked up along the gun's axis is made at the first question.
-        facing(surface, np.zeros((1, 3)), np.eye(3)[2:])
+        look_at_once(surface)
         return PreparedPart(surface, points, film, ShownFilm(surface, self.frame.frame_id))
 
     def show_anew(self) -> None:

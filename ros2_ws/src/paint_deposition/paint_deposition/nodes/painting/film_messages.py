@@ -19,15 +19,15 @@ from paint_deposition.part.surface import Surface
 
 
 class ShownFilm:
-    """A part as the simulator shows it: its messages, each made when it is first asked for.
-
-    Attributes:
-        mesh_id: digest of the refined mesh.
-    """
+    """A part as the simulator shows it: its messages, each made when it is first asked for."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
-        self.mesh_id = surface.mesh_id
         self._surface, self._frame_id = surface, frame_id
+
+    @cached_property
+    def mesh_id(self) -> str:
+        """Digest of the refined mesh."""
+        return self._surface.mesh_id
 
     @cached_property
     def mesh(self) -> ColouredMesh:
