@@ -26,10 +26,8 @@ test: build  ## run all tests; ARGS='-k pattern' is passed to pytest
 test-fast: build  ## run the tests of less than a second each, none of them with a node: a minute
 	@$(IN_ENVIRONMENT) $(TESTS) -m 'not slow' $(ARGS)
 
-bench: build  ## measure the speed of the film integral, of simulate and of the diagnosis
-	@$(IN_ENVIRONMENT) python benchmarks/kernel.py $(ARGS)
-	@$(IN_ENVIRONMENT) python benchmarks/file_to_film.py
-	@$(IN_ENVIRONMENT) python benchmarks/inference.py $(ARGS)
+bench: build  ## measure kernel, file to film, diagnosis and live nodes; ARGS=--quick tries it out
+	@$(IN_ENVIRONMENT) python benchmarks/bench.py $(ARGS)
 
 bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
 	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)

@@ -1,11 +1,13 @@
 """How long a diagnosis takes, stage by stage, and what one film of the fit costs.
 
-    python benchmarks/inference.py [CAMPAIGN.yaml] [ROUNDS]
+    python benchmarks/inference.py [CAMPAIGN.yaml] [ROUNDS] [--json FILE]
 
 Without a campaign: four recordings of the virtual paint shop with a hidden effect, 316 readings.
 Every stage counts with its best round after a warm-up; times of the processor add up all threads.
 """
 
+import argparse
+import json
 import math
 import os
 import resource
@@ -14,7 +16,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -93,8 +95,8 @@ def films(campaign: Campaign, rounds: int) -> None:
             )
 
 
-def stages(campaign: Campaign, rounds: int) -> None:
-    """Print the stages of a diagnosis."""
+def stages(campaign: Campaign, rounds: int) -> dict[str, Any]:
+    """Print the stages of a diagnosis, and return them."""
     table: dict[str, Stage] = {}
 
     def timed(name: str, work: Callable[[], Any]) -> Any:
@@ -111,14 +113,19 @@ def stages(campaign: Campaign, rounds: int) -> None:
         print(f'{name:53}{stage.wall_s:7.2f} s{stage.processor_s:9.2f} s')
     memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f'\n{diagnosis.verdict} {diagnosis.accepted}; most memory {memory:.0f} MB')
+    return {'stages': {name: asdict(stage) for name, stage in table.items()}, 'memory_mb': memory}
 
 
 def main() -> None:
     """Measure all."""
     warnings.simplefilter('ignore')
-    given = [Path(word) for word in sys.argv[1:] if not word.isdigit()]
-    rounds = next((int(word) for word in sys.argv[1:] if word.isdigit()), 3)
-    campaign = read_campaign(given[0]) if given else drawn()
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('words', nargs='*', metavar='CAMPAIGN.yaml | ROUNDS')
+    parser.add_argument('--json', type=Path, help='also write the figures to this file')
+    given = parser.parse_args()
+    rounds = next((int(word) for word in given.words if word.isdigit()), 3)
+    files = [word for word in given.words if not word.isdigit()]
+    campaign = read_campaign(Path(files[0])) if files else drawn()
     print(
         f'{len(campaign.readings)} readings at {len(campaign)} points, '
         f'{len(campaign.experiments)} recordings, '
@@ -126,7 +133,9 @@ def main() -> None:
     )
     diagnose(campaign, MODEL, EFFECTS)
     films(campaign, rounds)
-    stages(campaign, rounds)
+    record = {'readings': len(campaign.readings), **stages(campaign, rounds)}
+    if given.json:
+        given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
 
 
 if __name__ == '__main__':

@@ -1,11 +1,13 @@
 """How fast the film is integrated: NumPy, a plain compiled loop and the kernel, side by side.
 
-    python benchmarks/kernel.py [ROUNDS]
+    python benchmarks/kernel.py [ROUNDS] [--json FILE]
 
 All run in turns in one process, so that they share whatever else the machine does; each counts
 with its best round. A pair is one sub-step of the gun's way and one surface point.
 """
 
+import argparse
+import json
 import math
 import os
 import platform
@@ -169,8 +171,8 @@ def single_threaded(run: Callable[[], np.ndarray]) -> np.ndarray:
         numba.set_num_threads(threads)
 
 
-def measure(case: Case, rounds: int) -> None:
-    """Print ns per pair, ratios and agreement."""
+def measure(case: Case, rounds: int) -> dict[str, float]:
+    """Print ns per pair, ratios and agreement; the pairs per second of each way."""
     single = FilmIntegrator(case.points, MODEL, 'single')
     double = FilmIntegrator(case.points, MODEL, 'double')
     step = max(1, len(case.path) // NUMPY_STEPS)
@@ -205,6 +207,7 @@ def measure(case: Case, rounds: int) -> None:
             f'{name:32}{1e9 * seconds / case.pairs:9.2f}{seconds:8.3f} s'
             f'{best[first] / seconds:9.1f}{error:17.1e}'
         )
+    return {name: case.pairs / seconds for name, seconds in best.items()}
 
 
 START = """
@@ -225,8 +228,9 @@ print(loaded - begin, time.perf_counter() - loaded)
 """
 
 
-def measure_start() -> None:
+def measure_start() -> dict[str, float]:
     """Print how long a process takes to its first film, with and without compiled code on disk."""
+    took = {}
     with tempfile.TemporaryDirectory() as folder:
         environment = os.environ | {'NUMBA_CACHE_DIR': folder}
         environment['PYTHONPATH'] = os.pathsep.join([str(PACKAGE), os.getenv('PYTHONPATH', '')])
@@ -238,6 +242,8 @@ def measure_start() -> None:
             )  # fmt: skip
             loading, painting = (float(word) for word in done.stdout.split())
             print(f'  {what}: {loading:.2f} s loading libraries, {painting:.2f} s to the film')
+            took[what] = loading + painting
+    return took
 
 
 def cpu_name() -> str:
@@ -250,16 +256,21 @@ def cpu_name() -> str:
 
 def main() -> None:
     """Measure all."""
-    rounds = int(sys.argv[1]) if len(sys.argv) > 1 else 15
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument('rounds', nargs='?', type=int, default=15)
+    parser.add_argument('--json', type=Path, help='also write the figures to this file')
+    given = parser.parse_args()
     load = os.getloadavg()[0]
     print(
         f'{cpu_name()} ({numba.config.CPU_NAME or "host"}), {os.cpu_count()} cores, load '
         f'{load:.1f}; Python {platform.python_version()}, NumPy {np.__version__}, Numba '
-        f'{numba.__version__}; best of {rounds}'
+        f'{numba.__version__}; best of {given.rounds}'
     )
-    for case in (dense(), sample()):
-        measure(case, rounds)
-    measure_start()
+    rates = {case.name: measure(case, given.rounds) for case in (dense(), sample())}
+    first_film = measure_start()
+    if given.json:
+        record = {'pairs_per_s': rates, 'first_film_s': first_film}
+        given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
 
 
 if __name__ == '__main__':

@@ -3,11 +3,11 @@
     python benchmarks/live.py [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
 
 The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are processes
-of their own on one machine; messages go through the real middleware. The simulator starts twice, on
-a new part and on one seen before, and then runs once for each way to watch: nobody, or somebody who
-takes a topic as bytes. A pose's age is the time from its stamp, which is when it is sent, to the
-arrival of the first statistics that are no older. Processor time is that of the simulator, all
-threads, until it has painted everything, over the time of the motion.
+of their own on one machine; messages go through the real middleware. The simulator starts on a new
+part, and then on the part seen before for each way to watch: nobody, somebody who takes a topic as
+bytes, or the recorder with all that it records by default. A pose's age is the time from its stamp,
+which is when it is sent, to the arrival of the first statistics that are no older. Processor time
+is that of the simulator, all threads, until it has painted everything, over the time of the motion.
 """
 
 import argparse
@@ -28,7 +28,10 @@ from file_to_film import COARSER_THAN_ANY_M, HEIGHT_M, LENGTH_M, STANDOFF_M, bod
 GUNS = ('robot_1', 'robot_2')
 RATE_HZ = 250
 SPEED_M_PER_S = 0.5
-WATCHED = ('', 'thickness/changes', 'thickness/field', 'thickness/cloud', 'thickness/mesh')
+RECORDER = 'run_recorder'
+WATCHED = (
+    '', 'thickness/changes', 'thickness/field', 'thickness/cloud', 'thickness/mesh', RECORDER,
+)  # fmt: skip
 # Poses before are not counted: queues and caches fill.
 WARM_S = 2.0
 READY_WITHIN_S = 120.0
@@ -50,24 +53,27 @@ def peak_mb(process: subprocess.Popen) -> float:
 
 def start_simulator(running: ExitStack, folder: Path) -> tuple[subprocess.Popen, float]:
     """The simulator on the folder's part, and the time to `ready` in its log [s]."""
-    arguments = {
-        'mesh_file': folder / 'part.stl',
-        'max_edge_length_m': COARSER_THAN_ANY_M,
-        'atomizers': f'[{", ".join(GUNS)}]',
-        'output_directory': folder,
-    }
-    given = [part for name, value in arguments.items() for part in ('-p', f'{name}:={value}')]
-    log = folder / 'simulator.log'
+    return start_node(
+        running, folder, 'deposition_simulator', mesh_file=folder / 'part.stl',
+        max_edge_length_m=COARSER_THAN_ANY_M,
+    )  # fmt: skip
+
+
+def start_node(
+    running: ExitStack, folder: Path, executable: str, **parameters: object
+) -> tuple[subprocess.Popen, float]:
+    """A node of both guns, and the time to `ready` in its log [s]."""
+    parameters |= {'atomizers': f'[{", ".join(GUNS)}]', 'output_directory': folder}
+    given = [part for name, value in parameters.items() for part in ('-p', f'{name}:={value}')]
+    log = folder / f'{executable}.log'
     with log.open('wb') as file:
         began_s = time.monotonic()
-        process = subprocess.Popen(
-            ['deposition_simulator', '--ros-args', *given], stdout=file, stderr=file
-        )
+        process = subprocess.Popen([executable, '--ros-args', *given], stdout=file, stderr=file)
     running.callback(process.wait, 60)
     running.callback(process.terminate)
     while b': ready' not in log.read_bytes():
         if process.poll() is not None or time.monotonic() - began_s > READY_WITHIN_S:
-            raise SystemExit(f'the simulator does not get ready:\n{log.read_text()}')
+            raise SystemExit(f'{executable} does not get ready:\n{log.read_text()}')
         time.sleep(0.002)
     return process, time.monotonic() - began_s
 
@@ -210,7 +216,11 @@ def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
         simulator, ready_s = start_simulator(running, folder)
         robots = running.enter_context(Robots())
         robots.wait_until_heard()
-        watcher = start_watching(running, topic) if topic else None
+        watcher = recorder = None
+        if topic == RECORDER:
+            recorder, _ = start_node(running, folder, RECORDER, name='run')
+        elif topic:
+            watcher = start_watching(running, topic)
         began_s, began_cpu_s = time.monotonic(), cpu_s(simulator)
         stamps = robots.paint(seconds)
         lasted_s = time.monotonic() - began_s
@@ -218,6 +228,9 @@ def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
         share = (cpu_s(simulator) - began_cpu_s) / lasted_s
         ages = ages_s(stamps[stamps > stamps[0] + WARM_S * 1e9], robots.arrived)
         seen = {'messages': 0, 'bytes': 0}
+        if recorder:
+            seen['share'] = cpu_s(recorder) / lasted_s
+            seen['bytes'] = sum(file.stat().st_size for file in (folder / 'run').iterdir())
         if watcher:
             seen = json.loads(watcher.communicate('stop\n', timeout=60)[0])
         return {
@@ -231,6 +244,7 @@ def measure(folder: Path, seconds: float, topic: str) -> dict[str, Any]:
             'messages_per_s': seen['messages'] / lasted_s,
             'mb_per_s': seen['bytes'] / lasted_s * 1e-6,
             'memory_mb': peak_mb(simulator),
+            'recorder_share': seen.get('share'),
         }
 
 
@@ -256,7 +270,8 @@ def main() -> None:
         print(
             f'{len(np.unique(faces))} vertices, two guns at {RATE_HZ} Hz; ready after '
             f'{new_s:.1f} s on a new part\n{"watched":20}{"ready":>8}{"processor":>11}'
-            f'{"age of a pose, 50, 95 %":>25}{"messages/s":>12}{"MB/s":>8}{"memory":>10}{"lost":>6}'
+            f'{"age of a pose, 50, 95 %":>25}{"messages/s":>12}{"MB/s":>8}{"memory":>10}'
+            f'{"lost":>6}'
         )
         rows = []
         for topic in given.watch:

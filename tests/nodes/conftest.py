@@ -81,6 +81,7 @@ def painted(wait_until):
             lambda: node.film.counts.received >= count,
             what=f'{count} poses painted',
         )
+        node.up_to_date()
         return node.film.up_to_date().film_um
 
     return painted

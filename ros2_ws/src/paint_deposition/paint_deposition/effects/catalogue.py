@@ -6,7 +6,6 @@ from types import MappingProxyType
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.
@@ -38,5 +37,7 @@ def effect_class(effect_id: str) -> type[Effect]:
         return EFFECTS[effect_id]
     family, is_learned, covariate = effect_id.partition(':')
     if is_learned and family == 'learned':
+        from paint_deposition.effects.learned.catalogue import learned_law
+
         return learned_law(covariate)
     raise ModelError(f'no effect is called {effect_id!r}; {did_you_mean(effect_id, EFFECTS)}')

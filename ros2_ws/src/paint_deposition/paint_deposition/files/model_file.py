@@ -10,7 +10,6 @@ from pydantic import Field
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
@@ -182,6 +181,9 @@ def _learned(where: str, entry: dict[str, Any]) -> Effect:
         raise ModelError(
             f'{where}: has no covariate; give that of the learned law, such as time_s'
         )
+    # Loaded by those only whose models have learned.
+    from paint_deposition.effects.learned.catalogue import learned_law
+
     cls = learned_law(covariate)
     values = {key: entry[key] for key in entry if key not in ('id', 'covariate')}
     return checked(cls, cls.id, values, ModelError)

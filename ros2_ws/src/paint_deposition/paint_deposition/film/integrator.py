@@ -20,7 +20,6 @@ from paint_deposition.film.layout import (
 )
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.accumulation import TERMS, compile_kernel
-from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
@@ -103,7 +102,7 @@ class FilmIntegrator:
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
         self._keep_absent_laws = keep_absent_laws
-        self._blocks = Blocks.of(points.positions_m, points.normals, self._real)
+        self._blocks = points.blocks(self._real)
         self.reset()
         self.use(model)
 

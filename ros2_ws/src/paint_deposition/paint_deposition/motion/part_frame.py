@@ -12,6 +12,8 @@ from paint_deposition.motion.trajectory import Trajectory
 
 # As for poses of a recording: further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01
+# On which painting nodes say where the part stands.
+PART_POSE_TOPIC = 'part_pose'
 POSE_WORDS = 'seven numbers, x y z [m] and a unit quaternion qx qy qz qw'
 
 

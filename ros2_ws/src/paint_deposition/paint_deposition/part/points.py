@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from scipy.sparse import csr_matrix
 
+from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.part.orientation import outward_side
 
 DOWN = (0.0, 0.0, -1.0)
@@ -61,6 +62,7 @@ class SurfacePoints:
         self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
         self.extent_m = box_extent_m(self.positions_m) if extent_m is None else extent_m
         self.area_m2 = area_m2
+        self._blocks: dict[type, Blocks] = {}
         count = len(self.positions_m)
         self._covariates = {
             'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
@@ -75,11 +77,17 @@ class SurfacePoints:
     def __len__(self) -> int:
         return len(self.positions_m)
 
+    def blocks(self, precision: type) -> Blocks:
+        """The points as the kernel takes them; sorted once for all who paint them."""
+        if precision not in self._blocks:
+            self._blocks[precision] = Blocks.of(self.positions_m, self.normals, precision)
+        return self._blocks[precision]
+
     def __getstate__(self) -> dict:
         """Covariates are computed before points go to another process."""
         for name in self._covariates:
             self._covariate(name)
-        return self.__dict__
+        return self.__dict__ | {'_blocks': {}}
 
     @property
     def curvature_per_m(self) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Lines of sight: which points a gun sees, and how much of the sky a point sees (Embree)."""
 
+from functools import cached_property
+
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
@@ -28,10 +30,16 @@ class Occluder:
     def __init__(self, vertices_m: np.ndarray, faces: np.ndarray) -> None:
         # Embree works in single precision: keep coordinates small.
         self._origin_m = 0.5 * (vertices_m.min(axis=0) + vertices_m.max(axis=0))
-        self._scene = EmbreeScene(robust=True)
+        self._corners = (vertices_m - self._origin_m).astype(np.float32)
+        self._triangles = faces.astype(np.int32)
+
+    @cached_property
+    def _scene(self) -> EmbreeScene:
+        """Made with the first ray: it takes a second for a million triangles."""
+        scene = EmbreeScene(robust=True)
         # The scene does not keep the mesh alive by itself.
-        corners = (vertices_m - self._origin_m).astype(np.float32)
-        self._mesh = TriangleMesh(self._scene, corners, faces.astype(np.int32))
+        self._mesh = TriangleMesh(scene, self._corners, self._triangles)
+        return scene
 
     def visible(self, origins_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
         """Whether nothing of the part lies between.

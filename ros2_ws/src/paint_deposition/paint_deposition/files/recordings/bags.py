@@ -14,6 +14,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import (
     JOINT_TYPE,
@@ -25,7 +26,6 @@ from paint_deposition.files.recordings.triggers import (
     choose_topic,
     listed_topics,
     read_switching,
-    stamp_ns,
     unused_triggers,
 )
 from paint_deposition.motion.part_frame import Rigid

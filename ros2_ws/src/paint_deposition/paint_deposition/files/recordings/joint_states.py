@@ -12,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-from paint_deposition.files.recordings.triggers import choose_topic, listed_topics, stamp_ns
+from paint_deposition.files.recordings.triggers import choose_topic, listed_topics
 from paint_deposition.motion.trajectory import Trajectory
 
 USUAL_TIP = 'tool0'

@@ -17,13 +17,11 @@ import numpy as np
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, open_bag
 from paint_deposition.files.recordings.message_definitions import TF_TYPES
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid
 from paint_deposition.motion.trajectory import Trajectory
 
 STATIC = 'tf_static'
-# Where the part stood, as a painting node was told.
 PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
-PART_POSE_TOPIC = 'part_pose'
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.trajectory import numbered
@@ -39,11 +40,6 @@ class Switching:
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
     notes: tuple[str, ...] = ()
-
-
-def stamp_ns(header: Any) -> int:
-    """A header's stamp in integer nanoseconds, which a float could not hold."""
-    return header.stamp.sec * 1_000_000_000 + header.stamp.nanosec
 
 
 def choose_state_topic(bag: Bag, name: str) -> BagTopic:

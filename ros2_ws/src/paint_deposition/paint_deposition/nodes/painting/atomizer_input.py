@@ -12,7 +12,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -34,8 +34,10 @@ RELIABILITIES = {
     'reliable': ReliabilityPolicy.RELIABLE,
 }
 FOLLOW_PERIOD_S = 0.1
-POSES_A_BATCH = 50
+# Messages are taken together: to wake for each pose would cost more than to paint it.
+TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
+POSES_A_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
 
 
@@ -52,8 +54,9 @@ class AtomizerInput:
 
     The gun's name, if it has one, stands before the three topics: `robot_1/atomizer/pose`.
 
-    Poses are handed on in batches of fifty, and what there is of them every twentieth of a
-    second; a state is handed on at once, so that it is there before the poses that it may cut.
+    Poses are handed on in batches of fifty or more, and what there is of them every twentieth of a
+    second. States that have come are handed on first, so that they are there before the poses that
+    they may cut.
 
     Args:
         node: paints the poses.
@@ -90,6 +93,7 @@ class AtomizerInput:
         self.sprays = False
         self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
+        self._handed_on_s = -math.inf
         self._stamps: list[int] = []
         self._poses: list[tuple[np.ndarray, np.ndarray]] = []
         self.tf_queue = TfQueue()
@@ -113,7 +117,7 @@ class AtomizerInput:
         node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
         topic = of_gun(name, PROGRESS_TOPIC)
         self._progress = node.create_publisher(PoseProgress, topic, qos.PROGRESS)
-        node.create_steady_timer(BATCH_PERIOD_S, self.hand_on)
+        node.create_steady_timer(TAKE_PERIOD_S, self._take)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
 
     @property
@@ -140,13 +144,21 @@ class AtomizerInput:
         self.jumps = Jumps()
 
     def take_waiting(self) -> None:
-        """Take all that has come so far, also what still waits in the middleware."""
+        """Take all that has come so far and hand it on."""
         for topic in self._topics:
             topic.take_waiting()
         self.hand_on()
 
+    def _take(self) -> None:
+        for topic in self._topics:
+            topic.take_waiting()
+        waited = time.monotonic() - self._handed_on_s >= BATCH_PERIOD_S
+        if waited or len(self._stamps) >= POSES_A_BATCH:
+            self.hand_on()
+
     def hand_on(self) -> None:
-        """Give the receiver what has come, except poses that wait for their transform."""
+        """Give the receiver what was taken, except poses that wait for their transform."""
+        self._handed_on_s = time.monotonic()
         self.tf_queue.release(time.monotonic(), self._place, self._refuse)
         if not self._stamps:
             return
@@ -183,8 +195,6 @@ class AtomizerInput:
         now_s = self.pose_s = time.monotonic()
         self.tf_queue.add(message, now_s)
         self.tf_queue.release(now_s, self._place, self._refuse)
-        if len(self._stamps) >= POSES_A_BATCH:
-            self.hand_on()
         if self.poses_received % POSES_A_BATCH == 0:
             self._report_progress()
 

@@ -6,6 +6,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
@@ -19,6 +20,19 @@ if TYPE_CHECKING:  # older distributions have no such name
 REMEMBERED = 1000
 
 
+class Polled(CallbackGroup):
+    """Of subscriptions whose messages do not wake the executor: they are asked now and then."""
+
+    def can_execute(self, _entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, _entity: Any) -> None:
+        """Nothing is ever executed."""
+
+
 class AtomizerTopic:
     """Subscribes reliably at first, and as the publishers offer once there are any.
 
@@ -28,7 +42,7 @@ class AtomizerTopic:
 
     Args:
         watch: makes the subscription.
-        take: gets each message.
+        take: gets each message, in `take_waiting`.
         depth: messages that may wait.
         reliability: asked for whatever is offered; None: as offered.
     """
@@ -50,6 +64,7 @@ class AtomizerTopic:
         self._take = take
         self._reliability = reliability
         self._latched = latched
+        self._group = Polled()
         self._first = QoSProfile(
             depth=depth, reliability=reliability or ReliabilityPolicy.RELIABLE
         )
@@ -67,7 +82,7 @@ class AtomizerTopic:
             self._subscribe(profile)
 
     def take_waiting(self) -> None:
-        """Take what has come and the executor has not handed out yet."""
+        """Take what has come."""
         if self._subscription is not None:
             self._drain(self._subscription)
 
@@ -87,7 +102,7 @@ class AtomizerTopic:
         before, self._profile = self._subscription, profile
         # The new one is there before the old one goes: nothing is lost between them.
         self._subscription = self._watch.subscription(
-            self._message, self._topic, self._on_message, profile
+            self._message, self._topic, self._on_message, profile, self._group
         )
         if before is not None:
             self._drain(before)

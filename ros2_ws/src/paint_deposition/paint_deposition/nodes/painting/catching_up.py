@@ -9,9 +9,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime.messages import of_gun
@@ -57,6 +54,9 @@ class CatchingUp:
         for source in self._node.inputs:
             source.hand_on()
         log = self._node.get_logger()
+        # Libraries that only a node loads which catches up.
+        from paint_deposition.files.recordings.mcap_recovery import recover
+
         try:
             with tempfile.TemporaryDirectory() as place:
                 run = recover(self.folder, Path(place) / 'run').folder
@@ -88,6 +88,9 @@ class CatchingUp:
         return told
 
     def _read(self, name: str, run: Path) -> Trajectory:
+        from paint_deposition.files.motion_files import read_recording
+        from paint_deposition.files.recordings.bag_files import open_bag
+
         values, resolved = self._node.values, self._node.resolve_topic_name
         states = resolved(of_gun(name, 'atomizer/state'))
         with open_bag(run) as bag:

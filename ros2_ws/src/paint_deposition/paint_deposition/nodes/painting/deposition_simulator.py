@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +17,10 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.colour_scales import ColourScale, film_scale
+from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.nodes.painting.early import look_at_once
 from paint_deposition.nodes.painting.film_files import (
     figures_of,
     film_to_save,
@@ -37,36 +39,40 @@ from paint_deposition.nodes.runtime.diagnostics import Diagnostics
 from paint_deposition.nodes.runtime.file_names import require_file_name
 from paint_deposition.nodes.runtime.messages import of_gun
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-SIMULATOR = dict(
-    **PAINTING,
-    precision=NodeParameter(
+SIMULATOR = PAINTING | {
+    'publish_rate_hz': NodeParameter(
+        5.0,
+        'How often statistics go out while the film changes, and large messages at the most [Hz]',
+        (0.1, 30.0),
+    ),
+    'precision': NodeParameter(
         'single',
         'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
         choices=('single', 'double'),
         fixed_because='the film so far was summed in it; restart the node',
     ),
-    color_min_um=thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
-    color_max_um=thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
-    painted_above_um=thickness(
+    'color_min_um': thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
+    'color_max_um': thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
+    'painted_above_um': thickness(
         'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
     ),
-    target_um=thickness('Film wanted; 0: none [µm]'),
-    target_tolerance_um=thickness('Difference from the target that is allowed, either way [µm]'),
-    publish_mesh=NodeParameter(
-        True,
-        'Whether the coloured mesh goes out to whoever listens; of 275,000 vertices it takes 65 MB '
-        'each time [-]',
+    'target_um': thickness('Film wanted; 0: none [µm]'),
+    'target_tolerance_um': thickness(
+        'Difference from the target that is allowed [µm]'
     ),
-    output_directory=NodeParameter(
+    'publish_mesh': NodeParameter(
+        True,
+        'Whether who listens gets the coloured mesh; of 275,000 vertices it takes 65 MB each [-]',
+    ),
+    'output_directory': NodeParameter(
         'runs',
         'Where ~/save_film writes [path]',
         fixed_because='the network does not choose where files are written; restart the node',
     ),
-)
+}
 
 
 class DepositionSimulator(PaintingNode):
@@ -104,12 +110,13 @@ class DepositionSimulator(PaintingNode):
         # In a group of its own: while it waits for the disk, poses must not wait for it.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
-        self._scale: ColourScale | None = None
         self._stats = ThicknessStats()
         self._counts_shown: tuple | None = None
         # Counts what has been shown: another film, or the same in other colours.
         self._edition = 0
         self._film_um = np.empty(0)
+        self._scale = film_scale(self._film_um)
+        self._legend_ends: tuple[float, float] | None = None
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
         self.parts = PartChange(self, saving)
@@ -139,13 +146,12 @@ class DepositionSimulator(PaintingNode):
         points = self._points_on(surface)
         film = self._film_on(surface, points, self._models)
         film.warm_up()
-        # What is looked up along the gun's axis is made at the first question.
-        facing(surface, np.zeros((1, 3)), np.eye(3)[2:])
+        look_at_once(surface)
         return PreparedPart(surface, points, film, ShownFilm(surface, self.frame.frame_id))
 
     def show_anew(self) -> None:
         """The part is another one."""
-        self._shown = self._scale = None
+        self._shown = self._legend_ends = None
         self._changes = FilmChanges(self.shown_as)
 
     # --- parameters
@@ -188,39 +194,40 @@ class DepositionSimulator(PaintingNode):
         self._stats = stats_message(self.frame.frame_id, stamp_ns, figures, laid_cm3)
         self._stats.run = self.parts.part.run
         self._counts_shown = None
-        before = self._scale
         scale = film_scale(film_um, self.values['color_min_um'], self.values['color_max_um'])
         self._scale = scale
-        if before is None or (scale.low, scale.high) != (before.low, before.high):
+        if (scale.low, scale.high) != self._legend_ends:
+            self._legend_ends = scale.low, scale.high
             self._legend.publish(legend(scale, 'µm', self.surface, self.frame.frame_id))
 
     def _offer(self, film: CommonFilm, at_rest: bool) -> None:
         """Let those who listen have the film that is shown."""
-        film_um, shown_as = self._film_um, self.shown_as
+        film_um, shown_as, scale = self._film_um, self.shown_as, self._scale
         stamp_ns = self.film.newest_ns or 0
 
-        def mesh() -> bytes:
-            shown = film_um > self.values['painted_above_um']
-            rows = self._scale.rows(film_um, shown)
-            return shown_as.mesh.serialised(stamp_ns, self._scale.palette, rows)
+        def mesh(_: bool) -> bytes:
+            rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
+            return shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
+
+        def cloud(_: bool) -> PointCloud2:
+            return shown_as.cloud.message(stamp_ns, film_um)
+
+        def changes(anew: bool) -> PointCloud2 | None:
+            return self._changes.message(stamp_ns, film_um, whole=anew, exact=at_rest)
+
+        def field(_: bool) -> ThicknessField:
+            return shown_as.field.message(stamp_ns, film_um)
+
+        def share(_: bool, gun: int) -> ThicknessField:
+            return shown_as.field.message(stamp_ns, film.shares_um[gun])
 
         if self.values['publish_mesh']:
-            self._large['thickness/mesh'].offer(self._edition, lambda _: mesh())
-        self._large['thickness/cloud'].offer(
-            self._edition, lambda _: shown_as.cloud.message(stamp_ns, film_um)
-        )
-        self._large['thickness/field'].offer(
-            self._edition, lambda _: shown_as.field.message(stamp_ns, film_um)
-        )
-        for number, topic in enumerate(self._share_topics):
-            self._large[topic].offer(
-                self._edition,
-                lambda _, gun=number: shown_as.field.message(stamp_ns, film.shares_um[gun]),
-            )
-        self._large['thickness/changes'].offer(
-            (self._edition, at_rest),
-            lambda anew: self._changes.message(stamp_ns, film_um, anew, at_rest),
-        )
+            self._large['thickness/mesh'].offer(self._edition, mesh)
+        self._large['thickness/cloud'].offer(self._edition, cloud)
+        self._large['thickness/changes'].offer((self._edition, at_rest), changes)
+        self._large['thickness/field'].offer(self._edition, field)
+        for gun, topic in enumerate(self._share_topics):
+            self._large[topic].offer(self._edition, partial(share, gun=gun))
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""

@@ -19,15 +19,15 @@ from paint_deposition.part.surface import Surface
 
 
 class ShownFilm:
-    """A part as the simulator shows it: its messages, each made when it is first asked for.
-
-    Attributes:
-        mesh_id: digest of the refined mesh.
-    """
+    """A part as the simulator shows it: its messages, each made when it is first asked for."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
-        self.mesh_id = surface.mesh_id
         self._surface, self._frame_id = surface, frame_id
+
+    @cached_property
+    def mesh_id(self) -> str:
+        """Digest of the refined mesh."""
+        return self._surface.mesh_id
 
     @cached_property
     def mesh(self) -> ColouredMesh:
@@ -51,13 +51,13 @@ def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
 
 def _cloud(frame_id: str, layout: np.dtype, points: int) -> tuple[PointCloud2, np.ndarray]:
     """A cloud of so many points, and its (points,) values to fill; four bytes each field."""
-    kinds = {np.dtype(np.float32): PointField.FLOAT32, np.dtype(np.uint32): PointField.UINT32}
+    kinds = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
     message = PointCloud2(
         height=1,
         width=points,
         fields=[
-            PointField(name=name, offset=offset, datatype=kinds[kind], count=1)
-            for name, (kind, offset) in layout.fields.items()
+            PointField(name=name, offset=4 * k, datatype=kinds[layout[name].kind], count=1)
+            for k, name in enumerate(layout.names or ())
         ],
         is_bigendian=sys.byteorder == 'big',
         point_step=layout.itemsize,

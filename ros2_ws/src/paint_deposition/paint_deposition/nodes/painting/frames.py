@@ -11,8 +11,7 @@ from rclpy.publisher import Publisher
 from rclpy.time import Time
 from std_msgs.msg import Header
 
-from paint_deposition.files.recordings.transforms import PART_POSE_TOPIC
-from paint_deposition.motion.part_frame import Rigid, is_frame
+from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.painting.tf_queue import NoTransform
 from paint_deposition.nodes.runtime import qos
 

@@ -18,6 +18,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.nodes.painting import early
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.catching_up import CatchingUp
 from paint_deposition.nodes.painting.frames import PartFrame
@@ -65,6 +66,7 @@ class PaintingNode(PaintNode, ABC):
         self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
+        early.look_soon(self)
 
     def _prepare(self) -> None:
         self.gun_names: list[str] = self.values['atomizers'] or ['']
@@ -80,9 +82,11 @@ class PaintingNode(PaintNode, ABC):
         self._place_part()
         self._models = read_chosen_models(self.values)
         self._read_part()
+        self.get_logger().info('getting ready; a model seen for the first time is compiled')
+        loading = early.load_what_paints(self._models, self.values.get('precision', 'double'))
         self._take_surface(self._read_surface(self.mesh_file))
         self.film = self._film_on(self.surface, self.points, self._models)
-        self.get_logger().info('getting ready; a model seen for the first time is compiled')
+        loading.join()
         self.film.warm_up()
 
     # --- for the subclass
@@ -183,7 +187,7 @@ class PaintingNode(PaintNode, ABC):
     def up_to_date(self) -> None:
         """Paint all poses that have come, and take over films that have been prepared."""
         for source in self.inputs:
-            source.hand_on()
+            source.take_waiting()
         self._tend()
 
     # --- the part and the model

@@ -11,7 +11,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.replay.pose_window import PoseWindow
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC

@@ -13,8 +13,9 @@ from std_msgs.msg import Bool
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, stamp_ns
+from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 

@@ -17,9 +17,9 @@ from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.signals import Signal
-from paint_deposition.files.recordings.triggers import stamp_ns
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.nodes.runtime import qos

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import PublisherEventCallbacks, SubscriptionEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -33,7 +34,12 @@ class QosWatch:
         self.newcomers: Counter[str] = Counter()
 
     def subscription(
-        self, message: type, topic: str, take: Callable[..., None], profile: QoSProfile
+        self,
+        message: type,
+        topic: str,
+        take: Callable[..., None],
+        profile: QoSProfile,
+        group: CallbackGroup | None = None,
     ) -> Subscription:
         """Subscribe, and watch the publishers."""
         # The graph is asked who does not fit; the middleware's own notices come once and stay.
@@ -41,7 +47,7 @@ class QosWatch:
             message_lost=self._count_lost, use_default_callbacks=False
         )
         self._inputs[topic] = self._node.create_subscription(
-            message, topic, take, profile, event_callbacks=callbacks
+            message, topic, take, profile, event_callbacks=callbacks, callback_group=group
         )
         return self._inputs[topic]
 
