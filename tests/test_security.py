@@ -16,6 +16,7 @@ from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.recording.default_topics import default_topics
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
 PLACE = {'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 'part_parent_frame': 'base'}
@@ -57,6 +58,9 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, nam
     executor.add_node(node)
     rules = allowed(repository, name)
     published = {publisher.topic_name for publisher in node.publishers} | OF_ALL
+    if isinstance(node, ManagedNode):
+        # By the state machine, which lies below rclpy's publishers.
+        published |= {f'/{name}/transition_event'}
     heard = {subscription.topic_name for subscription in node.subscriptions}
     if name == 'run_recorder':
         # It subscribes as publishers appear.

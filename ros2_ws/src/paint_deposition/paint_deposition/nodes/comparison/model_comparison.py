@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, Diagnostics, Status
+from paint_deposition.nodes.runtime.diagnostics import OK, Status, Task
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
@@ -62,6 +63,9 @@ class ModelComparison(PaintingNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)
+
+    def _configure(self) -> None:
+        super()._configure()
         self._outputs = {
             topic: self.watch.publisher(message, topic, qos.LATCHED)
             for topic, message in (
@@ -71,10 +75,11 @@ class ModelComparison(PaintingNode):
             )
         }
         self.offer('~/compare', self._compare)
-        tasks = painting_tasks(self) | {'comparison': self._status}
-        self._diagnostics = Diagnostics(self, tasks)
         self._publish_legend()
         self.publish()
+
+    def _tasks(self) -> Mapping[str, Task]:
+        return painting_tasks(self) | {'comparison': self._status}
 
     # --- the part and its readings
 

@@ -67,6 +67,7 @@ class AtomizerInput:
         number, name: the same.
         poses_received: since the node started.
         refused_frames: poses refused for their frame, by frame, since the last reset.
+        unpainted: poses that came while the node was not active, since the last reset.
         without_frame: poses that name no frame, since the last reset.
         refusal: why the last refused pose was refused, '' if none was since the last reset.
         states_received: since the node started.
@@ -140,8 +141,17 @@ class AtomizerInput:
         self.refusals_of_states: set[str] = set()
         self.states_without_flow = 0
         self.without_frame = 0
+        self.unpainted = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
+
+    def not_painted(self, poses: int) -> None:
+        """Count poses that came while the node is not active."""
+        if not self.unpainted:
+            self._node.get_logger().warning(
+                f'{self._pose_topic}: poses come and are not painted, because the node is inactive'
+            )
+        self.unpainted += poses
 
     def take_waiting(self) -> None:
         """Take all that has come so far and hand it on."""

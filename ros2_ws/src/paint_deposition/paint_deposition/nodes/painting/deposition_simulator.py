@@ -31,11 +31,11 @@ from paint_deposition.nodes.painting.large_topic import LargeTopic
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.painting_parameters import PAINTING
+from paint_deposition.nodes.painting.painting_parameters import PAINTING, read_part
 from paint_deposition.nodes.painting.part_change import PartChange
 from paint_deposition.nodes.painting.parts import PreparedPart
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import Diagnostics
+from paint_deposition.nodes.runtime.diagnostics import Task
 from paint_deposition.nodes.runtime.file_names import require_file_name
 from paint_deposition.nodes.runtime.messages import of_gun
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
@@ -86,6 +86,9 @@ class DepositionSimulator(PaintingNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
+
+    def _configure(self) -> None:
+        super()._configure()
         # Of several guns the film of each, too.
         self._share_topics = [
             of_gun(name, 'thickness/field') for name in self.gun_names if len(self.gun_names) > 1
@@ -120,9 +123,15 @@ class DepositionSimulator(PaintingNode):
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self._publish_s = 0.0
         self.parts = PartChange(self, saving)
-        tasks = painting_tasks(self, self._more_on_the_film) | {'part': self.parts.status}
-        self._diagnostics = Diagnostics(self, tasks)
         self.publish()
+
+    def _cleanup(self) -> None:
+        super()._cleanup()
+        self.parts.close()
+        self._saving.shutdown()
+
+    def _tasks(self) -> Mapping[str, Task]:
+        return painting_tasks(self, self._more_on_the_film) | {'part': self.parts.status}
 
     # --- the part and its film
 
@@ -142,7 +151,7 @@ class DepositionSimulator(PaintingNode):
 
     def prepared_part(self, mesh_file: str) -> PreparedPart:
         """Read a part that is to come; in a thread of its own."""
-        surface = self._read_surface(mesh_file)
+        surface = read_part(self.values, mesh_file)
         points = self._points_on(surface)
         film = self._film_on(surface, points, self._models)
         film.warm_up()
@@ -248,10 +257,6 @@ class DepositionSimulator(PaintingNode):
         self._figures.publish(message)
 
     # --- services
-
-    def close(self) -> None:
-        self.parts.close()
-        self._saving.shutdown()
 
     async def _save_film(
         self, request: SaveFilm.Request, response: SaveFilm.Response

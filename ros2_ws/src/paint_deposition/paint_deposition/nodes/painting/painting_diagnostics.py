@@ -48,6 +48,7 @@ def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
         'steps faster than a robot': source.jumps.count,
         'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'publishers of poses': ' '.join(source.pose_publishers) or 'none',
+        'poses not painted while inactive': source.unpainted,
         'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
         'states refused': source.refused_states,
@@ -55,6 +56,12 @@ def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(film),
     }
+    if not node.active:
+        if not source.unpainted:
+            return Status(OK, 'inactive', values)
+        return Status(
+            WARN, f'inactive: {source.unpainted} poses came and were not painted', values
+        )
     now_s = time.monotonic()
     if source.refused_frames and now_s - source.refused_s < RECENT_S:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)

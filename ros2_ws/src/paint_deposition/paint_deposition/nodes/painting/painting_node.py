@@ -8,13 +8,11 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 from rclpy.timer import Timer
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
-from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -23,10 +21,11 @@ from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.catching_up import CatchingUp
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.outward_side import OutwardSide
+from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
-from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.qos_watch import QosWatch
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -34,7 +33,7 @@ from paint_deposition.part.surface import Surface
 TEND_PERIOD_S = 0.1
 
 
-class PaintingNode(PaintNode, ABC):
+class PaintingNode(ManagedNode, ABC):
     """Paints points of a part with a model as the motion comes in.
 
     A subclass says which points, with ``_points_on``, and shows the film.
@@ -53,20 +52,31 @@ class PaintingNode(PaintNode, ABC):
     """
 
     catching_up: CatchingUp | None = None
+    repainting: Repainting | None = None
 
-    def __init__(self, name: str, **kwargs: Any):
-        super().__init__(name, **kwargs)
+    def _configure(self) -> None:
         self.watch = QosWatch(self)
         self.inputs = [
             AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
         ]
-        if self.values['catch_up']:
-            self.catching_up = CatchingUp(self, self.values['catch_up'])
         self._shown: CommonFilm | None = None
         self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
         early.look_soon(self)
+
+    def _activate(self) -> None:
+        if self.values['catch_up'] and not self.film.counts.received:
+            self.catching_up = CatchingUp(self, self.values['catch_up'])
+
+    def _deactivate(self) -> None:
+        for source in self.inputs:
+            source.take_waiting()
+        if self.catching_up is not None:
+            self.catching_up.give_up()
+
+    def _cleanup(self) -> None:
+        self._give_up_repainting()
 
     def _prepare(self) -> None:
         self.gun_names: list[str] = self.values['atomizers'] or ['']
@@ -75,7 +85,6 @@ class PaintingNode(PaintNode, ABC):
         # What comes while a part is changed waits for the next one.
         self._held: list[tuple[int, PoseBatch | TriggerChange]] | None = None
         self.model_problem = ''
-        self.repainting: Repainting | None = None
         self._outward = OutwardSide(len(self.gun_names))
         self._notes_told = 0
         self.frame = PartFrame(self, self.values['frame_id'])
@@ -84,7 +93,7 @@ class PaintingNode(PaintNode, ABC):
         self._read_part()
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
         loading = early.load_what_paints(self._models, self.values.get('precision', 'double'))
-        self._take_surface(self._read_surface(self.mesh_file))
+        self._take_surface(read_part(self.values, self.mesh_file))
         self.film = self._film_on(self.surface, self.points, self._models)
         loading.join()
         self.film.warm_up()
@@ -113,7 +122,10 @@ class PaintingNode(PaintNode, ABC):
     # --- motion
 
     def add_poses(self, gun: int, batch: PoseBatch) -> None:
-        """Paint poses of a gun, by its number."""
+        """Paint poses of a gun, by its number, while the node is active."""
+        if not self.active:
+            self.inputs[gun].not_painted(len(batch))
+            return
         if self._held is not None:
             self._held.append((gun, batch))
             return
@@ -210,13 +222,6 @@ class PaintingNode(PaintNode, ABC):
         )
         return LiveFilms(tuple(films))
 
-    def _read_surface(self, mesh_file: str) -> Surface:
-        values = self.values
-        if not mesh_file:
-            raise PaintError(f"{self.get_name()}: mesh_file is empty: give the part's mesh")
-        down = np.array(values['down']) if values['down'] else None
-        return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
-
     def _check(self, values: Mapping[str, Any]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
@@ -303,7 +308,3 @@ class PaintingNode(PaintNode, ABC):
         if self.repainting is not None:
             self.repainting.give_up()
             self.repainting = None
-
-    def destroy_node(self) -> None:
-        self._give_up_repainting()
-        super().destroy_node()

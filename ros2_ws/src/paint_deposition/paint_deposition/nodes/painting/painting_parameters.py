@@ -2,8 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.meshes import read_mesh
 from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -12,8 +20,10 @@ from paint_deposition.nodes.runtime.parameters import (
     fixed,
     mesh_parameters,
 )
+from paint_deposition.part.surface import Surface
 
 PAINTING = dict(
+    **MANAGED,
     **fixed(
         'the film so far lies on this mesh, in this frame; restart the node for another part',
         **mesh_parameters(max_edge_length_m=0.01),
@@ -85,3 +95,15 @@ PAINTING = dict(
         2.0, 'How often what is shown goes out while the film changes [Hz]', (0.1, 30.0)
     ),
 )
+
+
+def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
+    """The surface of a mesh, refined and turned as a node's parameters say.
+
+    Raises:
+        PaintError: there is no mesh, or it cannot be read.
+    """
+    if not mesh_file:
+        raise PaintError("mesh_file is empty: give the part's mesh")
+    down = np.array(values['down']) if values['down'] else None
+    return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)

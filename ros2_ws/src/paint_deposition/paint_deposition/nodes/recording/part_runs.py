@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from pathlib import Path
 
@@ -60,4 +61,6 @@ def free_name(folder: Path, run: str) -> str:
         PaintError: it is no name for a folder.
     """
     require_file_name('run', run)
-    return run + time.strftime('_%Y%m%d_%H%M%S') if (folder / run).exists() else run
+    dated = run + time.strftime('_%Y%m%d_%H%M%S')
+    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
+    return next(name for name in names if not (folder / name).exists())

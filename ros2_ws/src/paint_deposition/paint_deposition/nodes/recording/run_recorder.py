@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,7 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
-from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.nodes.recording.default_topics import (
     PART_POSE,
     POSES,
@@ -26,16 +26,14 @@ from paint_deposition.nodes.recording.default_topics import (
 from paint_deposition.nodes.recording.log_time import LogTime
 from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, notes_on
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
+from paint_deposition.nodes.recording.recorder_parameters import RECORDER
 from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.file_names import (
-    FILE_NAME,
-    FILE_NAME_WORDS,
     require_file_name,
 )
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
-from paint_deposition.nodes.runtime.paint_node import PaintNode
-from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
 
 DISCOVERY_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.1
@@ -45,33 +43,8 @@ POSE_QUEUE_DEPTH = 5000
 QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
 
-RECORDER = fixed(
-    "the run's file is open; call ~/stop and start another recorder",
-    topics=NodeParameter(
-        [],
-        'Topics to record; empty: motion, film, plan, diagnostics and parameter changes [topics]',
-        element=str,
-    ),
-    atomizers=atomizer_names('whose run is recorded'),
-    output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
-    name=NodeParameter(
-        '',
-        "Run's name; empty: run_<date>_<time> [text]",
-        constraints=FILE_NAME_WORDS,
-        allows=lambda value: not value or bool(FILE_NAME.fullmatch(value)),
-    ),
-    compression=NodeParameter(
-        'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
-    ),
-    max_pose_gap_s=NodeParameter(
-        0.25, 'Longest interval between pose stamps that is no gap [s]', (0.001, 60.0)
-    ),
-    mesh_file=NodeParameter('', 'Mesh whose digest to keep with the run; empty: none [path]'),
-    model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
-)
 
-
-class RunRecorder(PaintNode):
+class RunRecorder(ManagedNode):
     """Records serialised messages, byte by byte as they were published.
 
     Publishers are found as they appear, and each topic's subscription is as reliable and as
@@ -80,47 +53,59 @@ class RunRecorder(PaintNode):
     """
 
     PARAMETERS = RECORDER
+    run: RunWriter
+    runs = 0
 
     def __init__(self, **kwargs: Any):
         super().__init__('run_recorder', **kwargs)
+
+    def _configure(self) -> None:
         guns = self.values['atomizers'] or ['']
         wanted = self.values['topics'] or default_topics(guns)
-        self._part_run = ''
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
         self._said_once = SaidOnce(STATIC_FRAMES, self.resolve_topic_name(PART_POSE))
-        self._topics: dict[str, RecordedTopic] = {}
-        self._run_topics: dict[str, RunTopic] = {}
-        self._refused: set[str] = set()
         self._error: RecordingError | None = None
-        self._log_time = LogTime()
         self._progress = {
             self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
                 PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
             )
             for gun in guns
         }
-        self._log_time = LogTime()
         self.offer('~/stop', self._stop)
+
+    def _activate(self) -> None:
+        self.run = self._new_run(self._next_name(), self._notes)
+        self.runs += 1
+        self._part_run = ''
+        self._topics: dict[str, RecordedTopic] = {}
+        self._run_topics: dict[str, RunTopic] = {}
+        self._refused: set[str] = set()
+        self._log_time = LogTime()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
-        self._diagnostics = Diagnostics(self, {'recording': self._status})
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 
     def _prepare(self) -> None:
-        notes = provenance(self.values['mesh_file'], self.values['model_file'])
+        self._notes = provenance(self.values['mesh_file'], self.values['model_file'])
+        if self.values['name']:
+            require_file_name('name', self.values['name'])
+
+    def _next_name(self) -> str:
+        """The run's name; one that this node has recorded by itself is not told from another."""
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
-        require_file_name('name', name)
-        self.run = self._new_run(name, notes)
+        if not self.runs:
+            return name
+        return free_name(Path(self.values['output_directory']), name)
 
     def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
         folder = Path(self.values['output_directory']) / name
         return RunWriter(folder, notes, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
-        if not self.run.complete:
+        if self.runs and not self.run.complete:
             self.run.abandon()
         super().destroy_node()
 
@@ -159,13 +144,6 @@ class RunRecorder(PaintNode):
     # --- writing
 
     def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
-        set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns, name)
-        if self._log_time.set_back_ns > set_back_ns:
-            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
-            self.get_logger().warning(
-                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
-            )
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part))
         log_time_ns = self._log_time_ns(name, received_ns)
@@ -177,7 +155,7 @@ class RunRecorder(PaintNode):
     def _log_time_ns(self, name: str, received_ns: int) -> int:
         """When a message is logged: as received, but never before the one before."""
         set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns)
+        log_time_ns = self._log_time.of(received_ns, name)
         if self._log_time.set_back_ns > set_back_ns:
             step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
             self.get_logger().warning(
@@ -241,12 +219,15 @@ class RunRecorder(PaintNode):
     # --- ending
 
     def _stop(self) -> tuple[bool, str]:
-        self.close()
+        if self.active:
+            self.trigger_deactivate()
         self.finish()
+        if not self.runs:
+            return True, 'nothing was recorded: the recorder was never activated'
         return self.run.complete, self.summary()
 
-    def close(self) -> None:
-        if self.run.complete or self._error is not None:
+    def _deactivate(self) -> None:
+        if self._error is not None:
             return
         for topic in self._topics.values():
             topic.drain()
@@ -268,7 +249,12 @@ class RunRecorder(PaintNode):
         gaps = sum(topic.gaps for topic in topics)
         return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
 
+    def _tasks(self) -> Mapping[str, Task]:
+        return {'recording': self._status}
+
     def _status(self) -> Status:
+        if not self.active and self._error is None:
+            return Status(OK, f'inactive; {self.summary()}' if self.runs else 'inactive')
         try:
             size, free = self.run.path.stat().st_size, shutil.disk_usage(self.run.folder).free
         except OSError as error:

@@ -24,6 +24,9 @@ class Status:
     values: Mapping[str, object] = field(default_factory=dict)
 
 
+Task = Callable[[], Status]
+
+
 class Diagnostics:
     """Publishes the status of every task of a node on /diagnostics.
 
@@ -31,13 +34,23 @@ class Diagnostics:
     period runs on the steady clock: a simulated clock that stands still must not silence it.
     """
 
-    def __init__(
-        self, node: PaintNode, tasks: Mapping[str, Callable[[], Status]], period_s: float = 1.0
-    ):
+    def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
         self._node = node
         self._tasks = dict(tasks)
         self._publisher = node.create_publisher(DiagnosticArray, '/diagnostics', qos.DIAGNOSTICS)
         self._timer = node.create_steady_timer(period_s, self.publish)
+
+    def show(self, tasks: Mapping[str, Task]) -> None:
+        """Tell of these tasks from now on."""
+        self._tasks = dict(tasks)
+
+    def show_only(self, name: str, why: str) -> None:
+        """Tell of this task alone, and of the others why there is nothing to tell.
+
+        An aggregator takes a status that is no longer sent for that of a node that is gone.
+        """
+        for other in self._tasks.keys() - {name}:
+            self._tasks[other] = lambda: Status(OK, why)
 
     def publish(self) -> None:
         message = DiagnosticArray()

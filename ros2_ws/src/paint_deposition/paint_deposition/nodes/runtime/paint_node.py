@@ -41,16 +41,24 @@ class PaintNode(Node):
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
             self._check(self.values)
-            PaintNode.loading = True
-            self._prepare()
+            self._begin()
         except PaintError:
             # The subclass is not complete yet: it has nothing of its own to destroy.
             super().destroy_node()
             raise
-        finally:
-            PaintNode.loading = False
         self.add_on_set_parameters_callback(self._check_changes)
         self.add_post_set_parameters_callback(self._apply_changes)
+
+    def _begin(self) -> None:
+        self._load()
+
+    def _load(self) -> None:
+        """Read the files; a signal breaks it off."""
+        PaintNode.loading = True
+        try:
+            self._prepare()
+        finally:
+            PaintNode.loading = False
 
     # --- for the subclass
 
@@ -70,6 +78,11 @@ class PaintNode(Node):
         """Finish files and the like. Called once, after the last callback; signals are ignored."""
 
     # --- for everybody
+
+    @property
+    def configured(self) -> bool:
+        """Whether its files have been read."""
+        return True
 
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
@@ -126,7 +139,8 @@ class PaintNode(Node):
         new = {change.name: change.value for change in changes}
         try:
             self._check(self.values | new)
-            self._check_change(self.values | new, set(new))
+            if self.configured:
+                self._check_change(self.values | new, set(new))
         except PaintError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
@@ -134,4 +148,5 @@ class PaintNode(Node):
     def _apply_changes(self, changes: list[Parameter]) -> None:
         new = {change.name: change.value for change in changes}
         self.values |= new
-        self._changed(set(new))
+        if self.configured:
+            self._changed(set(new))

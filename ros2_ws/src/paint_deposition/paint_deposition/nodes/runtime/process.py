@@ -35,11 +35,9 @@ def run_node(
     node: PaintNode | None = None
     told_to_stop = told_to_stop or threading.Event()
 
-    def stop(_signum: int, _frame: object) -> None:
+    def stop(signum: int, frame: object) -> None:
         told_to_stop.set()
-        # Loading a mesh takes a while and can be broken off without harm.
-        if PaintNode.loading:
-            raise KeyboardInterrupt
+        _break_off_loading(signum, frame)
 
     try:
         _on_signals(stop)
@@ -69,6 +67,12 @@ def run_node(
 def _on_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
     signal.signal(signal.SIGINT, action)
     signal.signal(signal.SIGTERM, action)
+
+
+def _break_off_loading(_signum: int, _frame: object) -> None:
+    # Loading a mesh takes a while and can be broken off without harm.
+    if PaintNode.loading:
+        raise KeyboardInterrupt
 
 
 def _init() -> None:
@@ -137,7 +141,7 @@ def _signals_finish(finished: Future) -> Iterator[None]:
             if not finished.done():
                 finished.set_result(0)
 
-    _on_signals(lambda _signum, _frame: None)
+    _on_signals(_break_off_loading)
     signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
     thread = threading.Thread(target=wait_for_signal, name='signals', daemon=True)
     thread.start()

@@ -1,0 +1,258 @@
+"""The managed nodes under a lifecycle manager, over real DDS."""
+
+from __future__ import annotations
+
+import os
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+pytest.importorskip('rclpy')
+
+from geometry_msgs.msg import PoseStamped
+from lifecycle_msgs.msg import TransitionEvent
+from lifecycle_msgs.srv import ChangeState, GetState
+from paint_msgs.srv import SaveFilm
+from rclpy.qos import QoSProfile
+
+from booth import SAMPLES
+from nodes.cell import (
+    DIAGNOSTICS,
+    Robot,
+    offline_um,
+    parameters,
+    two_passes,
+    values_of,
+    write_panel,
+)
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
+
+MOTION = two_passes()
+
+
+class Manager:
+    """Asks one node for transitions, as a lifecycle manager does."""
+
+    def __init__(self, caller, call, name: str) -> None:
+        self._caller, self._call, self._name = caller, call, name
+
+    def __getattr__(self, transition: str):
+        """`configure()` and so on: whether it succeeded, and the state after it."""
+        request = ChangeState.Request()
+        request.transition.label = transition
+
+        def change() -> tuple[bool, str]:
+            answer = self._call(self._caller, ChangeState, f'{self._name}/change_state', request)
+            return answer.success, self.state
+
+        return change
+
+    @property
+    def state(self) -> str:
+        answer = self._call(self._caller, GetState, f'{self._name}/get_state', GetState.Request())
+        return answer.current_state.label
+
+
+@pytest.fixture
+def viewer(onlooker):
+    return onlooker(DIAGNOSTICS)
+
+
+@pytest.fixture
+def manager(viewer, call):
+    """`manager(node)`: a manager of this node."""
+
+    def manager(node) -> Manager:
+        return Manager(viewer, call, node.get_fully_qualified_name())
+
+    return manager
+
+
+@pytest.fixture
+def recorder(ros_context, spin, tmp_path):
+    chosen = {'output_directory': str(tmp_path), 'name': 'run', 'autostart': False}
+    node = RunRecorder(context=ros_context, parameter_overrides=parameters(**chosen))
+    spin(node)
+    return node
+
+
+def test_a_node_that_is_left_alone_is_active(simulator, manager):
+    node = simulator()
+    assert manager(node).state == 'active'
+
+
+def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
+                                             wait_until):  # fmt: skip
+    node = simulator(autostart=False)
+    managed = manager(node)
+    events = onlooker(
+        {'/deposition_simulator/transition_event': (TransitionEvent, QoSProfile(depth=50))}
+    )
+    assert managed.state == 'unconfigured'
+    assert not node.count_subscribers('atomizer/pose')
+    assert managed.activate() == (False, 'unconfigured')
+    assert managed.configure() == (True, 'inactive')
+    assert managed.activate() == (True, 'active')
+    source = robot(node)
+    source.send(MOTION)
+    film = painted(node)
+    assert managed.deactivate() == (True, 'inactive')
+    request = SaveFilm.Request(name='held')
+    saved = call(events, SaveFilm, '/deposition_simulator/save_film', request)
+    assert saved.success
+    assert managed.activate() == (True, 'active')
+    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert np.array_equal(film, offline_um(node, MOTION))
+    assert managed.deactivate() == (True, 'inactive')
+    assert managed.cleanup() == (True, 'unconfigured')
+    wait_until(lambda: not source.pose_publisher.get_subscription_count())
+    assert managed.configure() == (True, 'inactive')
+    assert node.film.counts.received == 0
+    assert managed.shutdown() == (True, 'finalized')
+    (heard,) = events.heard.values()
+    states = [events.decoded(*events.heard, row).goal_state.label for row in range(len(heard))]
+    assert states[-2:] == ['shuttingdown', 'finalized']
+
+
+def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
+    simulator, robot, manager, painted, viewer, wait_until
+):
+    node = simulator(autostart=False)
+    managed = manager(node)
+    managed.configure()
+    source = robot(node)
+    source.send(MOTION, slice(0, 300))
+
+    def status():
+        return viewer.status('deposition_simulator: poses')
+
+    wait_until(lambda: status() and '300 poses came and were not painted' in status().message)
+    assert status().level == b'\x01'
+    managed.activate()
+    source.send(MOTION, slice(300, 600))
+    film = painted(node, 300)
+    # The states count that came before.
+    second_pass = replace(
+        MOTION,
+        stamps_ns=MOTION.stamps_ns[300:],
+        positions_m=MOTION.positions_m[300:],
+        quaternions_xyzw=MOTION.quaternions_xyzw[300:],
+    )
+    assert np.array_equal(film, offline_um(node, second_pass))
+    wait_until(lambda: status().message == 'painting')
+    assert values_of(status())['poses not painted while inactive'] == '300'
+
+
+def test_a_part_that_cannot_be_read_leaves_it_unconfigured(simulator, manager, viewer, wait_until,
+                                                           tmp_path):  # fmt: skip
+    mesh = tmp_path / 'late.stl'
+    mesh.write_text('no mesh')
+    node = simulator(autostart=False, mesh_file=str(mesh))
+    managed = manager(node)
+    assert managed.configure() == (False, 'unconfigured')
+
+    def status():
+        return viewer.status('deposition_simulator: state')
+
+    wait_until(lambda: status() and status().level == b'\x02')
+    assert 'late.stl' in status().message
+    write_panel(mesh)
+    assert managed.configure() == (True, 'inactive')
+    wait_until(lambda: status().level == b'\x00' and status().message.startswith('inactive'))
+
+
+class Faulty(ManagedNode):
+    """Its work fails in a way that nobody foresaw."""
+
+    def _configure(self) -> None:
+        self.create_publisher(PoseStamped, 'poses', 10)
+
+    def _activate(self) -> None:
+        raise ZeroDivisionError('by nothing')
+
+
+def test_an_error_that_nobody_foresaw_leads_back_to_the_beginning(ros_context, spin, manager,
+                                                                  viewer, wait_until):  # fmt: skip
+    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
+    spin(node)
+    managed = manager(node)
+    publishers = len(list(node.publishers))
+    assert managed.configure() == (True, 'inactive')
+    assert managed.activate() == (False, 'unconfigured')
+    assert len(list(node.publishers)) == publishers
+    wait_until(lambda: (status := viewer.status('faulty: state')) and status.level == b'\x02')
+    assert 'ZeroDivisionError: by nothing' in viewer.status('faulty: state').message
+    with pytest.raises(ZeroDivisionError):
+        Faulty('faulty', context=ros_context)
+
+
+def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_context, spin, manager,
+                                                             wait_until, tmp_path):  # fmt: skip
+    managed = manager(recorder)
+    source = Robot(ros_context)
+    spin(source)
+    assert managed.configure() == (True, 'inactive')
+    assert not list(tmp_path.iterdir())
+    for rows in (slice(0, 150), slice(300, 600)):
+        assert managed.activate() == (True, 'active')
+        wait_until(lambda: source.pose_publisher.get_subscription_count() == 1)
+        source.send(MOTION, rows)
+        assert managed.deactivate() == (True, 'inactive')
+        run = recorder.run.folder
+        assert (run / 'metadata.yaml').is_file()
+        recorded = read_trajectory(run, None, None)
+        assert np.array_equal(recorded.stamps_ns, MOTION.stamps_ns[rows])
+        wait_until(lambda: not source.pose_publisher.get_subscription_count())
+    assert len(list(tmp_path.glob('run*'))) == 2
+    assert managed.shutdown() == (True, 'finalized')
+
+
+def test_a_run_that_is_there_is_not_overwritten(recorder, manager, tmp_path):
+    (tmp_path / 'run').mkdir()
+    managed = manager(recorder)
+    managed.configure()
+    assert managed.activate() == (False, 'inactive')
+    assert not list((tmp_path / 'run').iterdir())
+
+
+def of_this_process() -> tuple[int, int]:
+    return threading.active_count(), len(os.listdir('/proc/self/fd'))
+
+
+@pytest.mark.parametrize('name', ['deposition_simulator', 'model_comparison', 'run_recorder'])
+def test_repeated_cycles_leave_nothing_behind(ros_context, spin, manager, tmp_path, name):
+    panel = SAMPLES / 'panel_study'
+    part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.2}
+    node_class, values = {
+        'deposition_simulator': (DepositionSimulator, part),
+        'model_comparison': (
+            ModelComparison,
+            part | {'measurements_file': str(panel / 'panel_577.csv')},
+        ),
+        'run_recorder': (RunRecorder, {'output_directory': str(tmp_path)}),
+    }[name]
+    values = values | {'autostart': False}
+    node = node_class(context=ros_context, parameter_overrides=parameters(**values))
+    spin(node)
+    managed = manager(node)
+
+    def entities() -> list[int]:
+        kinds = (node.publishers, node.subscriptions, node.services, node.timers)
+        return [len(list(kind)) for kind in kinds]
+
+    at_first = entities()
+    found = []
+    for _ in range(4):
+        for transition in (managed.configure, managed.activate, managed.deactivate,
+                           managed.cleanup):  # fmt: skip
+            assert transition()[0]
+        assert entities() == at_first
+        found.append(of_this_process())
+    # The first cycle opens what stays open, shared by all nodes.
+    assert found[-1] <= found[1]
