@@ -175,6 +175,11 @@ class Onlooker(Node):
         heard = self.heard[topic]
         return deserialize_message(heard[-1], self.types[topic]) if heard else None
 
+    def shows(self, topic: str, condition) -> bool:
+        """Whether the last message of a topic is there and meets a condition."""
+        newest = self.newest(topic)
+        return newest is not None and condition(newest)
+
     def first(self, topic: str):
         """The first message of a topic."""
         return self.decoded(topic, 0)

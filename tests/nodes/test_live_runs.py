@@ -94,7 +94,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
         wait_until(lambda: player.exit_code is not None, what='the replay')
         assert player.exit_code == 0, player.err
         wait_until(
-            lambda: statistics.newest('thickness/stats').poses_received == 300,
+            lambda: statistics.shows('thickness/stats', lambda m: m.poses_received == 300),
             what='every pose painted',
         )
         assert call(Trigger, '/run_recorder/stop', Trigger.Request()).success

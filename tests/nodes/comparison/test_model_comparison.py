@@ -132,12 +132,12 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     source.send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
-    wait_until(lambda: viewer.newest('comparison/stats').readings_painted == 40)
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
     without = viewer.newest('comparison/stats')
     assert without.model == 'default model'
     assert without.rmse_um > 3 * SIGMA_UM
     node.set_parameters(parameters(model_file=_true_model(tmp_path)))
-    wait_until(lambda: viewer.newest('comparison/stats').rmse_um < 1.5 * SIGMA_UM)
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
     assert viewer.newest('comparison/stats').model == 'truth.yaml'
 
 

@@ -36,7 +36,7 @@ def test_reset_bares_the_metal(simulator, robot, painted, onlooker, call, wait_u
     answer = call(viewer, Trigger, '/deposition_simulator/reset', Trigger.Request())
     assert answer.success
     assert '600 poses' in answer.message
-    wait_until(lambda: max(viewer.newest('thickness/field').thickness_um) == 0.0)
+    wait_until(lambda: viewer.shows('thickness/field', lambda m: max(m.thickness_um) == 0.0))
     assert node.film.counts.received == 0
     source.send(MOTION)
     assert np.array_equal(painted(node), first)
@@ -122,7 +122,7 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     painted(node)
     changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=100.0)
     assert all(result.successful for result in node.set_parameters(changes))
-    wait_until(lambda: viewer.newest('thickness/stats').within_target == 1.0)
-    wait_until(lambda: viewer.newest('thickness/legend').markers[-1].text == '25 µm')
+    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.within_target == 1.0))
+    wait_until(lambda: viewer.shows('thickness/legend', lambda m: m.markers[-1].text == '25 µm'))
     assert node.set_parameters(parameters(publish_rate_hz=1.0))[0].successful
     assert node._show_timer.timer_period_ns == 1_000_000_000

@@ -200,7 +200,7 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     assert 'no transform between them' in status.message
     assert 'set part_pose and part_parent_frame' in status.message
     assert node.film.up_to_date().film_um.max() == 0.0
-    wait_until(lambda: viewer.newest('thickness/stats').poses_rejected == len(MOTION))
+    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_rejected == len(MOTION)))
     # Refused they were, but none is any more.
     counted = f'{len(MOTION)} poses refused for their frame'
     wait_until(lambda: counted in viewer.status(POSES).message, what='the error gone')
