@@ -91,10 +91,10 @@ class PaintingNode(ManagedNode, ABC):
         self._place_part()
         self._models = read_chosen_models(self.values)
         self._read_part()
-        self.get_logger().info('getting ready; a model seen for the first time is compiled')
         loading = early.load_what_paints(self._models, self.values.get('precision', 'double'))
         self._take_surface(read_part(self.values, self.mesh_file))
         self.film = self._film_on(self.surface, self.points, self._models)
+        self.get_logger().info('getting ready; a model seen for the first time is compiled')
         loading.join()
         self.film.warm_up()
 
