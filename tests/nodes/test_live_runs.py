@@ -145,7 +145,7 @@ def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
 @pytest.mark.parametrize(
     ('module', 'values', 'words'),
     [
-        (SIMULATOR, {}, 'deposition_simulator: mesh_file is empty'),
+        (SIMULATOR, {}, 'mesh_file is empty'),
         (SIMULATOR, {'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
         (COMPARISON, {'mesh_file': 'nowhere.stl'}, 'measurements_file is empty'),
     ],

@@ -18,7 +18,7 @@ from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
-from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import qos

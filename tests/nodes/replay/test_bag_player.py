@@ -24,7 +24,7 @@ from files.recorded import (
 from nodes.replay.listener import recorded
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.files.recordings.triggers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns
 
 
 @pytest.mark.parametrize('rate', [0.0, 20.0])

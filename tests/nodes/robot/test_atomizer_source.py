@@ -172,7 +172,7 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
     robot.move(stamps_from_now() - 30_000_000_000)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY))
     robot.signals['/gun'].publish(Bool(data=True))
-    told = '/gun has no stamps, and the joint states are sent 29.'
+    told = '/gun has no stamps, and the poses of the robot are sent 29.'
     wait_until(lambda: (s := viewer.status('atomizer_source: signals')) and told in s.message)
     assert not viewer.heard['atomizer/state']
 
@@ -180,7 +180,7 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
 @pytest.mark.parametrize(
     ('values', 'message'),
     [
-        ({'urdf_file': ''}, 'urdf_file is empty: give the robot'),
+        ({'urdf_file': ''}, 'urdf_file and base_link are empty: give the robot, or the frame'),
         ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
         ({'flow': '/flow'}, 'flow is given without a trigger'),
         ({'trigger': '/io > many'}, "trigger is '/io > many': give a topic"),

@@ -3,25 +3,24 @@
 from __future__ import annotations
 
 import importlib
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
-from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.files.recordings.joint_states import USUAL_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.nodes.robot.joint_poses import JointPoses
+from paint_deposition.nodes.robot.tf_poses import TfPoses
 from paint_deposition.nodes.runtime import qos
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
 from paint_deposition.nodes.runtime.paint_node import PaintNode
@@ -34,7 +33,6 @@ QUEUE_DEPTH = 5000
 # Who comes late must know whether the gun is open; who is slow must miss no change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
-SILENT_S = 2.0
 SIGNALS = ('trigger', 'flow', 'brush')
 # (topic, message, what the middleware says of it)
 TakeMessage = Callable[[str, Any, 'MessageInfo'], None]
@@ -42,9 +40,15 @@ SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 1
 
 SOURCE = fixed(
     'the subscriptions are made with it when the node starts; restart the node',
-    urdf_file=NodeParameter('', 'The robot, URDF [path]'),
-    tip_link=NodeParameter('', 'Link that carries the bell; empty: tool0, else the last [name]'),
-    base_link=NodeParameter('', 'Link in which the poses are; empty: the root [name]'),
+    urdf_file=NodeParameter(
+        '', 'The robot, URDF, whose joint states give the poses; empty: tf gives them [path]'
+    ),
+    tip_link=NodeParameter(
+        '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
+    ),
+    base_link=NodeParameter(
+        '', 'Link or frame in which the poses are; empty: the root of urdf_file [name]'
+    ),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
     tcp_offset=NodeParameter(
         [],
@@ -68,10 +72,10 @@ SOURCE = fixed(
 
 
 class AtomizerSource(PaintNode):
-    """Publishes `atomizer/pose` from the joints of a robot, and `atomizer/state` from signals.
+    """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
-    A pose has the stamp of the joint state that it was computed from. A signal counts from the
-    stamp of its message, or else from the time at which it was sent.
+    A pose has the stamp of the joint state or transform that it was computed from. A signal
+    counts from the stamp of its message, or else from the time at which it was sent.
     """
 
     PARAMETERS = SOURCE
@@ -85,13 +89,13 @@ class AtomizerSource(PaintNode):
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
         # The joints and the signals that have no publisher yet.
-        self._missing: dict[str, TakeMessage] = {self.values['joint_topic']: self._take_joints}
+        self._missing: dict[str, TakeMessage] = {}
+        self._motion = self._motion_of_robot()
         for signal in self._signals.values():
             self._missing[signal.topic] = self._take_signals
         self._values: dict[str, float] = {}
         self._told: tuple[bool, float, int] | None = None
-        self._poses = self._without_joints = 0
-        self._joints_s = time.monotonic()
+        self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
         self._find_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._find_topics)
@@ -99,8 +103,11 @@ class AtomizerSource(PaintNode):
         self._diagnostics = Diagnostics(self, tasks)
 
     def _check(self, values: Mapping[str, Any]) -> None:
-        if not values['urdf_file']:
-            raise PaintError(f'{self.get_name()}: urdf_file is empty: give the robot')
+        if not values['urdf_file'] and not values['base_link']:
+            raise PaintError(
+                f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
+                'frame in which tf knows its tip'
+            )
         alone = [name for name in ('flow', 'brush') if values[name] and not values['trigger']]
         if alone:
             raise PaintError(f'{alone[0]} is given without a trigger: name what opens the gun')
@@ -110,29 +117,32 @@ class AtomizerSource(PaintNode):
 
     def _prepare(self) -> None:
         values = self.values
-        self._robot = Robot.read(
-            Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
-        )
+        self._robot = None
+        if values['urdf_file']:
+            self._robot = Robot.read(
+                Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
+            )
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.of(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
 
-    def _take_joints(self, _topic: str, message: JointState, info: MessageInfo) -> None:
-        told = dict(zip(message.name, message.position, strict=False))
-        if any(name not in told for name in self._robot.moving):
-            self._without_joints += 1
-            return
-        self._joints_s = time.monotonic()
-        stamp = stamp_ns(message.header)
-        if info['source_timestamp']:
-            self._clock_offset_s = (info['source_timestamp'] - stamp) * 1e-9
-        values = np.array([[told[name] for name in self._robot.moving]])
-        positions, quaternions = self._robot.poses(values)
-        x, y, z, qx, qy, qz, qw = (Rigid.of([*positions[0], *quaternions[0]]) @ self._tcp).values
+    def _motion_of_robot(self) -> JointPoses | TfPoses:
+        values = self.values
+        if self._robot is None:
+            tip = values['tip_link'] or USUAL_TIP
+            return TfPoses(self, values['base_link'], tip, self._publish_pose)
+        joints = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
+        self._missing[values['joint_topic']] = joints.take
+        return joints
+
+    def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
+        if sent_ns:
+            self._clock_offset_s = (sent_ns - stamp) * 1e-9
+        x, y, z, qx, qy, qz, qw = (tip @ self._tcp).values
         pose = PoseStamped()
-        pose.header.frame_id = self._robot.base
+        pose.header.frame_id = self._motion.base
         pose.header.stamp = Time(nanoseconds=stamp).to_msg()
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z = x, y, z
@@ -170,7 +180,7 @@ class AtomizerSource(PaintNode):
                 )
             elif not stamp and abs(self._clock_offset_s) > MAX_CLOCK_OFFSET_S:
                 self._problem = (
-                    f'{topic} has no stamps, and the joint states are sent '
+                    f'{topic} has no stamps, and the poses of the robot are sent '
                     f'{self._clock_offset_s:.3g} s off their own stamps: set the clocks'
                 )
             else:
@@ -191,25 +201,20 @@ class AtomizerSource(PaintNode):
             return
         self._told = on, flow, brush
         state = AtomizerState(spraying=on, flow=flow, brush=brush)
-        state.header.frame_id = self._robot.base
+        state.header.frame_id = self._motion.base
         state.header.stamp = Time(nanoseconds=stamp).to_msg()
         self._state_publisher.publish(state)
 
     # --- health
 
     def _robot_status(self) -> Status:
+        found = self._motion.status()
         values = {
-            'robot': self._robot.path,
-            'poses': f"of '{self._robot.tip}' in '{self._robot.base}'",
+            'poses': f"of '{self._motion.tip}' in '{self._motion.base}'",
             'published': self._poses,
-            'joint states without all joints': self._without_joints,
+            **found.values,
         }
-        if self._without_joints and not self._poses:
-            joints = ' '.join(self._robot.moving)
-            return Status(ERROR, f'no joint state tells of all of {joints}', values)
-        if time.monotonic() - self._joints_s > SILENT_S:
-            return Status(WARN, f'no joint states on {self.values["joint_topic"]}', values)
-        return Status(OK, 'following the robot', values)
+        return Status(found.level, found.message, values)
 
     def _signals_status(self) -> Status:
         values = {

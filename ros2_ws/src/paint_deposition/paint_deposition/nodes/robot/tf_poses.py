@@ -1,0 +1,151 @@
+"""The pose of a robot's tip from tf."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from typing import TYPE_CHECKING, Any
+
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+
+from paint_deposition.errors import PaintError, did_you_mean
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.nodes.robot.joint_poses import SILENT_S, TakePose
+from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.paint_node import PaintNode
+
+if TYPE_CHECKING:  # older distributions have no such name
+    from rclpy.subscription import MessageInfo
+
+QUEUE_DEPTH = 5000
+# Transforms that are so much older than the newest are of a stream that begins again [ns].
+ANOTHER_STREAM_NS = 1_000_000_000
+
+
+class TfPoses:
+    """Gives a pose for each stamp of a transform that moves between two frames.
+
+    A pose waits until all transforms on the way are known at its time or later; tf2 interpolates
+    those that come at other times.
+
+    Args:
+        node: to subscribe with.
+        base, tip: frame of the poses, and whose they are.
+        take_pose: gets each pose, in the order of their stamps.
+
+    Raises:
+        PaintError: tf2 is not installed.
+
+    Attributes:
+        base, tip: the same.
+    """
+
+    def __init__(self, node: PaintNode, base: str, tip: str, take_pose: TakePose) -> None:
+        try:
+            import tf2_ros
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            raise PaintError(
+                f'{node.get_name()}: poses from tf need tf2_ros, which is not installed; install '
+                'tf2_ros_py of your ROS distribution, or give urdf_file'
+            ) from None
+        self.base, self.tip = base.lstrip('/'), tip.lstrip('/')
+        self._take_pose = take_pose
+        self._tf2 = tf2_ros
+        self._buffer = tf2_ros.Buffer()
+        self._parents: dict[str, str] = {}
+        # Stamps of the transforms over time that may lie on the way, by the child's frame.
+        self._waiting: deque[tuple[int, str]] = deque(maxlen=QUEUE_DEPTH)
+        self._newest_ns: dict[str, int] = {}
+        self._told_ns = 0
+        self._unknown = 0
+        self._heard_s = time.monotonic()
+        latched = DurabilityPolicy.TRANSIENT_LOCAL
+        node.create_subscription(
+            TFMessage, '/tf_static', self._take_static, QoSProfile(depth=100, durability=latched)
+        )
+        node.create_subscription(TFMessage, '/tf', self._take, QoSProfile(depth=QUEUE_DEPTH))
+
+    def _take_static(self, message: Any) -> None:
+        for transform in message.transforms:
+            self._connect(transform)
+            self._buffer.set_transform_static(transform, 'tf')
+
+    def _take(self, message: Any, info: MessageInfo) -> None:
+        for transform in message.transforms:
+            child, stamp = self._connect(transform), stamp_ns(transform.header)
+            if stamp < self._newest_ns.get(child, 0) - ANOTHER_STREAM_NS:
+                self._begin_again()
+            self._buffer.set_transform(transform, 'tf')
+            self._newest_ns[child] = max(stamp, self._newest_ns.get(child, 0))
+            self._waiting.append((stamp, child))
+        self._hand_on(info['source_timestamp'])
+
+    def _connect(self, transform: Any) -> str:
+        child = transform.child_frame_id.lstrip('/')
+        self._parents[child] = transform.header.frame_id.lstrip('/')
+        return child
+
+    def _begin_again(self) -> None:
+        self._buffer.clear()  # static transforms stay
+        self._waiting.clear()
+        self._newest_ns.clear()
+        self._told_ns = 0
+
+    def _upward(self, frame: str) -> list[str]:
+        """A frame, its parent and so on up to the root."""
+        way = [frame]
+        while way[-1] in self._parents and len(way) <= len(self._parents):
+            way.append(self._parents[way[-1]])
+        return way
+
+    @property
+    def _moving(self) -> set[str]:
+        """The frames on the way that move in their parents; none while no way is known."""
+        from_tip, from_base = self._upward(self.tip), self._upward(self.base)
+        if from_tip[-1] != from_base[-1]:
+            return set()
+        return (set(from_tip) ^ set(from_base)) & self._newest_ns.keys()
+
+    def _hand_on(self, sent_ns: int) -> None:
+        moving = self._moving
+        if not moving:
+            return
+        known_ns = min(self._newest_ns[child] for child in moving)
+        on_the_way = [(at_ns, child) for at_ns, child in self._waiting if child in moving]
+        later = [(at_ns, child) for at_ns, child in on_the_way if at_ns > known_ns]
+        self._waiting = deque(later, maxlen=QUEUE_DEPTH)
+        due = {at_ns for at_ns, _ in on_the_way if self._told_ns < at_ns <= known_ns}
+        for stamp in sorted(due):
+            self._told_ns = stamp
+            try:
+                found = self._buffer.lookup_transform(self.base, self.tip, Time(nanoseconds=stamp))
+            except self._tf2.TransformException:
+                self._unknown += 1
+                continue
+            t, q = found.transform.translation, found.transform.rotation
+            self._heard_s = time.monotonic()
+            self._take_pose(stamp, Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w]), sent_ns)
+
+    def status(self) -> Status:
+        """Whether a way leads from the tip to the base, and its transforms come."""
+        frames = sorted({*self._parents, *self._parents.values()})
+        values = {
+            'frames': ' '.join(frames) or 'none',
+            'frames that move on the way': ' '.join(sorted(self._moving)) or 'none',
+            'times at which tf knew no pose': self._unknown,
+        }
+        if not frames:
+            return Status(WARN, 'no transforms on /tf', values)
+        for name in (self.tip, self.base):
+            if name not in frames:
+                known = did_you_mean(name, frames)
+                return Status(ERROR, f"tf has no frame '{name}'; {known}", values)
+        if not self._moving:
+            told = f"no transforms that move lead from '{self.tip}' to '{self.base}'"
+            return Status(ERROR, told, values)
+        if time.monotonic() - self._heard_s > SILENT_S:
+            return Status(WARN, 'no new transforms of the robot on /tf', values)
+        return Status(OK, 'following the robot', values)
