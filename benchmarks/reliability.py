@@ -4,8 +4,9 @@ Simulator, recorder and player are started beside a robot that sends 250 poses a
 SIGINT or SIGTERM, once or twice, or by SIGKILL, after a random time. What must hold then:
 
 * told to end: exit code 0 within ten seconds, no traceback, no half-written file; a recorder that
-  had begun its run has completed it. In the first tenths of a second, before any code of the node
-  runs, the signal ends Python itself; these ends are counted apart, and leave nothing behind;
+  had begun its run has completed it. More time may be allowed on a machine that is busy with other
+  work: what is being imported ends first. In the first tenths of a second, before any code of the
+  node runs, the signal ends Python itself; these ends are counted apart, and leave nothing behind;
 * killed: the run can be recovered up to a second before the end, without a hole.
 """
 
@@ -36,7 +37,6 @@ from paint_deposition.motion.trajectory import Trajectory
 
 RATE_HZ = 250
 LONGEST_S = 4.0
-ENDS_WITHIN_S = 10.0
 WAYS = {
     'SIGINT once': (signal.SIGINT,),
     'SIGINT twice': (signal.SIGINT, signal.SIGINT),
@@ -45,6 +45,8 @@ WAYS = {
     'SIGKILL': (signal.SIGKILL,),
 }
 EARLY = 'while Python started'
+# What Python says, with exit code 1, when a signal comes before it is whole.
+NO_SITE = 'Failed to import the site module'
 NODES = ('run_recorder', 'deposition_simulator', 'bag_player')
 ALONE = {'OPENBLAS_NUM_THREADS': '1', 'NUMBA_NUM_THREADS': '1'}
 
@@ -56,6 +58,7 @@ class Trial:
     node: str
     way: str
     after_s: float
+    took_s: float
     problem: str
 
 
@@ -63,7 +66,8 @@ class Trial:
 @click.option('--times', default=50, show_default=True, help='Trials of each node.')
 @click.option('--seed', default=1, show_default=True)
 @click.option('--nodes', default=','.join(NODES), show_default=True)
-def main(times: int, seed: int, nodes: str) -> None:
+@click.option('--within', default=10.0, show_default=True, help='Longest time to end [s].')
+def main(times: int, seed: int, nodes: str, within: float) -> None:
     """End each node so many times, the ways in turn; ends with 1 where something did not hold."""
     rng = np.random.default_rng(seed)
     trials = []
@@ -73,12 +77,15 @@ def main(times: int, seed: int, nodes: str) -> None:
             for number in range(times):
                 way = [*WAYS][number % len(WAYS)]
                 folder = Path(place) / f'{node}_{number}'
-                trials.append(_trial(node, way, rng.uniform(0.0, LONGEST_S), folder, mesh, bag))
+                after_s = rng.uniform(0.0, LONGEST_S)
+                trials.append(_trial(node, way, after_s, within, folder, mesh, bag))
                 if trials[-1].problem not in ('', EARLY):
                     print(trials[-1], flush=True)
     failed = [trial for trial in trials if trial.problem not in ('', EARLY)]
     held = Counter(f'{t.node}, {t.problem or t.way}' for t in trials if t.problem in ('', EARLY))
-    print(json.dumps({'trials': len(trials), 'failed': len(failed), 'held': held}, indent=2))
+    slowest_s = max(trial.took_s for trial in trials)
+    told = {'trials': len(trials), 'failed': len(failed), 'slowest_s': slowest_s, 'held': held}
+    print(json.dumps(told, indent=2))
     sys.exit(1 if failed else 0)
 
 
@@ -96,7 +103,9 @@ def _motion(folder: Path) -> Path:
     return write_pose_bag(folder / 'motion', motion)
 
 
-def _trial(node: str, way: str, after_s: float, folder: Path, mesh: Path, bag: Path) -> Trial:
+def _trial(
+    node: str, way: str, after_s: float, within_s: float, folder: Path, mesh: Path, bag: Path
+) -> Trial:
     folder.mkdir()
     parameters = {
         'run_recorder': {'output_directory': folder, 'name': 'run', 'topics': '[atomizer/pose]'},
@@ -113,21 +122,24 @@ def _trial(node: str, way: str, after_s: float, folder: Path, mesh: Path, bag: P
         stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, env=os.environ | ALONE,
     )  # fmt: skip
     time.sleep(after_s)
+    told_s = time.monotonic()
     for number in WAYS[way]:
         process.send_signal(number)
     try:
-        said, _ = process.communicate(timeout=ENDS_WITHIN_S)
+        said, _ = process.communicate(timeout=within_s)
         problem = _problem(way, process.returncode, said, folder)
     except subprocess.TimeoutExpired:
         process.kill()
         process.communicate()
-        problem = f'still there after {ENDS_WITHIN_S:g} s'
-    return Trial(node, way, round(after_s, 3), problem)
+        problem = f'still there after {within_s:g} s'
+    took_s = time.monotonic() - told_s
+    return Trial(node, way, round(after_s, 3), round(took_s, 3), problem)
 
 
 def _problem(way: str, exit_code: int, said: str, folder: Path) -> str:
     """What did not hold, '' if nothing."""
-    if exit_code in (-signal.SIGINT, -signal.SIGTERM) and '/nodes/' not in said:
+    ended_python = exit_code in (-signal.SIGINT, -signal.SIGTERM) or NO_SITE in said
+    if ended_python and '/nodes/' not in said:
         # Python itself was still starting; there the signal ends it as it ends any script.
         return EARLY if not any(folder.iterdir()) else 'left something behind'
     if 'Traceback' in said:
