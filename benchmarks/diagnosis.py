@@ -196,6 +196,7 @@ def amounts(painted: PaintedCase, diagnosis: Diagnosis) -> list[dict]:
 @click.option('--every', is_flag=True, help='Every cause alone, in every form, instead of a draw.')
 @click.option('--seed', default=1, show_default=True, help='Another seed draws other campaigns.')
 @click.option('--jobs', default=2, show_default=True, help='Processes.')
+@click.option('--scheduler', help='Address of a Dask scheduler, instead of processes here.')
 @click.option('--quick', is_flag=True, help='Ten campaigns of coarse films: five minutes.')
 @click.option(
     '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
@@ -209,6 +210,7 @@ def main(
     every: bool,
     seed: int,
     jobs: int,
+    scheduler: str | None,
     quick: bool,
     results: Path,
     report_only: bool,
@@ -230,7 +232,8 @@ def main(
     if not report_only:
         found = every_cause(seed) if every else cases(count, chosen, seed)
         done = {(r['case'], r['redraw']) for r in records}
-        records = add(results, run, tasks(found, parcels, redraws, done), jobs)
+        todo = tasks(found, parcels, redraws, done)
+        records = add(results, run, todo, jobs, scheduler)
     click.echo(table(records))
     if failed:
         click.echo('\n' + failures(records))

@@ -2,12 +2,13 @@
 
     python benchmarks/live.py [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
 
-The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are processes
-of their own on one machine; messages go through the real middleware. The simulator starts on a new
-part, and then on the part seen before for each way to watch: nobody, somebody who takes a topic as
-bytes, or the recorder with all that it records by default. A pose's age is the time from its stamp,
-which is when it is sent, to the arrival of the first statistics that are no older. Processor time
-is that of the simulator, all threads, until it has painted everything, over the time of the motion.
+The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are
+processes of their own on one machine; messages go through the real middleware. The simulator
+starts on a new part, and then on the part seen before for each way to watch: nobody, somebody who
+takes a topic as bytes, or the recorder with all that it records by default. A pose's age is the
+time from its stamp, which is when it is sent, to the arrival of the first statistics that are no
+older. Processor time is that of the simulator, all threads, until it has painted everything, over
+the time of the motion.
 """
 
 import argparse
