@@ -53,8 +53,11 @@ def largest_error(film, expected):
 class Screen:
     """A vertical wall in the plane x = 0: what is left of it is not seen from its right."""
 
-    def visible(self, origins_m, points_m):
-        return origins_m[:, :1] * points_m[:, 0] >= 0.0
+    def sees(self, eyes_m, points_m):
+        return eyes_m[..., 0] * points_m[..., 0] >= 0.0
+
+    def horizon_sines(self, points_m, normals):
+        return np.ones(len(points_m))
 
 
 def test_a_gun_at_rest_lays_flux_times_time():

@@ -11,14 +11,14 @@ from paint_deposition.part.surface import Surface
 def test_all_of_an_open_surface_is_seen(make_surface, ball):
     surface = make_surface(ball(0.5), 0.02, jitter=0.3)
     eyes = np.array([[0.0, -0.3, 0.0], [0.3, -0.4, 0.2]])
-    seen = surface.occluder.visible(eyes, surface.vertices_m)
+    seen = surface.occluder.sees(eyes[:, None], surface.vertices_m)
     assert seen.shape == (2, len(surface.vertices_m))
     assert seen.all()
 
 
 def test_concave_surface_sees_its_eye(make_surface, ball):
     surface = make_surface(ball(-0.3), 0.02)
-    assert surface.occluder.visible([[0.0, -0.3, 0.0]], surface.vertices_m).all()
+    assert surface.occluder.sees([0.0, -0.3, 0.0], surface.vertices_m).all()
 
 
 def test_the_shadow_of_a_bar_ends_where_geometry_says():
@@ -28,7 +28,7 @@ def test_the_shadow_of_a_bar_ends_where_geometry_says():
     surface = Surface.from_triangles(both.vertices, np.asarray(both.faces), 0.05)
     z = np.linspace(-0.4, 0.4, 801)
     line = np.stack([0 * z, 0 * z, z], axis=1)
-    seen = surface.occluder.visible([[0.0, -0.4, 0.0]], line)[0]
+    seen = surface.occluder.sees([0.0, -0.4, 0.0], line)
     # The bar's front corners, 0.19 m before the eye, cast the edge onto the wall 0.4 m before it.
     edge_m = 0.05 * 0.4 / 0.19
     clear = np.abs(np.abs(z) - edge_m) > 2e-3
@@ -39,7 +39,7 @@ def test_far_from_the_origin_nothing_is_lost(triangles, ball):
     vertices, faces = triangles(ball(-0.3), 0.02)
     offset = np.array([40.0, -25.0, 3.0])
     surface = Surface.from_triangles(vertices + offset, faces, 0.02)
-    assert surface.occluder.visible([offset - np.array([0.0, 0.3, 0.0])], surface.vertices_m).all()
+    assert surface.occluder.sees(offset - np.array([0.0, 0.3, 0.0]), surface.vertices_m).all()
 
 
 def test_sky_view_factor_of_a_plane_and_of_convex_surface_is_one(make_surface, flat, ball):

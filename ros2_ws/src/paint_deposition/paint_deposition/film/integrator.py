@@ -18,15 +18,15 @@ from paint_deposition.film.layout import (
     step_rows,
     term_constants,
 )
+from paint_deposition.film.lines_of_sight import LinesOfSight, Obstacle, Sight
 from paint_deposition.film.paint_used import PaintUsed
-from paint_deposition.kernel.accumulation import TERMS, compile_kernel
+from paint_deposition.kernel.accumulation import REACH, TERMS, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.visibility import Occluder
 
 Precision = Literal['single', 'double']
-# Lines of sight are traced anew after this travel of the emission point [m].
-SIGHT_STEP_M = 0.01
+# Reach of a pattern that may still become wider [m].
+ANY_REACH_M = 1e6
 # Sub-steps handed to the kernel at once, so that long work can report progress.
 BATCH = 2048
 # The simplest of the compiler's thread pools ends the process when two threads enter it at once.
@@ -54,14 +54,12 @@ class Steps:
 
     Attributes:
         rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
-        visible: (S, V) uint8, which points are seen, one row a tracing.
-        sight: (M,) row of ``visible`` that holds on each sub-step.
+        sight: what is seen on them.
         brush: (M,) row among the model's patterns of the one that sprays.
     """
 
     rows: np.ndarray
-    visible: np.ndarray
-    sight: np.ndarray
+    sight: Sight
     brush: np.ndarray
 
     def __len__(self) -> int:
@@ -70,7 +68,7 @@ class Steps:
     def of_brush(self, row: int) -> 'Steps':
         """Those on which one of the patterns sprays."""
         chosen = self.brush == row
-        return Steps(self.rows[chosen], self.visible, self.sight[chosen], self.brush[chosen])
+        return Steps(self.rows[chosen], self.sight.select(chosen), self.brush[chosen])
 
 
 class FilmIntegrator:
@@ -93,7 +91,7 @@ class FilmIntegrator:
         points: SurfacePoints,
         model: DepositionModel,
         precision: Precision = 'single',
-        occluder: Occluder | None = None,
+        occluder: Obstacle | None = None,
         keep_absent_laws: bool = False,
         parallel: bool = True,
     ) -> None:
@@ -101,6 +99,7 @@ class FilmIntegrator:
         self._parallel = parallel
         self._real: Any = np.float32 if precision == 'single' else np.float64
         self._occluder = occluder
+        self._lines_of_sight: LinesOfSight | None = None
         self._keep_absent_laws = keep_absent_laws
         self._blocks = points.blocks(self._real)
         self.reset()
@@ -113,6 +112,8 @@ class FilmIntegrator:
             model.projection, self.points.down, self.points.outward, self.points.centre_m
         )
         self._shadowed = model.shadow > 0.0 and self._occluder is not None
+        if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
+            self._lines_of_sight = LinesOfSight(self._occluder, self.points, self._blocks)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
         compiled = model.effects if self._keep_absent_laws else self._effects
@@ -131,7 +132,6 @@ class FilmIntegrator:
         self._done = 0
         self.used = PaintUsed()
         self._traced_from: np.ndarray | None = None
-        self._last_seen = np.ones(len(self._blocks.order), dtype=np.uint8)
 
     def fork(self) -> 'FilmIntegrator':
         """One that goes on from here and leaves this one as it is."""
@@ -147,13 +147,16 @@ class FilmIntegrator:
         """Paint along a path, or a part of one, that the effects on it have been applied to."""
         self.used += PaintUsed.of(self.model, path)
         for start in range(0, len(path), BATCH):
-            self.paint(self._steps(path.select(slice(start, start + BATCH))))
+            part = path.select(slice(start, start + BATCH))
+            self.paint(self._steps(part, model_constants(self.model)))
             if progress:
                 progress(min(start + BATCH, len(path)))
 
     def steps(self, path: SprayPath) -> Steps:
         """A path prepared for this model's effects and projection, to be painted repeatedly."""
-        return self._steps(self.sprayed(path)[0])
+        constants = model_constants(self.model)
+        constants[:, REACH] = ANY_REACH_M
+        return self._steps(self.sprayed(path)[0], constants)
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""
@@ -180,10 +183,16 @@ class FilmIntegrator:
         rows = np.flatnonzero(path.flow * path.dwell_s)
         return path.select(rows), rows
 
-    def _steps(self, path: SprayPath) -> Steps:
-        visible, sight = self._lines_of_sight(emission_points_m(self.model, path))
+    def _steps(self, path: SprayPath, constants: np.ndarray) -> Steps:
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
-        return Steps(rows, visible, sight, self.model.pattern_rows(path.brush))
+        brush = self.model.pattern_rows(path.brush)
+        if not (self._lines_of_sight and self._shadowed):
+            return Steps(rows, Sight.free(len(rows), len(self._blocks.spheres)), brush)
+        sight, self._traced_from = self._lines_of_sight.along(
+            emission_points_m(self.model, path), rows, brush,
+            constants.astype(self._real), self._traced_from,
+        )  # fmt: skip
+        return Steps(rows, sight, brush)
 
     def _run(
         self,
@@ -198,7 +207,7 @@ class FilmIntegrator:
         arguments = (
             blocks.points,
             blocks.normals,
-            steps.visible,
+            steps.sight.seen,
             film,
             recent,
             terms,
@@ -206,7 +215,8 @@ class FilmIntegrator:
             blocks.spheres,
             blocks.bounds,
             steps.rows,
-            steps.sight,
+            steps.sight.first,
+            steps.sight.tracing,
             steps.brush,
             constants.astype(self._real),
             self._parameters,
@@ -226,31 +236,6 @@ class FilmIntegrator:
         sorted_back = np.empty(values.shape)
         sorted_back[..., self._blocks.order] = values
         return sorted_back
-
-    def _lines_of_sight(self, origins_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Trace from the first origin and then after every SIGHT_STEP_M of travel.
-
-        Returns:
-            Which points are seen, one row a tracing, the first that of the path so far; and the
-            row that holds for each origin (M,).
-        """
-        rows = np.zeros(len(origins_m), dtype=np.int64)
-        if self._occluder is None or not self._shadowed:
-            return self._last_seen[np.newaxis], rows
-        wanted: list[np.ndarray] = []
-        for step, origin in enumerate(origins_m):
-            last = self._traced_from
-            if last is None or np.linalg.norm(origin - last) > SIGHT_STEP_M:
-                self._traced_from = origin
-                wanted.append(origin)
-            rows[step] = len(wanted)
-        seen = self._last_seen[np.newaxis]
-        if wanted:
-            in_order = self.points.positions_m[self._blocks.order]
-            traced = self._occluder.visible(np.array(wanted), in_order)
-            seen = np.concatenate([seen, traced.astype(np.uint8)])
-        self._last_seen = seen[-1].copy()
-        return seen, rows
 
     @property
     def emitted_cm3(self) -> float:

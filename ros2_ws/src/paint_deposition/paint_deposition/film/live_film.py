@@ -9,6 +9,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.lines_of_sight import Obstacle
 from paint_deposition.motion.motion_log import (
     DEFAULT_LIMIT_POSES,
     MotionLog,
@@ -19,7 +20,6 @@ from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBui
 from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change so much older than the newest pose is from a stream that begins again [ns].
@@ -56,7 +56,7 @@ class LiveFilm:
         model: DepositionModel,
         *,
         precision: Precision = 'single',
-        occluder: Occluder | None = None,
+        occluder: Obstacle | None = None,
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
         trigger_latency_s: float = DEFAULT_TRIGGER_LATENCY_S,
         limit_poses: int = DEFAULT_LIMIT_POSES,

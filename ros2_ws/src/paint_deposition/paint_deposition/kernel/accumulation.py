@@ -70,7 +70,7 @@ parameter_count = 0
 
 
 def paint_block(
-    block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush,
+    block, p, n, seen, film, recent, terms, done, spheres, bounds, steps, first, tracing, brush,
     constants, parameters,
 ):  # fmt: skip
     """Paint one block; arguments as those of ``accumulate``."""
@@ -98,7 +98,8 @@ def paint_block(
         zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
         shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
         weight = step[WEIGHT]
-        seen = visible[sight[m], part]
+        run = first[tracing[m], block]
+        not_hidden = seen[run : run + len(px)]
         for i in range(len(px)):
             dx, dy, dz = px[i] - ox, py[i] - oy, pz[i] - oz
             along = dx * zx + dy * zy + dz * zz
@@ -125,7 +126,7 @@ def paint_block(
             if apart:
                 share = weight * magnification * factor(ray, law)
                 if shadowed:
-                    share *= one - shadow * (one - seen[i])
+                    share *= one - shadow * (one - not_hidden[i])
                 share = share if lit else zero
                 sums[EVEN * LARGEST_BLOCK + i] += share * g1
                 sums[BY_COS * LARGEST_BLOCK + i] += share * g1 * y * per_rho
@@ -138,7 +139,7 @@ def paint_block(
             else:
                 flux = (f * g1 + g2) * weight * magnification * factor(ray, law)
                 if shadowed:
-                    flux *= one - shadow * (one - seen[i])
+                    flux *= one - shadow * (one - not_hidden[i])
                 newest[i] += flux if lit else zero
     if apart:
         for k in range(TERMS):
@@ -147,8 +148,8 @@ def paint_block(
 
 
 def accumulate(
-    p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush, constants,
-    parameters,
+    p, n, seen, film, recent, terms, done, spheres, bounds, steps, first, tracing, brush,
+    constants, parameters,
 ):  # fmt: skip
     """Add the path's film to ``film``.
 
@@ -157,7 +158,7 @@ def accumulate(
 
     Args:
         p, n: (3, V) points and outward normals, single or double precision, in blocks.
-        visible: (S, V) uint8 lines of sight, points in blocks.
+        seen: (N,) uint8, 1 where a point is seen, in runs of a block's points.
         film: (V,) float64 [um], updated in place.
         recent: (V,) [um], updated in place; the film is the sum of both.
         terms: (7, V) [um], written where they are kept apart, then of this path alone; film and
@@ -166,15 +167,16 @@ def accumulate(
         spheres: (B, 4) centre and radius of each block [m].
         bounds: (B + 1,) first point of each block.
         steps: (M, 16) sub-steps, from ``layout.step_rows``.
-        sight: (M,) row of ``visible`` for each sub-step.
+        first: (S, B) where in ``seen`` the run of a tracing and a block begins.
+        tracing: (M,) row of ``first`` for each sub-step.
         brush: (M,) row of ``constants`` for each sub-step.
         constants: (B, 11) of each brush, from ``layout.model_constants``.
         parameters: of the laws, or one unused number.
     """
     for block in prange(len(spheres)):
         paint_block(
-            block, p, n, visible, film, recent, terms, done, spheres, bounds, steps, sight, brush,
-            constants, parameters,
+            block, p, n, seen, film, recent, terms, done, spheres, bounds, steps, first, tracing,
+            brush, constants, parameters,
         )  # fmt: skip
 
 
@@ -192,7 +194,7 @@ def compile_kernel(
     Args:
         flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
             passed in one flat array, those of the flux factors first.
-        shadowed: whether the visibility table is used.
+        shadowed: whether lines of sight count.
         real: precision of the points, np.float32 or np.float64.
         apart: whether the film's terms are kept apart instead of summed.
         parallel: whether blocks are shared among threads.

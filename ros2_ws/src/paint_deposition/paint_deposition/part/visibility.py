@@ -1,12 +1,14 @@
 """Lines of sight: which points a gun sees, and how much of the sky a point sees (Embree)."""
 
 from functools import cached_property
+from threading import Lock
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.part.curvature import tangents
+from paint_deposition.part.horizon import Horizon
 
 # The last bit of a ray before the point that it goes to, and how far above the surface a ray
 # starts.
@@ -28,43 +30,53 @@ class Occluder:
     """
 
     def __init__(self, vertices_m: np.ndarray, faces: np.ndarray) -> None:
+        self._vertices_m, self._faces = vertices_m, faces
         # Embree works in single precision: keep coordinates small.
         self._origin_m = 0.5 * (vertices_m.min(axis=0) + vertices_m.max(axis=0))
-        self._corners = (vertices_m - self._origin_m).astype(np.float32)
-        self._triangles = faces.astype(np.int32)
+        self._building = Lock()
+        self._built: tuple[EmbreeScene, TriangleMesh] | None = None
 
-    @cached_property
+    @property
     def _scene(self) -> EmbreeScene:
-        """Made with the first ray: it takes a second for a million triangles."""
-        scene = EmbreeScene(robust=True)
-        # The scene does not keep the mesh alive by itself.
-        self._mesh = TriangleMesh(scene, self._corners, self._triangles)
-        return scene
+        """Made with the first ray, for all threads: it takes a second for a million triangles."""
+        with self._building:
+            if self._built is None:
+                scene = EmbreeScene(robust=True)
+                corners = (self._vertices_m - self._origin_m).astype(np.float32)
+                # The scene does not keep the mesh alive by itself.
+                self._built = scene, TriangleMesh(scene, corners, self._faces.astype(np.int32))
+            return self._built[0]
 
-    def visible(self, origins_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
+    def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
         """Whether nothing of the part lies between.
 
         Args:
-            origins_m: (M, 3) eyes [m].
-            points_m: (V, 3) points on the part [m].
+            eyes_m, points_m: (..., 3) eyes, and points on the part, of shapes that go together
+                [m].
 
         Returns:
-            (M, V) bool. A point's own surroundings within CLEARANCE_M do not hide it, nor does
+            (...,) bool. A point's own surroundings within CLEARANCE_M do not hide it, nor does
             surface that is seen from behind: incidence is the projection's business.
         """
-        origins_m, points_m = np.atleast_2d(origins_m), np.atleast_2d(points_m)
-        seen = np.empty((len(origins_m), len(points_m)), dtype=bool)
-        rows = max(1, BLOCK_RAYS // max(1, len(points_m)))
-        for start in range(0, len(origins_m), rows):
-            eyes = origins_m[start : start + rows, None, :]
-            way = points_m - eyes
-            length = np.linalg.norm(way, axis=2)
-            direction = way / np.maximum(length, 1e-12)[:, :, None]
-            starts = np.broadcast_to(eyes, way.shape)
-            seen[start : start + rows] = ~self._blocked(
-                starts.reshape(-1, 3), direction.reshape(-1, 3), length.ravel() - CLEARANCE_M
-            ).reshape(length.shape)
-        return seen
+        eyes, points = np.broadcast_arrays(eyes_m, points_m)
+        way = points - eyes
+        length = np.linalg.norm(way, axis=-1)
+        direction = way / np.maximum(length, 1e-12)[..., None]
+        blocked = self._blocked(
+            eyes.reshape(-1, 3), direction.reshape(-1, 3), length.ravel() - CLEARANCE_M
+        )
+        return ~blocked.reshape(length.shape)
+
+    @cached_property
+    def _horizon(self) -> Horizon:
+        return Horizon.of(self._vertices_m, self._faces)
+
+    def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N,) sine of the elevation above which nothing of the part hides a point.
+
+        See ``Horizon.sines``.
+        """
+        return self._horizon.sines(points_m, normals)
 
     def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
@@ -73,15 +85,19 @@ class Occluder:
         only the lowest sky is hidden, as in the shallow recesses of a door.
         """
         sky, weights = _sky()
+        horizon = self.horizon_sines(points_m, normals)
         open_share = np.empty(len(points_m))
         rows = BLOCK_RAYS // SKY_RAYS
         for start in range(0, len(points_m), rows):
-            up = normals[start : start + rows]
+            part = slice(start, start + rows)
+            up = normals[part]
             frame = np.stack([*tangents(up), up])
-            direction = np.einsum('ks,kni->nsi', sky, frame).reshape(-1, 3)
-            starts = np.repeat(points_m[start : start + rows] + LIFT_M * up, SKY_RAYS, axis=0)
+            point, ray = np.nonzero(sky[2] <= horizon[part, None])
+            direction = np.einsum('kr,kri->ri', sky[:, ray], frame[:, point])
+            starts = points_m[part][point] + LIFT_M * up[point]
             blocked = self._blocked(starts, direction, np.full(len(starts), FAR_M))
-            open_share[start : start + rows] = 1.0 - blocked.reshape(-1, SKY_RAYS) @ weights
+            hidden = np.bincount(point, blocked * weights[ray], minlength=len(up))
+            open_share[part] = 1.0 - hidden
         return open_share
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
