@@ -80,7 +80,6 @@ def paint_block(
     settled, newest = film[part], recent[part]
     sums = np.zeros(TERMS * LARGEST_BLOCK if apart else 0)
     one, zero, tiny = real(1.0), real(0.0), real(1e-30)
-    law = to_fixed_tuple(parameters, parameter_count)
     for m in range(len(steps)):
         if (done + m) & (FLUSH - 1) == 0:
             for i in range(len(newest)):
@@ -97,7 +96,7 @@ def paint_block(
         yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
         zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
         shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
-        weight = step[WEIGHT]
+        weight, law = step[WEIGHT], to_fixed_tuple(parameters[brush[m]], parameter_count)
         seen = visible[sight[m], part]
         for i in range(len(px)):
             dx, dy, dz = px[i] - ox, py[i] - oy, pz[i] - oz
@@ -169,7 +168,7 @@ def accumulate(
         sight: (M,) row of ``visible`` for each sub-step.
         brush: (M,) row of ``constants`` for each sub-step.
         constants: (B, 11) of each brush, from ``layout.model_constants``.
-        parameters: of the laws, or one unused number.
+        parameters: (B, n) of the laws for each brush, or one unused number.
     """
     for block in prange(len(spheres)):
         paint_block(
@@ -191,7 +190,7 @@ def compile_kernel(
 
     Args:
         flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
-            passed in one flat array, those of the flux factors first.
+            passed in one row for each brush, those of the flux factors first.
         shadowed: whether the visibility table is used.
         real: precision of the points, np.float32 or np.float64.
         apart: whether the film's terms are kept apart instead of summed.
