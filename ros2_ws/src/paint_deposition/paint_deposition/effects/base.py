@@ -2,14 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from math import prod
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, ClassVar, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
+from paint_deposition.effects.set_point_power import SetPointPower
+from paint_deposition.errors import ModelError
 from paint_deposition.kernel.ray import Ray as Ray
+from paint_deposition.model.brush import Brush
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis, downhill_axis
@@ -99,7 +103,8 @@ class Effect(BaseModel):
     * ``on_film``: the film changes after it has arrived.
     * ``on_gauge``: the gauge reads something else than the film.
 
-    An effect made without arguments is absent.
+    An effect made without arguments is absent. One on the path or on the flux may follow the
+    set-points of the brushes by powers, ``follows``; its law is then that of each brush.
     """
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
@@ -126,6 +131,18 @@ class Effect(BaseModel):
     flux_factor: ClassVar[Callable[..., float] | None] = None
     pattern_scale: ClassVar[Callable[..., float] | None] = None
 
+    follows: tuple[SetPointPower, ...] = Field(
+        (), description='a list of set-points with the power by which the amplitudes follow each'
+    )
+
+    @model_serializer(mode='wrap')
+    def _without_nothing(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """An effect that follows nothing does not say so."""
+        values = written(self)
+        if not self.follows:
+            values.pop('follows', None)
+        return values
+
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         """Return the path that really was sprayed."""
         return path
@@ -146,11 +163,40 @@ class Effect(BaseModel):
         """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
         return 0.0
 
+    def of_brush(self, brush: Brush) -> 'Effect':
+        """The effect at the set-points of a brush.
+
+        Raises:
+            ModelError: the brush does not tell one, or the amplitude is out of bounds there.
+        """
+        if not self.follows:
+            return self
+        whose = f'{self.id} follows a set-point, and brush {brush.number}'
+        factor = prod(power.factor(brush, whose) for power in self.follows)
+        described, values = self.parameters(), {}
+        for name in self.amplitudes():
+            info, neutral = described[name], described[name]['neutral']
+            value = neutral + factor * (getattr(self, name) - neutral)
+            if not info['low'] <= value <= info['high']:
+                raise ModelError(
+                    f'{self.id}: {name} would be {value:.4g} at the set-points of brush '
+                    f'{brush.number}, outside {info["low"]:g} to {info["high"]:g}; correct '
+                    'exponent or amplitude'
+                )
+            values[name] = value
+        return self.model_copy(update=values | {'follows': ()})
+
     @property
     def is_neutral(self) -> bool:
         """Whether all amplitudes are at the value at which the effect is absent."""
         described = self.parameters()
         return all(getattr(self, name) == described[name]['neutral'] for name in self.amplitudes())
+
+    @property
+    def acts_on_the_finished_film(self) -> bool:
+        """Whether it acts on the film after it has arrived, or on the gauge."""
+        own = type(self)
+        return own.on_film is not Effect.on_film or own.on_gauge is not Effect.on_gauge
 
     @property
     def absent(self) -> 'Effect':
@@ -170,6 +216,7 @@ class Effect(BaseModel):
         return {
             name: {**cast(dict, info.json_schema_extra), 'description': info.description}
             for name, info in cls.model_fields.items()
+            if name not in Effect.model_fields
         }
 
     @classmethod
@@ -187,4 +234,5 @@ class Effect(BaseModel):
 
     def values(self) -> tuple[float, ...]:
         """Parameter values in the order declared."""
-        return tuple(float(getattr(self, name)) for name in type(self).model_fields)
+        own = (name for name in type(self).model_fields if name not in Effect.model_fields)
+        return tuple(float(getattr(self, name)) for name in own)

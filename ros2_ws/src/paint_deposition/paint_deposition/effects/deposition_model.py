@@ -176,10 +176,33 @@ class DepositionModel(BaseModel):
         """Whether an effect depends on what lies ahead in the stroke."""
         return any(effect.needs_whole_strokes for effect in self.effects)
 
+    def effects_by_pattern(self) -> tuple[tuple[Effect, ...], ...]:
+        """The effects as they are for each pattern, in the order of ``patterns``.
+
+        Raises:
+            ModelError: an effect follows a set-point that is not known, or cannot follow any.
+        """
+        following = [effect for effect in self.effects if effect.follows]
+        for effect in following:
+            if not self.brushes:
+                raise ModelError(
+                    f'{effect.id} follows set-points, which a model with planar alone does not '
+                    'tell; give brushes'
+                )
+            if effect.acts_on_the_finished_film:
+                raise ModelError(
+                    f'{effect.id} acts on the finished film, which all brushes share: it cannot '
+                    'follow set-points; take `follows` out'
+                )
+        if not following:
+            return (self.effects,) * len(self.patterns)
+        return tuple(tuple(e.of_brush(brush) for e in self.effects) for brush in self.brushes)
+
     @property
     def widening(self) -> float:
         """How many times wider than the planar pattern the effects can make the spray."""
-        return math.prod(effect.reach() for effect in self.effects)
+        by_pattern = self.effects_by_pattern()
+        return max(math.prod(effect.reach() for effect in effects) for effects in by_pattern)
 
     @property
     def reach_m(self) -> float:
@@ -192,8 +215,14 @@ class DepositionModel(BaseModel):
 
     @property
     def shadow(self) -> float:
-        """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
-        return max((effect.shadow() for effect in self.effects), default=0.0)
+        """Most that is stopped of the flux where the line of sight is blocked, 0 to 1."""
+        return max(self.shadows)
+
+    @property
+    def shadows(self) -> tuple[float, ...]:
+        """The same share for each of the patterns."""
+        by_pattern = self.effects_by_pattern()
+        return tuple(max((e.shadow() for e in effects), default=0.0) for effects in by_pattern)
 
     @property
     def max_step_m(self) -> float:

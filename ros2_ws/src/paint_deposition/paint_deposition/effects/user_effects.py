@@ -161,7 +161,8 @@ def _problem_with(effect: type[Effect]) -> str | None:
             return f"has no {name}; add a line {name} = '...'"
     if not re.fullmatch('[a-z][a-z0-9_]*', effect.id):
         return f'has the id {effect.id!r}; use small letters, digits and _'
-    for name, field in effect.model_fields.items():
+    own = [name for name in effect.model_fields if name not in Effect.model_fields]
+    for name, field in ((name, effect.model_fields[name]) for name in own):
         if not isinstance(field.json_schema_extra, dict) or 'role' not in field.json_schema_extra:
             return f'declares {name} without parameter(...); give its unit and bounds there'
     if not effect.amplitudes():
@@ -183,7 +184,7 @@ def _problem_with_law(effect: type[Effect], name: str) -> str | None:
         return None
     if not isinstance(inspect.getattr_static(effect, name), staticmethod):
         return f'defines {name} with self; put @staticmethod before it'
-    wanted = ['ray', *effect.model_fields]
+    wanted = ['ray', *effect.parameters()]
     if list(inspect.signature(law).parameters)[1:] != wanted[1:]:
         return f'must define {name}({", ".join(wanted)}): the ray, then all its parameters'
     values = np.array(effect.typical().values(), dtype=np.float32)

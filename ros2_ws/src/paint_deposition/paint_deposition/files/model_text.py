@@ -105,9 +105,9 @@ def _effect(effect: Effect, folder: Path) -> CommentedMap:
 
 
 def _fields(values: BaseModel, **before: str) -> CommentedMap:
-    text = CommentedMap({**before, **plain(dict(values))})
+    text = CommentedMap({**before, **plain(values.model_dump())})
     for name, info in type(values).model_fields.items():
-        if info.description:
+        if info.description and name in text:
             text.yaml_add_eol_comment(info.description, name, COMMENT_COLUMN)
     return text
 

@@ -132,9 +132,5 @@ def _finish(model: DepositionModel) -> tuple[Effect, ...]:
     return tuple(
         effect
         for effect in model.effects
-        if not effect.is_neutral
-        and (
-            type(effect).on_film is not Effect.on_film
-            or type(effect).on_gauge is not Effect.on_gauge
-        )
+        if not effect.is_neutral and effect.acts_on_the_finished_film
     )

@@ -13,6 +13,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.layout import (
+    compiled_laws,
     emission_points_m,
     model_constants,
     step_rows,
@@ -116,14 +117,13 @@ class FilmIntegrator:
             self._lines_of_sight = LinesOfSight(self._occluder, self.points, self._blocks)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
-        compiled = model.effects if self._keep_absent_laws else self._effects
-        laws, values = [], []
-        for kind in ('flux_factor', 'pattern_scale'):
-            chosen = [e for e in compiled if getattr(type(e), kind) is not None]
-            laws.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
-            values += [value for e in chosen for value in e.values()]
+        whole = model.effects_by_pattern()
+        acting = [[e for e in effects if not e.is_neutral] for effects in whole]
+        # Each effect as it is for every brush, mostly the same.
+        self._on_path = list(zip(*acting, strict=True))
+        *laws, parameters = compiled_laws(whole if self._keep_absent_laws else acting)
         self._variant = (*laws, self._shadowed, self._real)
-        self._parameters = np.array(values or [0.0], dtype=self._real)
+        self._parameters = parameters.astype(self._real)
 
     def reset(self) -> None:
         """Back to bare metal."""
@@ -178,10 +178,20 @@ class FilmIntegrator:
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
         """What is really sprayed of a path, effects on it applied, and the rows that it is."""
-        for effect in self._effects:
-            path = effect.on_path(path, self._context)
+        for effects in self._on_path:
+            path = self._moved(path, effects)
         rows = np.flatnonzero(path.flow * path.dwell_s)
         return path.select(rows), rows
+
+    def _moved(self, path: SprayPath, effects: Sequence[Effect]) -> SprayPath:
+        """The path under an effect as it is for each brush."""
+        kinds = list(dict.fromkeys(effects))
+        moved = [effect.on_path(path, self._context) for effect in kinds]
+        if len(kinds) == 1:
+            return moved[0]
+        # Before the first opening there is no brush, and nothing is sprayed.
+        row = np.searchsorted([brush.number for brush in self.model.brushes[:-1]], path.brush)
+        return SprayPath.by_row(moved, np.array([kinds.index(e) for e in effects])[row])
 
     def _steps(self, path: SprayPath, constants: np.ndarray) -> Steps:
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)

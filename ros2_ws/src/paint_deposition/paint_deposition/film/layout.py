@@ -1,24 +1,29 @@
 """What the kernel reads: a row of numbers for each sub-step, and the constants of the model."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import accumulation as kernel
+from paint_deposition.kernel.laws import Law
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 
+Laws = tuple[tuple[Law, int], ...]
 # Stands for a gain of nothing, which has no logarithm [um/s].
 NO_GAIN_UM_PER_S = 1e-30
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
     """(B, 11) constants of eqs. (1) and (2), a row a brush, as the kernel uses them."""
-    return np.stack([_constants(model, planar) for planar in model.patterns])
+    each = zip(model.patterns, model.shadows, strict=True)
+    return np.stack([_constants(model, planar, shadow) for planar, shadow in each])
 
 
-def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
+def _constants(model: DepositionModel, planar: PlanarPattern, shadow: float) -> np.ndarray:
     projection = model.projection
     ring = planar.K1_cm3_per_s * (1.0 - planar.K2) / planar.gamma_m2
     centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
@@ -32,8 +37,25 @@ def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
     c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
     c[kernel.NEAREST] = projection.nearest_m
     c[kernel.REACH] = model.reach_of_m(planar)
-    c[kernel.SHADOW] = model.shadow
+    c[kernel.SHADOW] = shadow
     return c
+
+
+def compiled_laws(effects: Sequence[Sequence[Effect]]) -> tuple[Laws, Laws, np.ndarray]:
+    """What the kernel inlines of effects, each as it is for every one of B brushes.
+
+    Returns:
+        Flux factors and pattern scales, each with how many parameters it takes; and (B, n) the
+        parameters, one unused number where there are none.
+    """
+    found: list[Laws] = []
+    values: list[list[float]] = [[] for _ in effects]
+    for kind in ('flux_factor', 'pattern_scale'):
+        chosen = [[e for e in each if getattr(type(e), kind) is not None] for each in effects]
+        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen[0]))
+        for row, each in zip(values, chosen, strict=True):
+            row += [value for effect in each for value in effect.values()]
+    return found[0], found[1], np.array([row or [0.0] for row in values])
 
 
 def term_constants(model: DepositionModel) -> np.ndarray:

@@ -80,7 +80,6 @@ def paint_block(
     settled, newest = film[part], recent[part]
     sums = np.zeros(TERMS * LARGEST_BLOCK if apart else 0)
     one, zero, tiny = real(1.0), real(0.0), real(1e-30)
-    law = to_fixed_tuple(parameters, parameter_count)
     for m in range(len(steps)):
         if (done + m) & (FLUSH - 1) == 0:
             for i in range(len(newest)):
@@ -97,7 +96,7 @@ def paint_block(
         yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
         zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
         shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
-        weight = step[WEIGHT]
+        weight, law = step[WEIGHT], to_fixed_tuple(parameters[brush[m]], parameter_count)
         run = first[tracing[m], block]
         not_hidden = seen[run : run + len(px)]
         for i in range(len(px)):
@@ -171,7 +170,7 @@ def accumulate(
         tracing: (M,) row of ``first`` for each sub-step.
         brush: (M,) row of ``constants`` for each sub-step.
         constants: (B, 11) of each brush, from ``layout.model_constants``.
-        parameters: of the laws, or one unused number.
+        parameters: (B, n) of the laws for each brush, or one unused number.
     """
     for block in prange(len(spheres)):
         paint_block(
@@ -193,8 +192,13 @@ def compile_kernel(
 
     Args:
         flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
+    <<<<<<< HEAD
             passed in one flat array, those of the flux factors first.
         shadowed: whether lines of sight count.
+    =======
+            passed in one row for each brush, those of the flux factors first.
+        shadowed: whether the visibility table is used.
+    >>>>>>> brush
         real: precision of the points, np.float32 or np.float64.
         apart: whether the film's terms are kept apart instead of summed.
         parallel: whether blocks are shared among threads.

@@ -5,7 +5,6 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.collapse import Collapse, half_width_m
@@ -258,12 +257,7 @@ def _notes(
         notes.append(f'the target of {request.target_um:g} µm would need {right:.3g} m/s')
     if request.width_m is not None and request.length_m is None:
         notes.append('cycle time is for passes as long as the width')
-    on_film = [e.id for e in model.effects if _acts_on_film(e)]
+    on_film = [e.id for e in model.effects if e.acts_on_the_finished_film]
     if on_film:
         notes.append(f'left out, for they act on the finished film: {", ".join(on_film)}')
     return notes
-
-
-def _acts_on_film(effect: Effect) -> bool:
-    own = type(effect)
-    return own.on_film is not Effect.on_film or own.on_gauge is not Effect.on_gauge

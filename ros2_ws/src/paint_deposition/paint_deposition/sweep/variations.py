@@ -31,7 +31,7 @@ Values = dict[str, Any]
 def known_names() -> list[str]:
     """Everything that may vary."""
     of_model = [f'{section}.{n}' for section, cls in SECTIONS.items() for n in cls.model_fields]
-    of_effects = [f'{e.id}.{name}' for e in EFFECTS.values() for name in e.model_fields]
+    of_effects = [f'{e.id}.{name}' for e in EFFECTS.values() for name in e.parameters()]
     others = (*INPUTS, 'part_pose', 'effects', *OF_PASSES, *OF_MOTION)
     return [*others, *of_model, *of_effects]
 

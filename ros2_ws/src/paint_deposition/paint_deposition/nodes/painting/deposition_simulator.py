@@ -60,9 +60,7 @@ SIMULATOR = PAINTING | {
         'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
     ),
     'target_um': thickness('Film wanted; 0: none [µm]'),
-    'target_tolerance_um': thickness(
-        'Difference from the target that is allowed [µm]'
-    ),
+    'target_tolerance_um': thickness('Difference from the target that is allowed [µm]'),
     'publish_mesh': NodeParameter(
         True,
         'Whether who listens gets the coloured mesh; of 275,000 vertices it takes 65 MB each [-]',

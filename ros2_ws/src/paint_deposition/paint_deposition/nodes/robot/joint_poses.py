@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from sensor_msgs.msg import JointState
 
-from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
 
