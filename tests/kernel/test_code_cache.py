@@ -22,10 +22,10 @@ def law(ray, rate):
 
 run = kernel.compile_kernel(((law, 1),), (), False, np.float32)
 one, many = np.zeros(1, np.float32), np.zeros((3, 1), np.float32)
-run(many, many, np.ones((1, 1), np.uint8), np.zeros(1), one, np.zeros((1, 0)), 0,
-    np.zeros((1, 4)), np.array([0, 1]),
-    np.zeros((1, kernel.STEP_COLUMNS), np.float32), np.zeros(1, np.int64),
-    np.zeros(1, np.int64), np.ones((1, kernel.MODEL_CONSTANTS), np.float32), one)
+run(many, many, np.ones(1, np.uint8), np.zeros(1), one, np.zeros((1, 0)), 0,
+    np.zeros((1, 4)), np.array([0, 1]), np.zeros((1, kernel.STEP_COLUMNS), np.float32),
+    np.zeros((1, 1), np.int64), np.zeros(1, np.int64), np.zeros(1, np.int64),
+    np.ones((1, kernel.MODEL_CONSTANTS), np.float32), np.zeros((1, 1), np.float32))
 print(sum(run.stats.cache_hits.values()))
 """
 
