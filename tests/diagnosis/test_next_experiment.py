@@ -71,7 +71,7 @@ def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit)
     predicted = found.here[1]
     # Its amplitudes are not free: what they need of their prior is separation, too.
     assert predicted.precision == pytest.approx(1.0 / 9.0)
-    basis = footprint_along(study.rays(fit.model), fit.model.planar)
+    basis = footprint_along(study.rays(fit.model), fit.model.patterns)
     random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], footprint_kinds()[-1])
     law = random.learned(1e-3 * predicted.amounts)
     film_um = [
