@@ -16,7 +16,9 @@ from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.recording.default_topics import default_topics
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from robot_arm import urdf
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
 PLACE = {'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0], 'part_parent_frame': 'base'}
@@ -28,6 +30,7 @@ NODES = {
     ),
     'index_planner': (IndexPlanner, PANEL),
     'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
+    'atomizer_source': (AtomizerSource, {}),
     'run_recorder': (RunRecorder, {'name': 'run'}),
 }
 # Where tf2 is installed, and with use_sim_time.
@@ -54,6 +57,9 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, nam
     node_class, values = NODES[name]
     if name == 'run_recorder':
         values = values | {'output_directory': str(tmp_path)}
+    if name == 'atomizer_source':
+        (tmp_path / 'arm.urdf').write_text(urdf())
+        values = values | {'urdf_file': str(tmp_path / 'arm.urdf')}
     node = node_class(context=ros_context, parameter_overrides=parameters(**values))
     executor.add_node(node)
     rules = allowed(repository, name)
@@ -65,6 +71,8 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, nam
     if name == 'run_recorder':
         # It subscribes as publishers appear.
         heard |= {node.resolve_topic_name(topic) for topic in (*default_topics(['']), 'part')}
+    if name == 'atomizer_source':
+        heard.add('/joint_states')  # likewise
     offered = {service.service_name for service in node.services}
     assert published | NOT_ALWAYS == rules['publish'] | NOT_ALWAYS
     assert heard | NOT_ALWAYS | OF_ALL == rules['subscribe'] | NOT_ALWAYS | OF_ALL

@@ -97,6 +97,11 @@ def poses(viewer) -> tuple[list[int], np.ndarray]:
     return [stamp_ns(message.header) for message in heard], np.array(rows)
 
 
+def told(viewer) -> str:
+    status = viewer.status('atomizer_source: robot')
+    return status.message if status else ''
+
+
 @needs_tf
 def test_poses_are_those_of_the_bell_at_the_stamps_of_the_transforms(broadcaster, viewer,
                                                                      wait_until):  # fmt: skip
@@ -115,7 +120,7 @@ def test_poses_are_those_of_the_bell_at_the_stamps_of_the_transforms(broadcaster
     )
     assert np.abs(found[:, :3] - expected[:, :3]).max() < 1e-9
     assert np.abs(np.sum(found[:, 3:] * expected[:, 3:], axis=1)) == pytest.approx(1.0, abs=1e-12)
-    wait_until(lambda: viewer.status('atomizer_source: robot').message == 'following the robot')
+    wait_until(lambda: told(viewer) == 'following the robot')
 
 
 @needs_tf
@@ -132,15 +137,10 @@ def test_a_stream_that_begins_again_is_followed(broadcaster, viewer, wait_until)
 @needs_tf
 def test_a_frame_that_is_not_there_is_named(broadcaster, viewer, wait_until):
     broadcaster.send(START_NS, foot_to_tool=arm(START_NS))
-
-    def message() -> str:
-        status = viewer.status('atomizer_source: robot')
-        return status.message if status else ''
-
-    wait_until(lambda: message() == "tf has no frame 'tool0'; did you mean 'tool'?")
+    wait_until(lambda: told(viewer) == "tf has no frame 'tool0'; did you mean 'tool'?")
     broadcaster.send(START_NS, foot_to_tool0=arm(START_NS), cell_to_world=rail(START_NS))
-    told = "no transforms that move lead from 'tool0' to 'world'"
-    wait_until(lambda: message() == told)
+    no_way = "no transforms that move lead from 'tool0' to 'world'"
+    wait_until(lambda: told(viewer) == no_way)
     assert not viewer.heard['atomizer/pose']
 
 

@@ -53,9 +53,21 @@ def generate_launch_description():
             description="The robot's joint states, with urdf [topic]",
         ),
         DeclareLaunchArgument(
+            'base_frame',
+            default_value='',
+            description='Frame in which tf gives the poses of tip_frame; empty: none [name]',
+        ),
+        DeclareLaunchArgument(
+            'tip_frame',
+            default_value='tool0',
+            description="Frame that carries the gun, with base_frame; the TCP's offset in it is "
+            'tcp_offset of the parameter file [name]',
+        ),
+        DeclareLaunchArgument(
             'trigger',
             default_value='',
-            description='What opens the gun, with urdf: /gun, or "/io.level > 12" [topic]',
+            description='What opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" '
+            '[topic]',
         ),
         DeclareLaunchArgument(
             'bag',
@@ -131,6 +143,8 @@ def wanted(given):
     """The parameters that the arguments tell of each node, by its name."""
     if not Path(given['parameters']).is_file():
         raise ValueError(f'parameters: there is no file {given["parameters"]}')
+    if given['urdf'] and given['base_frame']:
+        raise ValueError('urdf and base_frame are given: the poses come from joints or from tf')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
@@ -148,6 +162,12 @@ def wanted(given):
         nodes['atomizer_source'] = {
             'urdf_file': given['urdf'],
             'joint_topic': given['joint_topic'],
+            'trigger': given['trigger'],
+        }
+    elif given['base_frame']:
+        nodes['atomizer_source'] = {
+            'base_link': given['base_frame'],
+            'tip_link': given['tip_frame'],
             'trigger': given['trigger'],
         }
     if given['bag']:
