@@ -28,6 +28,7 @@ BENCHMARKS: dict[str, tuple[list[str], list[str]]] = {
     'kernel': ([], ['1']),
     'file_to_film': ([], ['2000', '20000', '--no-scaling']),
     'inference': ([], ['1']),
+    'recommend': ([], ['3']),
     'live': ([], ['--vertices', '20000', '--seconds', '5']),
 }
 LIBRARIES = ('numpy', 'scipy', 'numba', 'trimesh', 'embreex', 'rclpy')

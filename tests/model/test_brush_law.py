@@ -52,7 +52,7 @@ def test_a_bell_that_follows_powers_is_followed(speed, air, voltage, flow):
         'flow_cm3_per_min': flow,
     }  # fmt: skip
     true = brush_at(9, WIDTH, EFFICIENCY, **at)
-    found = BrushLaw(CORNERS).pattern(9, true.set_points)
+    found = BrushLaw(CORNERS).pattern('brushes, 9', true.set_points)
     assert values(found) == pytest.approx(values(true.planar), rel=1e-5)
 
 
@@ -73,7 +73,7 @@ def test_the_law_goes_through_the_calibrated_brushes():
         update={'planar': PlanarPattern(K1_cm3_per_s=0.9, K2=0.5, K3=0.3, phi_rad=-2.0)}
     )
     for brush in (CORNERS[0], other):
-        found = BrushLaw((CORNERS[0], other)).pattern(9, brush.set_points)
+        found = BrushLaw((CORNERS[0], other)).pattern('brushes, 9', brush.set_points)
         assert values(found) == pytest.approx(values(brush.planar), rel=1e-5)
 
 
@@ -83,7 +83,7 @@ def test_twice_the_flow_is_twice_the_paint_where_nothing_else_is_known():
         number=2, flow_cm3_per_min=400.0,
         planar=FIRST.model_copy(update={'K1_cm3_per_s': 4.0 * FIRST.K1_cm3_per_s}),
     )  # fmt: skip
-    found = BrushLaw((one, four)).pattern(3, SetPoints(flow_cm3_per_min=200.0))
+    found = BrushLaw((one, four)).pattern('brushes, 3', SetPoints(flow_cm3_per_min=200.0))
     assert found.K1_cm3_per_s == pytest.approx(2.0 * FIRST.K1_cm3_per_s, rel=1e-5)
     assert found.sigma1_m == pytest.approx(FIRST.sigma1_m, rel=1e-5)
 
@@ -103,15 +103,15 @@ def test_twice_the_flow_is_twice_the_paint_where_nothing_else_is_known():
 def test_what_is_out_of_the_calibrated_range_is_refused(at, message):
     law, wanted = BrushLaw(CORNERS[:2]), SetPoints(**(BASE | at))
     with pytest.raises(ModelError) as refused:
-        law.pattern(9, wanted)
+        law.pattern('brushes, 9', wanted)
     assert message in str(refused.value)
     assert '\n' not in str(refused.value)
 
 
 def test_a_law_needs_two_brushes_that_tell_their_set_points():
     with pytest.raises(ModelError, match='has no planar and lies between no two brushes'):
-        BrushLaw(CORNERS[:1]).pattern(9, SetPoints(**BASE))
+        BrushLaw(CORNERS[:1]).pattern('brushes, 9', SetPoints(**BASE))
     silent = CORNERS[1].model_copy(update={'voltage_kv': None})
     with pytest.raises(ModelError, match='voltage_kv is given and brush 2 has none; add it'):
-        BrushLaw((CORNERS[0], silent)).pattern(9, SetPoints(**BASE))
+        BrushLaw((CORNERS[0], silent)).pattern('brushes, 9', SetPoints(**BASE))
     assert set(SETTINGS) <= set(SetPoints.model_fields)

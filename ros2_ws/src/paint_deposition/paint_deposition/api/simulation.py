@@ -11,6 +11,7 @@ import numpy as np
 from paint_deposition.api.geometry import GunOnPart, look_at_guns, require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
+from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
@@ -189,7 +190,9 @@ def simulate(
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
-    for motion, its_model in zip(motions, models, strict=True):
+    given, told = models, [by_set_points(m, its) for m, its in zip(motions, models, strict=True)]
+    motions, models = [motion for motion, _ in told], [its for _, its in told]
+    for motion, its_model in told:
         require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
@@ -209,7 +212,7 @@ def simulate(
             laid_cm3, integrator.emitted_cm3,
         )
         for name, gun, its_model, laid_cm3, integrator in zip(
-            names or [''], seen, models, common.laid_cm3(surface.vertex_areas_m2).tolist(),
+            names or [''], seen, given, common.laid_cm3(surface.vertex_areas_m2).tolist(),
             common.guns, strict=True,
         )
     )  # fmt: skip

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import Brush, listed
+from paint_deposition.model.brush import BETWEEN, Brush, listed
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
@@ -227,7 +227,13 @@ class DepositionModel(BaseModel):
     @property
     def max_step_m(self) -> float:
         """Travel of a sub-step that keeps the integral's error below 0.1 % of the peak [m]."""
-        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in self.patterns)
+        # Brushes that set-points stand for come and go while a motion is under way.
+        named = [
+            p
+            for p, number in zip(self.patterns, self._numbers or (0,), strict=True)
+            if number < BETWEEN
+        ]
+        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named)
         return min(DEFAULT_MAX_STEP_M, 0.1 * width)
 
     def effect(self, effect_id: str) -> Effect | None:

@@ -28,7 +28,7 @@ def read_brushes(section: Mapping[Any, Any]) -> list[Brush]:
     calibrated = [_brush(n, planar, at) for n, (planar, at) in read.items() if planar]
     law = BrushLaw(tuple(calibrated))
     between = [
-        _brush(n, law.pattern(n, at), at, interpolated=True)
+        _brush(n, law.pattern(f'brushes, {n}', at), at, interpolated=True)
         for n, (planar, at) in read.items()
         if planar is None
     ]

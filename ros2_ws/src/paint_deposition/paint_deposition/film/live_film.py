@@ -3,11 +3,13 @@
 import copy
 from bisect import bisect_right, insort
 from collections.abc import Iterable
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.between_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.lines_of_sight import Obstacle
 from paint_deposition.motion.motion_log import (
@@ -140,9 +142,11 @@ class LiveFilm:
         """Take a change of the trigger, early, in time or late.
 
         Raises:
-            ModelError: its brush is not in the model; the change is not taken.
+            ModelError: its brush is not in the model, or its set-points lie outside the calibrated
+                ones; the change is not taken.
         """
         if change.flow > 0.0:
+            change = self._with_its_brush(change)
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
         self._carry_on(change.stamp_ns)
@@ -188,6 +192,7 @@ class LiveFilm:
         Raises:
             ModelError: the model does not have a brush that was used.
         """
+        model = taken_over(model, self.model)
         untold = self._sprays_untold and not (self._changes or self._carried)
         model.require_brushes({ONLY_BRUSH} if untold else self._brushes)
         builder = self._builder
@@ -205,6 +210,15 @@ class LiveFilm:
         path = away.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
+
+    def _with_its_brush(self, change: TriggerChange) -> TriggerChange:
+        """A change whose set-points tell the brush with the number that stands for them."""
+        if not told_instead(self.model, change.brush, change.set_points):
+            return change
+        model, number = with_set_points(self.model, change.set_points)
+        if model is not self.model:
+            self._integrator.use(model)
+        return replace(change, brush=number)
 
     def _begin_again(self, first_change: TriggerChange) -> None:
         log = self.log

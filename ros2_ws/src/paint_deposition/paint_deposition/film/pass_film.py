@@ -75,7 +75,7 @@ def sampled_collapse(
 ) -> SampledCollapse:
     """``collapse_um`` sampled finely enough for sums over passes; options as there.
 
-    At a fineness of 0.4 sigma_n of parallel passes is still good to 1e-5, in a fifth of the time.
+    At a fineness of 0.25 sigma_n of parallel passes is still good to 1e-5, in a tenth of the time.
     """
     standoff = options.get('standoff_m') or model.projection.nominal_standoff_m
     widening = max(_widening(model, standoff), 1e-6)

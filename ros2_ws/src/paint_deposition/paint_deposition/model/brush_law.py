@@ -52,13 +52,13 @@ class BrushLaw:
 
     brushes: tuple[Brush, ...]
 
-    def pattern(self, number: int, wanted: SetPoints) -> PlanarPattern:
-        """The pattern of brush ``number`` at its set-points.
+    def pattern(self, where: str, wanted: SetPoints) -> PlanarPattern:
+        """The pattern at these set-points.
 
         Raises:
-            ModelError: one line, where a set-point is missing or out of the calibrated range.
+            ModelError: one line that begins with ``where``, if a set-point is missing or out of
+                the calibrated range.
         """
-        where = f'brushes, {number}'
         if len(self.brushes) < 2:
             raise ModelError(
                 f'{where} has no planar and lies between no two brushes that have one; give planar'

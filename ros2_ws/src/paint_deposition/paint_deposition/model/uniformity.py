@@ -58,16 +58,41 @@ class ParallelPasses:
         return film
 
     def sigma_n(self, index_m: float) -> float:
-        """Eq. (5): standard deviation of the film over its mean, over one period.
+        """Eq. (5): standard deviation of the film over its mean, over one period."""
+        return float(self.sigma_n_at(np.array([index_m]))[0])
+
+    def sigma_n_at(self, index_m: np.ndarray) -> np.ndarray:
+        """(N,) eq. (5) at indexes (N,) [m], each the same to the last bit as by itself.
 
         Even points over a period of a smooth periodic function: exact to rounding once they
         resolve the collapse.
         """
-        period = self.period_m(index_m)
+        period = np.array([self.period_m(value) for value in index_m.tolist()])
         finest = min(self.first.finest_m, self.second.finest_m)
-        points = max(FEWEST_POINTS, math.ceil(POINTS_PER_SCALE * period / finest))
-        film = self.thickness_um(index_m, period * np.arange(points) / points)
-        return float(film.std() / film.mean())
+        points = np.maximum(FEWEST_POINTS, POINTS_PER_SCALE * period / finest)
+        # Powers of two, so that many indexes have as many and are computed together.
+        points = 2 ** np.ceil(np.log2(points)).astype(np.int64)
+        found = np.empty(len(index_m))
+        for count in np.unique(points).tolist():
+            rows = points == count
+            film = self._films_um(index_m[rows], period[rows], count)
+            found[rows] = film.std(axis=1) / film.mean(axis=1)
+        return found
+
+    def _films_um(self, index_m: np.ndarray, period_m: np.ndarray, points: int) -> np.ndarray:
+        """(N, points) film [um] over one period of each index."""
+        x = period_m[:, np.newaxis] * np.arange(points) / points
+        film = np.zeros(x.shape)
+        for collapse, row in self._rows(1.0):
+            start, reach = row * index_m, collapse.reach_m
+            lowest = math.floor(np.min((-start - reach) / period_m))
+            highest = math.ceil(np.max((period_m - start + reach) / period_m))
+            lines = start + np.arange(lowest, highest + 1)[:, np.newaxis] * period_m
+            away = x - lines[:, :, np.newaxis]
+            laid = np.where(np.abs(away) <= reach, collapse.thickness_um(away), 0.0)
+            # One pass after the other: passes out of reach change no bit.
+            film += laid.sum(axis=0)
+        return film
 
     def _rows(self, index_m: float) -> list[tuple[Collapse, float]]:
         if self.alike:

@@ -65,6 +65,9 @@ class Trajectory:
             Before the first of them the gun is off.
         trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one,
             throughout.
+        trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
+            magnitude of the voltage [kV] from that time on; not above 0 or NaN is not told. Empty:
+            none is.
         notes: remarks on the recording for the user, a line each.
         warnings: what is likely wrong with it, a line each with the remedy.
         source: the file it came from, for messages.
@@ -85,6 +88,7 @@ class Trajectory:
     source: str = 'trajectory'
     settings: Mapping[str, float] = field(default_factory=dict)
     trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    trigger_set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'
@@ -109,12 +113,22 @@ class Trajectory:
                 'brushes; give one brush a flow, or none'
             )
 
+        if len(self.trigger_set_points) not in (0, len(self.trigger_flow)):
+            raise RecordingError(
+                f'{len(self.trigger_flow)} trigger flows go with {len(self.trigger_set_points)} '
+                'rows of set-points; give one row a flow, or none'
+            )
+
     @property
     def triggers(self) -> list[tuple[int, float, int]]:
         """Time [ns], flow and brush of each change of the trigger."""
         brush = self.trigger_brush if len(self.trigger_brush) else np.zeros(len(self.trigger_flow))
         columns = (self.trigger_stamps_ns, self.trigger_flow, brush.astype(np.int64))
         return list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def set_points_of(self, row: int) -> tuple[float, ...]:
+        """Those from a change of the trigger on, none where none are told."""
+        return tuple(map(float, self.trigger_set_points[row : row + 1].ravel()))
 
     @property
     def brushes(self) -> set[int]:

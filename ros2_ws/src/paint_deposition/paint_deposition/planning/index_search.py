@@ -21,10 +21,10 @@ STANDOFF_PRECISION_M = 1e-5
 # Drift is followed as far as these shares of the right value.
 LEAST, MOST = 0.4, 1.8
 STEPS = 100
-# With effects each step costs a pass through the integrator: few, and each with less than half the
+# With effects each step costs a pass through the integrator: few, and each with a quarter of the
 # sub-steps and samples, which is good to 1e-5 of sigma_n.
 STEPS_WITH_EFFECTS = 6
-SEARCHED = 0.4
+SEARCHED = 0.25
 
 
 @dataclass(frozen=True)
@@ -56,7 +56,7 @@ class IndexCurve:
         finest = min(parallel.first.finest_m, parallel.second.finest_m)
         count = math.ceil((high_m - low_m) / finest * POINTS_PER_SCALE)
         index = np.linspace(low_m, high_m, min(max(count, FEWEST_POINTS), MOST_POINTS))
-        sigma = np.array([parallel.sigma_n(value) for value in index])
+        sigma = parallel.sigma_n_at(index)
         inside = np.flatnonzero((sigma[1:-1] < sigma[:-2]) & (sigma[1:-1] <= sigma[2:])) + 1
         minima = tuple(_refined(parallel, index[k - 1], index[k + 1]) for k in inside)
         return IndexCurve(parallel, index, sigma, minima)
@@ -122,10 +122,20 @@ def index_drift_m(
     parallel: ParallelPasses, index_m: float, tolerance: float
 ) -> tuple[float, float]:
     """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
-    return (
-        _farthest_within(parallel.sigma_n, index_m, LEAST * index_m, tolerance, STEPS),
-        _farthest_within(parallel.sigma_n, index_m, MOST * index_m, tolerance, STEPS),
+    least, most = (
+        _farthest_known(parallel, np.linspace(index_m, share * index_m, STEPS + 1), tolerance)
+        for share in (LEAST, MOST)
     )
+    return least, most
+
+
+def _farthest_known(parallel: ParallelPasses, index_m: np.ndarray, tolerance: float) -> float:
+    """How far one may go along indexes (N,) [m], the first of them good, within a tolerance."""
+    beyond = np.flatnonzero(parallel.sigma_n_at(index_m[1:]) > tolerance)
+    if not len(beyond):
+        return float(index_m[-1])
+    last, first_beyond = index_m[beyond[0] : beyond[0] + 2].tolist()
+    return _crossing_at(parallel.sigma_n, last, first_beyond, tolerance)
 
 
 def standoff_drift_m(
@@ -156,10 +166,7 @@ def standoff_drift_m(
         return there.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
 
     nearest, farthest = (
-        _farthest_within(
-            sigma_n, here, share * here, tolerance, STEPS_WITH_EFFECTS, STANDOFF_PRECISION_M
-        )
-        for share in (LEAST, MOST)
+        _farthest_within(sigma_n, here, share * here, tolerance) for share in (LEAST, MOST)
     )
     return nearest - here, farthest - here
 
@@ -176,17 +183,12 @@ def _crossing_at(
 
 
 def _farthest_within(
-    sigma_n: Callable[[float], float],
-    start: float,
-    limit: float,
-    tolerance: float,
-    steps: int,
-    precision_m: float = PRECISION_M,
+    sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float
 ) -> float:
-    """How far one may go from a good start toward a limit without breaking the tolerance."""
+    """How far the standoff may go from a good start toward a limit within a tolerance [m]."""
     value = start
-    for further in np.linspace(start, limit, steps + 1)[1:].tolist():
+    for further in np.linspace(start, limit, STEPS_WITH_EFFECTS + 1)[1:].tolist():
         if sigma_n(further) > tolerance:
-            return _crossing_at(sigma_n, value, further, tolerance, precision_m)
+            return _crossing_at(sigma_n, value, further, tolerance, STANDOFF_PRECISION_M)
         value = further
     return limit

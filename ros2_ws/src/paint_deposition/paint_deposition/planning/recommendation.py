@@ -30,6 +30,8 @@ BARE = 0.01
 SLOWEST_M_PER_S = 0.005
 FIRST_GUESS_M_PER_S = 0.2
 SPEED_ROUNDS = 6
+# Within this share of a speed film goes as 1 / speed, whatever an effect makes of the speed.
+NEAR = 1e-4
 
 
 @dataclass(frozen=True)
@@ -212,9 +214,7 @@ def _at_target(
                 f'{wanted:.3g} m/s, outside {SLOWEST_M_PER_S:g} to {FASTEST_M_PER_S:g} m/s; the '
                 f'closest is {request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s'
             )
-        if abs(wanted - speed) <= 1e-9 * speed:
-            break
-        if not model.effects:
+        if not model.effects or abs(wanted - speed) <= NEAR * speed:
             parallel = curve.parallel
             first = parallel.first.scaled(speed / wanted)
             second = first if parallel.alike else parallel.second.scaled(speed / wanted)

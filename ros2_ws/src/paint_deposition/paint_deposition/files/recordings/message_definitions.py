@@ -28,6 +28,7 @@ float64 shaping_air_l_per_min
 float64 bell_speed_rpm
 float64 voltage_kv
 int32 brush
+float64 flow_cm3_per_min
 """
 
 

@@ -12,7 +12,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -238,7 +238,8 @@ class AtomizerInput:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')
             flow = relative_flow(message.spraying, message.flow)
-            self._node.add_trigger(self.number, TriggerChange(stamp, flow, message.brush))
+            change = TriggerChange(stamp, flow, message.brush, set_points_of(message))
+            self._node.add_trigger(self.number, change)
         except PaintError as error:
             if str(error) not in self.refusals_of_states:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')

@@ -105,10 +105,8 @@ class CatchingUp:
 
     @staticmethod
     def _changes(recorded: Trajectory) -> list[TriggerChange]:
-        brushes = recorded.trigger_brush.tolist() or [0] * len(recorded.trigger_flow)
-        flows = recorded.trigger_flow.tolist()
-        rows = zip(recorded.trigger_stamps_ns.tolist(), flows, brushes, strict=True)
-        return [TriggerChange(*row) for row in rows]
+        rows = enumerate(recorded.triggers)
+        return [TriggerChange(*told, recorded.set_points_of(row)) for row, told in rows]
 
 
 def _merged(

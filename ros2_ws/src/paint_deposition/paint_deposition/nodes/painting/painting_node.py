@@ -13,6 +13,7 @@ from rclpy.timer import Timer
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
+from paint_deposition.film.between_brushes import require_its_brush
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -143,7 +144,7 @@ class PaintingNode(ManagedNode, ABC):
             self.film.guns[gun].add_trigger(change)
             return
         if change.flow > 0.0:
-            self._models[gun].require_brushes([change.brush])
+            require_its_brush(self._models[gun], change)
         self._held.append((gun, change))
 
     def reset(self) -> None:

@@ -65,6 +65,7 @@ def _state_of_bool(message: RawMessage) -> bytes:
             shaping_air_l_per_min=math.nan,
             bell_speed_rpm=math.nan,
             voltage_kv=math.nan,
+            flow_cm3_per_min=math.nan,
         )
     )
 
