@@ -24,7 +24,7 @@ import trimesh
 # A minute of motion at 250 Hz, whatever the rate here.
 RATE_HZ, POSES_A_MINUTE = 250, 15_000
 PART_M = (1.6, 0.8)
-EDGE_M = {200_000: 0.0036, 20_000: 0.0115, 2_000: 0.036}
+EDGE_M = {200_000: 0.0036, 50_000: 0.0115, 3_000: 0.036}
 SAMPLE_S = 5.0
 # The first part of a run fills caches and queues; the slope is of the rest.
 WARM_SHARE = 0.25

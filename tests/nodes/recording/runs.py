@@ -3,9 +3,14 @@
 import yaml
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
+from rclpy.utilities import get_rmw_implementation_identifier
 
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
+
+# Whether messages come with a number; CycloneDDS gives them none.
+NUMBERED = get_rmw_implementation_identifier() != 'rmw_cyclonedds_cpp'
+UNCOUNTED = ' (losses cannot be counted: this middleware does not number messages)'
 
 
 def pose(stamp_ns: int, x_m: float = 0.0, frame_id: str = 'door') -> PoseStamped:

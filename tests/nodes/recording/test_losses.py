@@ -9,16 +9,11 @@ from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rclpy.serialization import serialize_message
-from rclpy.utilities import get_rmw_implementation_identifier
 from std_msgs.msg import String
 
 from files.recorded import START_NS
-from nodes.recording.runs import pose
+from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
 from paint_deposition.nodes.runtime import qos
-
-# CycloneDDS numbers none.
-NUMBERED = get_rmw_implementation_identifier() != 'rmw_cyclonedds_cpp'
-UNCOUNTED = ' (losses cannot be counted: this middleware does not number messages)'
 
 
 def test_gaps_and_missed_messages_are_counted(record, publisher, wait_until):
