@@ -119,3 +119,39 @@ def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeyp
     address = 'tcp://127.0.0.1:9'
     done = paint('sweep', sweep_file, '-o', tmp_path / 'out', '--scheduler', address)
     assert_refused(done, address, 'dask scheduler')
+
+
+OWN = """
+from paint_deposition.effects.base import Effect, parameter
+
+class Own(Effect):
+    id = 'own'
+    family = 'incidence'
+    gain: float = parameter(0.0, low=-1.0, high=1.0, typical=0.1, unit='1', description='gain')
+
+    @staticmethod
+    def flux_factor(ray, gain):
+        return 1.0 + gain * ray.cos_incidence
+"""
+
+
+@pytest.mark.slow
+def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
+    """Its text is part of what a case is known by, too."""
+    file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
+    file.write_text(OWN)
+    model_file.write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
+    told = TOLD | {'grid': {'model': [str(model_file)], 'speed_factor': SPEEDS[:1]}}
+    sweep = SweepFile.model_validate(told)
+    job = Job.of(sweep, DOOR)
+    surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
+    motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
+    alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
+    file.unlink()
+    finished = Finished(tmp_path / NAME)
+    with workers(count=1) as client:
+        run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
+    (row,) = finished.table([job.cases[0].digest]).to_pylist()
+    assert row['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+    file.write_text(OWN.replace('1.0 + gain', '1.5 + gain'))
+    assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest

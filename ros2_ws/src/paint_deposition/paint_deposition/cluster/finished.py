@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-import pickle
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from paint_deposition.cluster.packing import packed
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.json_files import json_text
 
@@ -26,7 +26,7 @@ def digest_of(*told: Any) -> str:
 
 def content_digest(value: Any) -> str:
     """The same for an input as it is in memory, such as a surface or a motion."""
-    return hashlib.sha256(pickle.dumps(value, protocol=5)).hexdigest()[:32]
+    return hashlib.sha256(packed(value)).hexdigest()[:32]
 
 
 @dataclass(frozen=True)

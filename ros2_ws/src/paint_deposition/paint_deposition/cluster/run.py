@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 from paint_deposition.cluster.finished import Columns, Finished
+from paint_deposition.cluster.packing import packed
 from paint_deposition.cluster.workers import workers, workers_in_words
 from paint_deposition.errors import ManyError
 
@@ -92,7 +93,7 @@ def run(
     sent = _sent(client, {name for case in left.values() for name in case.inputs}, inputs)
     futures: dict[Future, Case] = {
         client.submit(
-            _unpacked, work, case.given, *(sent[name] for name in case.inputs),
+            _unpacked, work, packed(case.given), *(sent[name] for name in case.inputs),
             key=f'case-{case.digest}', pure=False, retries=1,
         ): case
         for case in left.values()
@@ -110,22 +111,21 @@ def run(
 
 def _sent(client: Client, names: set[str], inputs: Mapping[str, Any]) -> dict[str, Future]:
     # With bytes Dask neither walks through the arrays nor copies them for each worker.
-    packed = {name: pickle.dumps(inputs[name], protocol=5) for name in names}
     return {
-        name: client.submit(bytes, content, key=f'input-{name}', pure=False)
-        for name, content in packed.items()
+        name: client.submit(bytes, packed(inputs[name]), key=f'input-{name}', pure=False)
+        for name in names
     }
 
 
 @lru_cache(maxsize=OPENED)
-def _opened(packed: bytes) -> Any:
+def _opened(content: bytes) -> Any:
     """An input as it was. What it keeps for itself, a search tree say, serves the next case."""
-    return pickle.loads(packed)
+    return pickle.loads(content)
 
 
-def _unpacked(work: Callable[..., Columns], given: Mapping[str, Any], *packed: bytes) -> Columns:
+def _unpacked(work: Callable[..., Columns], given: bytes, *inputs: bytes) -> Columns:
     """Run one case in a worker."""
-    return work(given, *map(_opened, packed))
+    return work(pickle.loads(given), *map(_opened, inputs))
 
 
 def _result(future: Future, case: Case) -> Columns:

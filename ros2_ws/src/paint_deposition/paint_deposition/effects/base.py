@@ -112,6 +112,7 @@ class Effect(BaseModel):
     id: ClassVar[str]
     family: ClassVar[str]
     file: ClassVar[Path | None] = None  # a user's own effect
+    file_content: ClassVar[bytes] = b''
     signature: ClassVar[str] = ''
     rivals: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ''

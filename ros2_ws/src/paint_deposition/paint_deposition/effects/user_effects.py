@@ -60,10 +60,19 @@ def read_effect_file(path: str | Path) -> type[Effect]:
         raise ModelError(
             f'{path}: cannot be read ({error.strerror}); give the file of an effect'
         ) from None
+    return effect_of(path, source)
+
+
+def effect_of(path: Path, source: bytes) -> type[Effect]:
+    """The class of a user's own effect from what its file reads, wherever the file may be.
+
+    Raises:
+        ModelError: as ``read_effect_file``.
+    """
     key = (path.resolve(), hashlib.sha256(source).hexdigest())
     if key not in _loaded:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
-        _loaded[key].file = key[0]
+        _loaded[key].file, _loaded[key].file_content = key[0], source
     effect = _loaded[key]
     if effect.id in EFFECTS:
         raise ModelError(

@@ -79,7 +79,8 @@ class Job:
         else:
             inputs = self._of_a_film(values)
             options = self._options(values, planned=inputs[1] == NOTHING)
-        digest = digest_of(code_digest(), model and model_digest(model), options, inputs)
+        own = [effect.file_content.decode() for effect in model.effects] if model else []
+        digest = digest_of(code_digest(), model and model_digest(model), own, options, inputs)
         return Case(digest, {'model': model, **options}, inputs)
 
     def _named(self, key: str, values: Values) -> Path | None:
@@ -115,12 +116,6 @@ class Job:
             return varied_model(DepositionModel(), values)
         file: ModelFile = self._once(('model', path), lambda: read_model_file(path))
         self.files[f'model {path.name}'] = path
-        own = [effect.id for effect in file.model.effects if effect.file is not None]
-        if own:
-            raise ManyError(
-                f'{path}: {own[0]} is an effect file of your own, which workers do not have; '
-                'sweep a model without it'
-            )
         model = file.model
         if DRAW in values:
             model = self._draws(path, file)[values[DRAW]]

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK
+from paint_deposition.sweep.variations import DRAW
 
 # Values that are few enough for a line through their medians.
 FEW_VALUES = 12
@@ -34,17 +35,17 @@ def write_sweep_picture(
     for row, (label, result) in zip(charts, results.items(), strict=True):
         for axes, name in zip(row, names, strict=True):
             quiet(axes, axes.get_xlabel(), label if axes is row[0] else '')
-            _draw(axes, varied[name], result)
+            _draw(axes, varied[name], result, in_order=name != DRAW)
     figure.suptitle(title, x=0.01, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
 
 
-def _draw(axes: Axes, values: np.ndarray, result: np.ndarray) -> None:
+def _draw(axes: Axes, values: np.ndarray, result: np.ndarray, in_order: bool) -> None:
     there = np.isfinite(values) & np.isfinite(result)
     values, result = values[there], result[there]
     axes.scatter(values, result, s=14, color=ACCENT, alpha=0.55, linewidths=0)
     places = np.unique(values)
-    if 1 < len(places) <= FEW_VALUES and len(values) > len(places):
+    if in_order and 1 < len(places) <= FEW_VALUES and len(values) > len(places):
         medians = [np.median(result[values == place]) for place in places]
         axes.plot(places, medians, color=ACCENT, linewidth=1.4)
     # Rounding alone is no result: the chart does not magnify it.
