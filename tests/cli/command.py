@@ -44,6 +44,8 @@ def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.C
             kind = 'pose_table'
         if words[0] == 'inspect' and '--mesh' in words:
             kind = 'gun_on_part'
+        if words[0] == 'inspect' and '--programmed' in words:
+            kind = 'driven_speed'
         jsonschema.validate(json.loads(done.stdout), schema(kind))
     return done
 

@@ -32,7 +32,14 @@ def test_every_command_that_prints_json_has_its_schema():
         if any('--json' in option.opts for option in commands.get_command(context, name).params)
     }
     assert printing == set(KINDS)
-    others = {'program', 'side_by_side', 'pose_table', 'gun_on_part', 'plan_of_faces'}
+    others = {
+        'program',
+        'side_by_side',
+        'pose_table',
+        'gun_on_part',
+        'plan_of_faces',
+        'driven_speed',
+    }
     assert {*KINDS.values(), *others} == set(KINDS_OF_JSON)
 
 

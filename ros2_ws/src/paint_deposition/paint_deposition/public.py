@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from paint_deposition.api.planning import plan, plan_faces, recommend
     from paint_deposition.api.samples import sample_folder
     from paint_deposition.api.simulation import Film, simulate
+    from paint_deposition.api.speeds import compare_speeds
     from paint_deposition.api.writing import write
     from paint_deposition.comparison.comparison import Comparison, SideBySide
     from paint_deposition.diagnosis.reading_choice import ChosenReadings
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from paint_deposition.files.model_file import read_model, write_model
     from paint_deposition.files.motion_files import read_recording
     from paint_deposition.fitting.calibration import Calibration
+    from paint_deposition.motion.driven_speed import DrivenSpeed
     from paint_deposition.motion.trajectory import Trajectory
     from paint_deposition.part.surface import Surface
     from paint_deposition.planning.clearance import GunEnvelope
@@ -44,6 +46,7 @@ DEFINED_IN = {
     'Comparison': 'comparison.comparison',
     'DepositionModel': 'effects.deposition_model',
     'Diagnosis': 'diagnosis.verdict',
+    'DrivenSpeed': 'motion.driven_speed',
     'Film': 'api.simulation',
     'GunEnvelope': 'planning.clearance',
     'GunOnPart': 'api.geometry',
@@ -60,6 +63,7 @@ DEFINED_IN = {
     'choose_readings': 'api.measuring',
     'compare': 'api.inference',
     'compare_models': 'api.inference',
+    'compare_speeds': 'api.speeds',
     'diagnose': 'api.inference',
     'improve': 'api.improvement',
     'look_at': 'api.geometry',
@@ -86,6 +90,7 @@ __all__ = [
     'Comparison',
     'DepositionModel',
     'Diagnosis',
+    'DrivenSpeed',
     'Film',
     'GunEnvelope',
     'GunOnPart',
@@ -102,6 +107,7 @@ __all__ = [
     'choose_readings',
     'compare',
     'compare_models',
+    'compare_speeds',
     'diagnose',
     'improve',
     'look_at',
