@@ -263,8 +263,8 @@ def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
     def status():
         return viewer.status('deposition_simulator: topics')
 
-    topics = 'atomizer/pose', 'thickness/cloud', 'atomizer/state'
-    wait_until(lambda: status() and all(topic in status().message for topic in topics))
+    told = 'atomizer/pose: /robot', 'atomizer/state: /robot', '/stranger', 'thickness/cloud'
+    wait_until(lambda: status() and all(words in status().message for words in told))
     assert status().level == b'\x02'
     assert 'atomizer/pose: /robot publishes another reliability' in status().message
     assert 'thickness/cloud: /onlooker asks for another durability' in status().message

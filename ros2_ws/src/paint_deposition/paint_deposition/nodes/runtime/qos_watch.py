@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Callable
 from functools import partial
 from typing import Any
@@ -76,17 +76,18 @@ class QosWatch:
 
     def misfits(self) -> dict[str, str]:
         """By topic, who is there now and cannot be heard, or cannot hear; new ones are logged."""
-        found: dict[str, str] = {}
+        every: defaultdict[str, list[str]] = defaultdict(list)
         for topic, subscription in self._inputs.items():
             for info in self._node.get_publishers_info_by_topic(topic):
                 why = _misfit(info, subscription.msg_type, info.qos_profile, self._asked(topic))
                 if why:
-                    found[topic] = f'{endpoint_name(info)} publishes {why}'
+                    every[topic].append(f'{endpoint_name(info)} publishes {why}')
         for topic, publisher in self._outputs.items():
             for info in self._node.get_subscriptions_info_by_topic(topic):
                 why = _misfit(info, publisher.msg_type, publisher.qos_profile, info.qos_profile)
                 if why:
-                    found[topic] = f'{endpoint_name(info)} asks for {why}'
+                    every[topic].append(f'{endpoint_name(info)} asks for {why}')
+        found = {topic: ', '.join(sorted(set(what))) for topic, what in every.items()}
         for topic, what in found.items():
             if self._told.get(topic) != what:
                 self._node.get_logger().error(f'{topic}: {what}; they do not hear each other')
