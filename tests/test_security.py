@@ -8,6 +8,8 @@ import pytest
 
 pytest.importorskip('rclpy')
 
+from rclpy.action import get_action_server_names_and_types_by_node
+
 from booth import SAMPLES
 from nodes.cell import parameters
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
@@ -40,20 +42,20 @@ OF_ALL = {'/rosout', '/parameter_events'}
 
 
 def allowed(repository, node: str) -> dict[str, set[str]]:
-    """Full names that a node may publish, subscribe to and reply on."""
+    """Full names that a node may publish, subscribe to, reply on and execute."""
     policies = ElementTree.parse(repository / 'config/sros2/policies.xml')
     (profile,) = policies.findall(f".//profile[@node='{node}']")
     assert profile.get('ns') == '/'
     found = {}
-    for kind in ('publish', 'subscribe', 'reply'):
-        (names,) = profile.findall(f"*[@{kind}='ALLOW']")
+    for kind in ('publish', 'subscribe', 'reply', 'execute'):
+        names = profile.findall(f"*[@{kind}='ALLOW']/*")
         texts = [name.text.replace('~', f'/{node}') for name in names]
         found[kind] = {text if text.startswith('/') else f'/{text}' for text in texts}
     return found
 
 
 @pytest.mark.parametrize('name', NODES)
-def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, name):
+def test_policies_fit_the_nodes(repository, ros_context, executor, wait_until, tmp_path, name):
     node_class, values = NODES[name]
     if name == 'run_recorder':
         values = values | {'output_directory': str(tmp_path)}
@@ -77,3 +79,8 @@ def test_policies_fit_the_nodes(repository, ros_context, executor, tmp_path, nam
     assert published | NOT_ALWAYS == rules['publish'] | NOT_ALWAYS
     assert heard | NOT_ALWAYS | OF_ALL == rules['subscribe'] | NOT_ALWAYS | OF_ALL
     assert offered | NOT_ALWAYS == rules['reply'] | NOT_ALWAYS
+
+    def executed() -> set[str]:
+        return {action for action, _ in get_action_server_names_and_types_by_node(node, name, '/')}
+
+    wait_until(lambda: executed() == rules['execute'], what='the actions of the policies')

@@ -10,10 +10,22 @@ from nodes.processes import NodeProcess
 NODE = """
 import os, signal, sys, time
 from pathlib import Path
+import llvmlite.binding as llvm
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
 from paint_deposition.nodes.runtime.paint_node import PaintNode
 from paint_deposition.nodes.runtime.process import run_node
+
+
+def compile_and_be_told_to_end():
+    # The signal comes while LLVM, called from Python, calls Python.
+    llvm.initialize_native_target()
+    llvm.initialize_native_asmprinter()
+    machine = llvm.Target.from_default_triple().create_target_machine()
+    module = llvm.parse_assembly('define i32 @one() { ret i32 1 }')
+    engine = llvm.create_mcjit_compiler(module, machine)
+    engine.set_object_cache(lambda *_: os.kill(os.getpid(), signal.SIGTERM), None)
+    engine.finalize_object()
 
 
 class Worker(PaintNode):
@@ -34,6 +46,10 @@ class Worker(PaintNode):
             raise PaintError('mesh none.stl does not exist; give a mesh')
         if self.values['does'] == 'load':
             print('loading', flush=True)
+            while True:
+                time.sleep(0.01)
+        if self.values['does'] == 'compile':
+            compile_and_be_told_to_end()
             while True:
                 time.sleep(0.01)
 
@@ -103,6 +119,12 @@ def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
     assert process.wait() == 0
     assert process.out.split() == ['ready', 'closed']
     assert process.err.strip().endswith('[worker]: ready')
+    assert complaints(process.err) == []
+
+
+def test_a_signal_that_the_compiler_would_swallow_ends_cleanly(worker):
+    process = worker('compile')
+    assert process.wait() == 0
     assert complaints(process.err) == []
 
 

@@ -1,4 +1,4 @@
-"""A diagnosis in a process of its own, which a cancel ends at once; the node answers meanwhile."""
+"""A diagnosis in a process of its own: a cancel ends it at once, the node answers meanwhile."""
 
 from __future__ import annotations
 

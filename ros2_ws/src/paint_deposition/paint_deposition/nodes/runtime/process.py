@@ -9,6 +9,7 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
+from types import FrameType
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -20,6 +21,8 @@ from paint_deposition.nodes.runtime.paint_node import PaintNode
 
 EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
+# After so long a signal is tried again that came at a bad moment.
+AGAIN_S = 0.02
 
 
 def run_node(
@@ -35,7 +38,7 @@ def run_node(
     node: PaintNode | None = None
     told_to_stop = told_to_stop or threading.Event()
 
-    def stop(signum: int, frame: object) -> None:
+    def stop(signum: int, frame: FrameType | None) -> None:
         told_to_stop.set()
         _break_off_loading(signum, frame)
 
@@ -56,6 +59,7 @@ def run_node(
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
         _on_signals(signal.SIG_IGN)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
     try:
         if node is not None:
             exit_code = max(exit_code, _closed(node))
@@ -64,15 +68,28 @@ def run_node(
     return exit_code
 
 
-def _on_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
+def _on_signals(action: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
     signal.signal(signal.SIGINT, action)
     signal.signal(signal.SIGTERM, action)
 
 
-def _break_off_loading(_signum: int, _frame: object) -> None:
+def _break_off_loading(_signum: int, frame: FrameType | None) -> None:
     # Loading a mesh takes a while and can be broken off without harm.
-    if PaintNode.loading:
+    if not PaintNode.loading:
+        return
+    if not _in_the_compiler(frame):
         raise KeyboardInterrupt
+    # It calls back into Python from C, where an exception is printed and lost: try again soon.
+    signal.signal(signal.SIGALRM, _break_off_loading)
+    signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
+
+
+def _in_the_compiler(frame: FrameType | None) -> bool:
+    while frame is not None:
+        if str(frame.f_globals.get('__name__')).startswith('llvmlite.'):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def _init() -> None:
