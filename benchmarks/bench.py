@@ -18,11 +18,12 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-from file_to_film import RATE_HZ, exponent
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
 
-from kernel import cpu_name
+from benchmarks.file_to_film import RATE_HZ, exponent  # noqa: E402
+from benchmarks.kernel import cpu_name  # noqa: E402
 
-HERE = Path(__file__).resolve().parent
 # The arguments of each, thorough and quick.
 BENCHMARKS: dict[str, tuple[list[str], list[str]]] = {
     'kernel': ([], ['1']),
@@ -32,13 +33,9 @@ BENCHMARKS: dict[str, tuple[list[str], list[str]]] = {
     'live': ([], ['--vertices', '20000', '--seconds', '5']),
 }
 LIBRARIES = ('numpy', 'scipy', 'numba', 'trimesh', 'embreex', 'rclpy')
-# Pairs of point and sub-step per second that other programs reached on this machine's kind of
-# processor: a loop in C++ with one thread, and two published simulators in Python.
-PEERS_PAIRS_PER_S = {
-    'C++ loop of a coverage planner, 1 thread': 61e6,
-    'PaintRL': 5.7e6,
-    'MA_Cobod': 0.32e6,
-}
+# Pairs of point and sub-step per second that the inner loops of other programs reached on the two
+# cores of docs/measurements.md; the first is the better of two runs of one thread.
+PEERS_PAIRS_PER_S = {'CY, C++, 1 thread': 78e6, 'PaintRL': 5.7e6, 'MA_Cobod': 0.32e6}
 
 
 def measured(name: str, arguments: list[str], folder: Path) -> dict[str, Any]:
@@ -46,7 +43,8 @@ def measured(name: str, arguments: list[str], folder: Path) -> dict[str, Any]:
     print(f'\n=== {name}', flush=True)
     told = folder / f'{name}.json'
     subprocess.run(
-        [sys.executable, str(HERE / f'{name}.py'), *arguments, '--json', str(told)], check=True
+        [sys.executable, str(ROOT / 'benchmarks' / f'{name}.py'), *arguments, '--json', str(told)],
+        check=True,
     )
     return json.loads(told.read_text())
 

@@ -24,7 +24,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from file_to_film import COARSER_THAN_ANY_M, HEIGHT_M, LENGTH_M, STANDOFF_M, body_side, write_stl
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from benchmarks.file_to_film import (  # noqa: E402
+    COARSER_THAN_ANY_M,
+    HEIGHT_M,
+    LENGTH_M,
+    STANDOFF_M,
+    body_side,
+    write_stl,
+)
 
 GUNS = ('robot_1', 'robot_2')
 RATE_HZ = 250

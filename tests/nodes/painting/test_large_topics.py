@@ -13,9 +13,11 @@ from paint_msgs.msg import ThicknessField
 from paint_msgs.srv import ChangePart
 from rclpy.serialization import deserialize_message
 from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import Marker
 
 from nodes.cell import two_passes
 from nodes.processes import NodeProcess
+from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.nodes.runtime import qos
 
@@ -137,3 +139,45 @@ def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooke
             return np.array(other.newest('thickness/field').thickness_um, np.float32)
 
         wait_until(lambda: np.array_equal(newest(), film), what='the newest film')
+
+
+def test_a_large_mesh_comes_in_parts_and_only_those_that_change(simulator, robot, painted,
+                                                                onlooker, monkeypatch,
+                                                                wait_until):  # fmt: skip
+    monkeypatch.setattr('paint_deposition.nodes.painting.film_messages.MOST_FACES', 300)
+    node = simulator(color_max_um=40.0)
+    tiles = -(-len(node.surface.faces) // 300)
+    assert tiles > 5
+    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+
+    markers: dict[int, Marker] = {}
+    decoded: list[bytes] = []
+
+    def colours() -> np.ndarray:
+        """As the viewer shows them; each message is decoded once."""
+        heard = viewer.heard['thickness/mesh'][len(decoded) :]
+        decoded.extend(heard)
+        markers.update((m.id, m) for m in (deserialize_message(data, Marker) for data in heard))
+        found = [c for _, marker in sorted(markers.items()) for c in marker.colors]
+        return np.array([(c.r, c.g, c.b, c.a) for c in found])
+
+    def expected(film: np.ndarray) -> np.ndarray:
+        rgba = film_scale(film, 0.0, 40.0).rgba(film, film > 1.0)
+        corners = [node.shown_as.corners(tile) for tile in range(tiles)]
+        return rgba[np.concatenate(corners)] / np.float32(255.0)
+
+    wait_until(lambda: len(viewer.heard['thickness/mesh']) == tiles, what='the bare mesh')
+    source = robot(node)
+    # The gun is still at the side of the panel.
+    source.send(MOTION, slice(0, 60))
+    begun = expected(painted(node, 60))
+    wait_until(lambda: np.allclose(colours(), begun, atol=1e-6), what='the first colours')
+    assert tiles < len(decoded) < 2 * tiles
+    source.send(MOTION, slice(60, None))
+    whole = expected(painted(node))
+    wait_until(lambda: np.allclose(colours(), whole, atol=1e-6), what='the colours of the film')
+    late = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+    wait_until(lambda: len(late.heard['thickness/mesh']) >= tiles, what='the whole mesh')
+    assert {late.decoded('thickness/mesh', row).id for row in range(-tiles, 0)} == set(
+        range(tiles)
+    )

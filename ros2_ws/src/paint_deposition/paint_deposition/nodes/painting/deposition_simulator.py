@@ -29,6 +29,7 @@ from paint_deposition.nodes.painting.film_files import (
 from paint_deposition.nodes.painting.film_messages import FilmChanges, ShownFilm, stats_message
 from paint_deposition.nodes.painting.large_topic import LargeTopic
 from paint_deposition.nodes.painting.legend import legend
+from paint_deposition.nodes.painting.mesh_tiles import MeshTiles
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING, read_part
@@ -145,7 +146,7 @@ class DepositionSimulator(PaintingNode):
     def _take_surface(self, surface: Surface) -> None:
         super()._take_surface(surface)
         self.shown_as = ShownFilm(surface, self.frame.frame_id)
-        self._changes = FilmChanges(self.shown_as)
+        self._mesh, self._changes = MeshTiles(self.shown_as), FilmChanges(self.shown_as)
 
     def prepared_part(self, mesh_file: str) -> PreparedPart:
         """Read a part that is to come; in a thread of its own."""
@@ -159,6 +160,7 @@ class DepositionSimulator(PaintingNode):
     def show_anew(self) -> None:
         """The part is another one."""
         self._shown = self._legend_ends = None
+        self._mesh = MeshTiles(self.shown_as, clear=True)
         self._changes = FilmChanges(self.shown_as)
 
     # --- parameters
@@ -212,9 +214,9 @@ class DepositionSimulator(PaintingNode):
         film_um, shown_as, scale = self._film_um, self.shown_as, self._scale
         stamp_ns = self.film.newest_ns or 0
 
-        def mesh(_: bool) -> bytes:
+        def mesh(anew: bool) -> bytes | None:
             rows = scale.rows(film_um, film_um > self.values['painted_above_um'])
-            return shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
+            return self._mesh.message(self._edition, stamp_ns, scale.palette, rows, whole=anew)
 
         def cloud(_: bool) -> PointCloud2:
             return shown_as.cloud.message(stamp_ns, film_um)
@@ -229,7 +231,7 @@ class DepositionSimulator(PaintingNode):
             return shown_as.field.message(stamp_ns, film.shares_um[gun])
 
         if self.values['publish_mesh']:
-            self._large['thickness/mesh'].offer(self._edition, mesh)
+            self._large['thickness/mesh'].offer((self._edition, self._mesh.sent), mesh)
         self._large['thickness/cloud'].offer(self._edition, cloud)
         self._large['thickness/changes'].offer((self._edition, at_rest), changes)
         self._large['thickness/field'].offer(self._edition, field)

@@ -7,6 +7,7 @@ import threading
 from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
+import numba
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -21,6 +22,15 @@ if TYPE_CHECKING:
 
 # After the node has told that it is ready.
 LOOK_AFTER_S = 0.1
+
+
+def paint_in_one_thread() -> None:
+    """Let this thread paint alone; other threads, one that repaints say, still share their work.
+
+    Motion comes in pieces of milliseconds: threads that wait for the next one would take more of
+    the processor than the painting.
+    """
+    numba.set_num_threads(1)
 
 
 def load_what_paints(models: Iterable[DepositionModel], precision: Precision) -> threading.Thread:

@@ -17,22 +17,50 @@ from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.part.surface import Surface
 
+# Triangles of a marker, which takes 120 bytes for each.
+MOST_FACES = 150_000
+
 
 class ShownFilm:
     """A part as the simulator shows it: its messages, each made when it is first asked for."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
         self._surface, self._frame_id = surface, frame_id
+        self._made: dict[int, ColouredMesh] = {}
 
     @cached_property
     def mesh_id(self) -> str:
         """Digest of the refined mesh."""
         return self._surface.mesh_id
 
+    @property
+    def tiles(self) -> int:
+        """How many markers the mesh takes."""
+        return -(-len(self._surface.faces) // MOST_FACES)
+
+    def corners(self, tile: int) -> np.ndarray:
+        """(3 F,) vertices at the corners of a marker's triangles."""
+        return self._faces_of(tile).ravel()
+
+    def tile(self, number: int) -> ColouredMesh:
+        """A marker of the mesh."""
+        if number not in self._made:
+            faces, vertices = self._faces_of(number), self._surface.vertices_m
+            self._made[number] = ColouredMesh(vertices, faces, self._frame_id, 'thickness', number)
+        return self._made[number]
+
+    def _faces_of(self, tile: int) -> np.ndarray:
+        faces = self._faces
+        return faces[len(faces) * tile // self.tiles : len(faces) * (tile + 1) // self.tiles]
+
     @cached_property
-    def mesh(self) -> ColouredMesh:
-        surface = self._surface
-        return ColouredMesh(surface.vertices_m, surface.faces, self._frame_id, 'thickness')
+    def _faces(self) -> np.ndarray:
+        """Those of the part; of a large one along its longest side, so that few markers change."""
+        vertices, faces = self._surface.vertices_m, self._surface.faces
+        if self.tiles == 1:
+            return faces
+        along = vertices[:, np.ptp(vertices, axis=0).argmax()]
+        return faces[np.argsort(along[faces].sum(axis=1), kind='stable')]
 
     @cached_property
     def cloud(self) -> FilmCloud:

@@ -80,6 +80,7 @@ class PaintingNode(ManagedNode, ABC):
         self._give_up_repainting()
 
     def _prepare(self) -> None:
+        early.paint_in_one_thread()
         self.gun_names: list[str] = self.values['atomizers'] or ['']
         self.mesh_file: str = self.values['mesh_file']
         self.real_time_factors = [RealTimeFactor() for _ in self.gun_names]
