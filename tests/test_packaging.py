@@ -225,6 +225,15 @@ def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
         assert not Path(f'/proc/{process}').exists()
 
 
+def test_the_aggregator_has_one_group_for_each_node():
+    path = SOURCES / PACKAGE / 'config' / 'diagnostic_aggregator.yaml'
+    groups = yaml.safe_load(path.read_text())['analyzers']['ros__parameters']
+    sought = [
+        word for group in groups.values() if isinstance(group, dict) for word in group['contains']
+    ]
+    assert sorted(sought) == [f'{node}:' for node in NODES]
+
+
 def test_parameter_file_names_every_node():
     assert set(cell_parameters()) == set(NODES)
 
