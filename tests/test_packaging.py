@@ -180,6 +180,7 @@ def test_launch_file_describes_every_node():
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))
     assert set(wanted()) == {'deposition_simulator', 'index_planner'}
+    assert set(wanted(base_frame='world')['atomizer_source']) <= set(table_of('atomizer_source'))
 
 
 @pytest.mark.parametrize(
@@ -200,6 +201,7 @@ def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
     ('argument', 'words'),
     [
         ('rate:=fast', "rate: 'fast' is no number"),
+        ('tip_frame:=gun', 'tip_frame is given without base_frame'),
         ('parameters:=nowhere.yaml', 'there is no file nowhere.yaml'),
         ('use_sim_time:=maybe', '"maybe" is not valid'),
     ],
@@ -221,6 +223,15 @@ def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
     assert 'bag_player ended with exit code 2' in said
     for process in re.findall(r'process started with pid \[(\d+)\]', said):
         assert not Path(f'/proc/{process}').exists()
+
+
+def test_the_aggregator_has_one_group_for_each_node():
+    path = SOURCES / PACKAGE / 'config' / 'diagnostic_aggregator.yaml'
+    groups = yaml.safe_load(path.read_text())['analyzers']['ros__parameters']
+    sought = [
+        word for group in groups.values() if isinstance(group, dict) for word in group['contains']
+    ]
+    assert sorted(sought) == [f'{node}:' for node in NODES]
 
 
 def test_parameter_file_names_every_node():

@@ -27,6 +27,7 @@ from nodes.cell import (
     values_of,
     write_panel,
 )
+from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
@@ -219,6 +220,33 @@ def test_a_run_that_is_there_is_not_overwritten(recorder, manager, tmp_path):
     managed.configure()
     assert managed.activate() == (False, 'inactive')
     assert not list((tmp_path / 'run').iterdir())
+
+
+SLOW = """
+import sys, time
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.runtime.process import run_node
+
+class Slow(ManagedNode):
+    def __init__(self, **kwargs):
+        super().__init__('slow', **kwargs)
+        self.create_timer(0.02, self.trigger_configure)
+
+    def _prepare(self):
+        print('loading', flush=True)
+        while True:
+            time.sleep(0.01)
+
+sys.exit(run_node(Slow))
+"""
+
+
+def test_an_interrupt_breaks_off_what_a_manager_let_it_load(ros_domain, wait_until, tmp_path):
+    with NodeProcess(tmp_path / 'slow', '', code=SLOW, autostart='false') as process:
+        wait_until(lambda: 'loading' in process.out, what='the node')
+        process.interrupt_as_launch_does()
+        assert process.wait() == 0
+        assert 'Traceback' not in process.err
 
 
 def of_this_process() -> tuple[int, int]:

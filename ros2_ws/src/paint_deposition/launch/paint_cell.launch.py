@@ -59,9 +59,9 @@ def generate_launch_description():
         ),
         DeclareLaunchArgument(
             'tip_frame',
-            default_value='tool0',
-            description="Frame that carries the gun, with base_frame; the TCP's offset in it is "
-            'tcp_offset of the parameter file [name]',
+            default_value='',
+            description="Frame that carries the gun, with base_frame; empty: tool0. The TCP's "
+            'offset in it is tcp_offset of the parameter file [name]',
         ),
         DeclareLaunchArgument(
             'trigger',
@@ -145,6 +145,10 @@ def wanted(given):
         raise ValueError(f'parameters: there is no file {given["parameters"]}')
     if given['urdf'] and given['base_frame']:
         raise ValueError('urdf and base_frame are given: the poses come from joints or from tf')
+    if given['tip_frame'] and not given['base_frame']:
+        raise ValueError('tip_frame is given without base_frame: name the frame of the poses')
+    if given['trigger'] and not (given['urdf'] or given['base_frame']):
+        raise ValueError('trigger is given without urdf or base_frame, with which it goes')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
