@@ -126,8 +126,12 @@ class Robot(Node):
             publisher.topic_name for publisher in (self.pose_publisher, self.state_publisher)
         ]
         inputs = [s for node in nodes for s in node.subscriptions if s.topic_name in topics]
-        return all(s.get_publisher_count() for s in inputs) and all(
-            publisher.get_subscription_count() >= len(nodes)
+        return all(s.get_publisher_count() for s in inputs) and self.has_listeners(len(nodes))
+
+    def has_listeners(self, count: int) -> bool:
+        """Whether so many listen to the poses and to the states."""
+        return all(
+            publisher.get_subscription_count() >= count
             for publisher in (self.pose_publisher, self.state_publisher)
         )
 

@@ -31,14 +31,13 @@ def test_it_catches_up_from_the_running_recording(
     robot, viewer = Robot(ros_context), onlooker(STATS)
     spin(robot)
     mesh = write_panel(tmp_path / 'panel.stl')
-    listening = robot.pose_publisher.get_subscription_count
     recorder = NodeProcess(tmp_path / 'rec', 'run_recorder', output_directory=tmp_path, name='run')
     with recorder:
         first = NodeProcess(
             tmp_path / 'sim', 'deposition_simulator', mesh_file=mesh, max_edge_length_m=0.05
         )
         with first:
-            wait_until(lambda: listening() == 2, what='both')
+            wait_until(lambda: robot.has_listeners(2), what='both')
             robot.send(MOTION, slice(0, KILLED_AT))
             wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
         # Killed; the gun goes on.
