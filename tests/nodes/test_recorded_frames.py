@@ -42,7 +42,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     wait_until(lambda: '/part_pose' in recorder.run.counts, what='the pose of the part recorded')
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
-    wait_until(lambda: source.pose_publisher.get_subscription_count() == 2)
+    wait_until(lambda: source.has_listeners(2))
     source.send(in_the_cell(), frame_id='base_link')
     film = painted(node, len(MOTION))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='all recorded')
