@@ -18,6 +18,7 @@ from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.fitting.forward import Forward
+from paint_deposition.model.brush import Brush
 from paint_deposition.model.pattern import PlanarPattern
 from scenes import straight_pass
 
@@ -181,3 +182,28 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
     path.write_text(yaml.safe_dump({'experiments': [entry]}))
     with pytest.raises(PaintError, match="'panel': gun 1 has no 'trajectory'; give the name of"):
         read_campaign(path)
+
+
+def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, tmp_path):
+    bell = DepositionModel()
+    film = pd.simulate(surface, [UPPER, LOWER], [bell, THIN]).film_um
+    inside = np.flatnonzero(np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.2)[::5]
+    rows = np.column_stack([surface.vertices_m, film])[inside]
+    table = '\n'.join(','.join(map(repr, row.tolist())) for row in rows)
+    (tmp_path / 'film.csv').write_text(f'x_m,y_m,z_m,thickness_um\n{table}\n')
+    guns = [{'trajectory': str(bags['upper'])}, {'trajectory': str(bags['lower']), 'brush': 2}]
+    entry = {'mesh': str(PANEL), 'measurements': 'film.csv', 'guns': guns, 'brush': 1}
+    campaign = tmp_path / 'campaign.yaml'
+    campaign.write_text(yaml.safe_dump({'experiments': [entry]}))
+    both = DepositionModel.of_brushes(
+        Brush(number=number, planar=model.planar) for number, model in ((1, bell), (2, THIN))
+    )
+    model = _model(tmp_path / 'both.yaml', both)
+    done = paint('compare', campaign, '--model', model, '--json', '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)['misfits'][0]
+    assert found['rmse_um'] < 1e-4
+    # One pattern for both guns is not enough.
+    plain = _model(tmp_path / 'plain.yaml', bell)
+    done = paint('compare', campaign, '--model', plain, '-o', tmp_path / 'plain')
+    assert_refused(done, 'brushes 1, 2 are used and the model has the pattern of one')

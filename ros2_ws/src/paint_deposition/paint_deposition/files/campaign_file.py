@@ -77,13 +77,21 @@ class _Files(BaseModel):
     measurements: Text = Field(description='the name of a file of gauge readings')
 
 
-class _Gun(MotionSource):
+class _Brushed(MotionSource):
+    """A motion, and its brush where the recording does not tell it."""
+
+    brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
+        None, description='the number of the brush, where the recording names none'
+    )
+
+
+class _Gun(_Brushed):
     """One of several guns; what it does not say holds for it as for the experiment."""
 
     trajectory: Text | None = Field(None, description='the name of a recording or module')
 
 
-class _Entry(MotionSource, _Files):
+class _Entry(_Brushed, _Files):
     """An experiment as it is written."""
 
     guns: list[Any] = Field(
@@ -91,9 +99,6 @@ class _Entry(MotionSource, _Files):
     )
 
     name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
-    brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
-        None, description='the number of the brush, where the recording names none'
-    )
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
@@ -166,15 +171,15 @@ def _read_experiment(
 ) -> Experiment:
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     motions = _motions(folder, entry)
-    files |= _named([file for file, _ in motions])
+    files |= _named([file for file, *_ in motions])
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
-    trajectories = [read_motion(file, source) for file, source in motions]
+    trajectories = [read_motion(file, source) for file, source, _ in motions]
     paths = []
-    for trajectory in trajectories:
+    for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
         path, counts = spray_path(trajectory, entry.max_pose_gap_s)
         require_spraying(trajectory, path)
-        paths.append(_with_brush(path, entry.brush))
+        paths.append(_with_brush(path, brush))
         if counts.rejected:
             progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
@@ -194,8 +199,8 @@ def _read_experiment(
     )  # fmt: skip
 
 
-def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource]]:
-    """The file of each gun and what to read of it.
+def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int | None]]:
+    """The file of each gun, what to read of it, and its brush.
 
     Raises:
         ReadingsError: a gun has no file.
@@ -214,7 +219,8 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource]]:
         source = MotionSource(**(own | said))
         if source.urdf:
             source = source.model_copy(update={'urdf': str(folder / source.urdf)})
-        motions.append((str(folder / file), source))
+        brush = entry.brush if gun.brush is None else gun.brush
+        motions.append((str(folder / file), source, brush))
     return motions
 
 
