@@ -93,8 +93,8 @@ def _mcap_index(length: int) -> bytes:
 def _bag_index() -> bytes:
     """A ROS 1 bag that has its index where some bytes say a length above a thousand million."""
     seed = targets()['ros1'].seeds()[0]
-    lengths = (struct.unpack_from('<I', seed, place)[0] for place in range(len(seed) - 4))
-    place = next(place for place, length in enumerate(lengths) if length > CLAIMED)
+    places = range(20, len(seed) - 4)
+    place = next(p for p in places if struct.unpack_from('<I', seed, p)[0] > CLAIMED)
     at = seed.index(b'index_pos=') + len(b'index_pos=')
     return seed[:at] + struct.pack('<Q', place) + seed[at + 8 :]
 
