@@ -82,6 +82,23 @@ def _bag(head: int, data: int) -> bytes:
     return b'#ROSBAG V2.0\n' + record + struct.pack('<I', data) + bytes(100)
 
 
+def _mcap_index(length: int) -> bytes:
+    """A recording whose index says that a chunk is so long."""
+    seed = targets()['mcap'].seeds()[0]
+    at = seed.index(b'\x08' + struct.pack('<Q', 104))
+    end = at + 9 + 104
+    return seed[: end - 16] + struct.pack('<QQ', length, length) + seed[end:]
+
+
+def _bag_index() -> bytes:
+    """A ROS 1 bag that has its index where some bytes say a length above a thousand million."""
+    seed = targets()['ros1'].seeds()[0]
+    places = range(20, len(seed) - 4)
+    place = next(p for p in places if struct.unpack_from('<I', seed, p)[0] > CLAIMED)
+    at = seed.index(b'index_pos=') + len(b'index_pos=')
+    return seed[:at] + struct.pack('<Q', place) + seed[at + 8 :]
+
+
 def _far_cell(cell: bytes = b'<c r="XFD1048576">') -> bytes:
     sheet = targets()['worksheet']
     far = b'<row r="1048576">' + cell + b'<v>1</v></c></row></sheetData>'
@@ -108,12 +125,14 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
             '"values":{"bufferView":0}}')),
     ),
     'a record of an MCAP file': ('mcap', lambda: _mcap_record(2**40)),
+    'a chunk in the index of an MCAP file': ('mcap', lambda: _mcap_index(2**40)),
     'a record to recover': ('mcap_recovery', lambda: _mcap_record(2**40)),
     'a zstd chunk of an MCAP file': ('mcap', lambda: _mcap_chunk(b'zstd', 2**40)),
     'a zstd chunk to recover': ('mcap_recovery', lambda: _mcap_chunk(b'zstd', 2**40)),
     'an lz4 chunk to recover': ('mcap_recovery', lambda: _mcap_chunk(b'lz4', 2**40)),
     'the head of a ROS 1 record': ('ros1', lambda: _bag(4_000_000_000, 10)),
     'the data of a ROS 1 record': ('ros1', lambda: _bag(8, 4_000_000_000)),
+    'the index of a ROS 1 bag': ('ros1', _bag_index),
     'transforms of a message': ('mcap', lambda: _many_transforms()),
     'a cell of a workbook': ('workbook', _far_cell),
     'a cell of a workbook in single quotes': (

@@ -4,7 +4,6 @@ Only the types of the topics that are read are parsed: one exotic topic, such as
 events that rosbags does not understand, does not make the poses beside it unreadable.
 """
 
-import struct
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -13,7 +12,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
-from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -22,14 +20,12 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.bounded_path import BoundedPath
 from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_files
 
 # The key of a bag's custom data under which a plan says which topic is its trigger.
 TRIGGER = 'trigger_topic'
 ROS2_SUFFIXES = ('.mcap', '.db3')
-# How records begin: in MCAP a kind and a length; in ROS 1 the lengths of head and data.
-ROS1_MAGIC = b'#ROSBAG V2.0\n'
-ROS1_LENGTH, MCAP_LENGTH = struct.Struct('<I'), struct.Struct('<BQ')
 # The messages that are read by the names of their fields.
 KNOWN = (
     'builtin_interfaces/msg/Time', 'std_msgs/msg/Header', 'std_msgs/msg/Bool',
@@ -149,8 +145,8 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
     path = Path(path)
     _refuse_what_is_no_bag(path)
     with _reading(path):
-        _refuse_claims(path)
-        reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
+        bounded = BoundedPath(path)
+        reader = Ros1Reader(bounded) if path.suffix == '.bag' else Ros2Reader(bounded)
         reader.open()
     try:
         yield Bag(path, reader)
@@ -185,28 +181,6 @@ def _refuse_what_is_no_bag(path: Path) -> None:
             raise RecordingError(_unfinished(path, f'{file.name} has no end'))
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
-
-
-def _refuse_claims(path: Path) -> None:
-    """A record that is said to be longer than its file, before memory is taken for it."""
-    files = [path] if path.suffix == '.bag' else mcap_files(path)
-    for file in files:
-        magic, lengths, behind = (
-            (MCAP0_MAGIC, (MCAP_LENGTH,), len(MCAP0_MAGIC))
-            if file.suffix == '.mcap'
-            else (ROS1_MAGIC, (ROS1_LENGTH, ROS1_LENGTH), 0)
-        )
-        size, at = file.stat().st_size - behind, len(magic)
-        with file.open('rb') as stream:
-            while at < size:
-                for length in lengths:
-                    stream.seek(at)
-                    at += (
-                        length.size
-                        + length.unpack(stream.read(length.size).ljust(length.size, b'\xff'))[-1]
-                    )
-        if at > size:
-            raise ValueError(f'its last record ends {at - size} bytes behind the file')
 
 
 def _unfinished(path: Path, reason: str) -> str:
