@@ -1,6 +1,7 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
 from functools import reduce
+from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from paint_deposition.part.welding import weld
 
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
+# Types of a PLY, little-endian.
+PLY = {'float': '<f4', 'uchar': 'u1', 'int': '<i4'}
 # Triangles lower than this have no direction that could be trusted.
 LEAST_HEIGHT_M = 1e-7
 
@@ -72,21 +75,26 @@ def write_mesh_ply(
         colours: (V, 3) or (V, 4) uint8, shown by viewers.
         properties: (V,) values of the vertices by name, such as ``thickness_um``.
     """
-    from trimesh import Trimesh
-
-    painted = Trimesh(
-        surface.vertices_m,
-        surface.faces,
-        vertex_normals=surface.normals,
-        vertex_colors=colours,
-        vertex_attributes={
-            name: np.asarray(values, dtype=np.float32) for name, values in properties.items()
-        },
-        process=False,
-        validate=False,
-    )
-    with replacing(path) as temporary:
-        painted.export(temporary, file_type='ply', vertex_normal=True)
+    columns = [
+        *zip(('x', 'y', 'z'), repeat('float'), surface.vertices_m.T, strict=False),
+        *zip(('nx', 'ny', 'nz'), repeat('float'), surface.normals.T, strict=False),
+        *zip(('red', 'green', 'blue', 'alpha'), repeat('uchar'), colours.T, strict=False),
+        *((name, 'float', values) for name, values in properties.items()),
+    ]
+    vertices = np.empty(len(surface.vertices_m), [(name, PLY[kind]) for name, kind, _ in columns])
+    for name, _, values in columns:
+        vertices[name] = values
+    faces = np.empty(len(surface.faces), [('count', PLY['uchar']), ('corners', PLY['int'], 3)])
+    faces['count'], faces['corners'] = 3, surface.faces
+    head = [
+        'ply', 'format binary_little_endian 1.0', f'element vertex {len(vertices)}',
+        *(f'property {kind} {name}' for name, kind, _ in columns),
+        f'element face {len(faces)}', 'property list uchar int vertex_indices', 'end_header', '',
+    ]  # fmt: skip
+    with replacing(path) as temporary, temporary.open('wb') as file:
+        file.write('\n'.join(head).encode())
+        vertices.tofile(file)
+        faces.tofile(file)
 
 
 def _prepared(

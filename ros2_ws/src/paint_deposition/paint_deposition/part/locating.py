@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from scipy.spatial import cKDTree
 
 # How much further away than the nearest surface the side that a normal points out of may be.
@@ -84,8 +85,6 @@ class SurfaceLocator:
     def _closest(
         self, points_m: np.ndarray, normals: np.ndarray | None, side: np.ndarray | None
     ) -> tuple[np.ndarray, np.ndarray]:
-        from trimesh.triangles import closest_point
-
         nearest, few = self._tree.query(points_m, k=min(FEW, len(self._faces)))
         nearest, few = nearest.reshape(len(points_m), -1), few.reshape(len(points_m), -1)
         # No point of a triangle is further from its centre than the reach.
@@ -99,7 +98,7 @@ class SurfaceLocator:
         near = [few[n] if far[n] else faces for n, faces in enumerate(near)]
         point = np.repeat(np.arange(len(points_m)), [len(faces) for faces in near])
         face = np.concatenate([np.asarray(faces, dtype=np.int64) for faces in near])
-        place = closest_point(self._vertices_m[self._faces[face]], points_m[point])
+        place = closest_places(self._vertices_m, self._faces, face, points_m, point)
         distance = np.linalg.norm(place - points_m[point], axis=1)
         if normals is not None or side is not None:
             facing = self._normals[self._faces[face]].mean(axis=1)
@@ -111,6 +110,52 @@ class SurfaceLocator:
         order = np.lexsort((distance, point))
         first = order[np.unique(point[order], return_index=True)[1]]
         return face[first], place[first]
+
+
+@njit(cache=True, nogil=True)
+def closest_places(vertices, faces, face, points, point):
+    """(P, 3) place on each of P triangles that is closest to a point.
+
+    Ericson, Real-Time Collision Detection (2005), section 5.1.5. The function of trimesh does the
+    same; loading trimesh for it takes longer than all that it computes here.
+
+    Args:
+        vertices, faces: (V, 3) [m] and (F, 3).
+        face, point: (P,) rows of ``faces`` and of ``points``.
+        points: (N, 3) [m].
+    """
+    places = np.empty((len(face), 3))
+    ab, ac, ap = np.empty(3), np.empty(3), np.empty(3)
+    for k in range(len(face)):
+        a, b, c = faces[face[k]]
+        d1, d2, abab, abac, acac = 0.0, 0.0, 0.0, 0.0, 0.0
+        for i in range(3):
+            ab[i], ac[i] = vertices[b, i] - vertices[a, i], vertices[c, i] - vertices[a, i]
+            ap[i] = points[point[k], i] - vertices[a, i]
+            d1, d2 = d1 + ab[i] * ap[i], d2 + ac[i] * ap[i]
+            abab, abac, acac = abab + ab[i] ** 2, abac + ab[i] * ac[i], acac + ac[i] ** 2
+        # The same from b and from c, and the areas of the triangles that the point makes.
+        d3, d4, d5, d6 = d1 - abab, d2 - abac, d1 - abac, d2 - acac
+        of_a, of_b, of_c = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+        if d1 <= 0.0 and d2 <= 0.0:
+            v, w = 0.0, 0.0
+        elif d3 >= 0.0 and d4 <= d3:
+            v, w = 1.0, 0.0
+        elif of_c <= 0.0 <= d1 and d3 <= 0.0:
+            v, w = d1 / (d1 - d3), 0.0
+        elif d6 >= 0.0 and d5 <= d6:
+            v, w = 0.0, 1.0
+        elif of_b <= 0.0 <= d2 and d6 <= 0.0:
+            v, w = 0.0, d2 / (d2 - d6)
+        elif of_a <= 0.0 and d4 >= d3 and d5 >= d6:
+            w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+            v = 1.0 - w
+        else:
+            area = of_a + of_b + of_c
+            v, w = of_b / area, of_c / area
+        for i in range(3):
+            places[k, i] = vertices[a, i] + v * ab[i] + w * ac[i]
+    return places
 
 
 def _barycentric(corners_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
