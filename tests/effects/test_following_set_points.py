@@ -8,6 +8,7 @@ import pytest
 from brushes import NARROW, WIDE, switched
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.incidence_attraction import IncidenceAttraction
 from paint_deposition.effects.library.sag import Sag
@@ -138,6 +139,8 @@ def test_a_model_file_holds_what_an_effect_follows(tmp_path):
          'incidence_attraction follows a set-point, and brush 1 does not tell its bell_speed_rpm'),
         (brushed(Sag(run_m=0.01, follows=(AIR,))),
          'sag acts on the finished film, which all brushes share: it cannot follow set-points'),
+        (brushed(CURVES['time_s'](low=0.0, high=4.0, learned=(0.1, -0.1), follows=(AIR,))),
+         'learned:time_s has no amplitude that could follow set-points'),
         (brushed(AirDrift(shift_down_m=0.09, follows=(MORE_AIR,))),
          'air_drift: shift_down_m would be 0.18 at the set-points of brush 1, outside 0 to 0.1'),
     ],

@@ -161,6 +161,7 @@ def test_a_bag_keeps_set_points_and_paint_tells_them_apart(tmp_path):
     assert np.array_equal(np.nan_to_num(read.trigger_set_points), CHANGING.trigger_set_points)
     assert np.array_equal(offline_um(read), offline_um(CHANGING))
     numbered, known = by_set_points(read, MODEL)
+    assert numbered.notes[-1].endswith('set-points lie between brushes 1, 2 (2 different)')
     assert model_digest(known) == model_digest(MODEL)
     path, _ = spray_path(numbered)
     integrator = FilmIntegrator(lying_plane(), known)

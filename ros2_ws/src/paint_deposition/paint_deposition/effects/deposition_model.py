@@ -189,6 +189,11 @@ class DepositionModel(BaseModel):
                     f'{effect.id} follows set-points, which a model with planar alone does not '
                     'tell; give brushes'
                 )
+            if not effect.amplitudes():
+                raise ModelError(
+                    f'{effect.id} has no amplitude that could follow set-points; take `follows` '
+                    'out'
+                )
             if effect.acts_on_the_finished_film:
                 raise ModelError(
                     f'{effect.id} acts on the finished film, which all brushes share: it cannot '

@@ -7,7 +7,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints
+from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints, listed
 from paint_deposition.model.brush_law import SETTINGS, BrushLaw
 from paint_deposition.motion.motion_log import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
@@ -101,4 +101,14 @@ def by_set_points(
                 model, brushes[row] = with_set_points(model, set_points)
             except ModelError as error:
                 raise ModelError(f'{trajectory.source}: {error}') from None
-    return replace(trajectory, trigger_brush=np.array(brushes, dtype=np.int64)), model
+    used = [number for number in dict.fromkeys(brushes) if number >= BETWEEN]
+    numbers = listed(brush.number for brush in model.brushes)
+    note = (
+        f'{trajectory.source}: states name no brush; their set-points lie between brushes '
+        f'{numbers} ({len(used)} different)'
+    )
+    return replace(
+        trajectory,
+        trigger_brush=np.array(brushes, dtype=np.int64),
+        notes=(*trajectory.notes, note) if used else trajectory.notes,
+    ), model

@@ -17,7 +17,7 @@ FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
 # Where a window ends, and the standoff that is still good, are found to this [m].
 PRECISION_M = 1e-7
-STANDOFF_PRECISION_M = 1e-5
+STANDOFF_PRECISION_M = 1e-4
 # Drift is followed as far as these shares of the right value.
 LEAST, MOST = 0.4, 1.8
 STEPS = 100
