@@ -167,10 +167,13 @@ class AtomizerInput:
             self.hand_on()
 
     def hand_on(self) -> None:
-        """Give the receiver what was taken, except poses that wait for their transform."""
+        """Give the receiver what was taken, except poses that wait for their transform.
+
+        What comes in the moment in which the node activates itself waits until it has.
+        """
         self._handed_on_s = time.monotonic()
         self.tf_queue.release(time.monotonic(), self._place, self._refuse)
-        if not self._stamps:
+        if not self._stamps or self._node.starts_itself:
             return
         stamps = np.array(self._stamps, dtype=np.int64)
         positions, quaternions = map(np.array, zip(*self._poses, strict=True))

@@ -37,6 +37,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     """
 
     PARAMETERS: ParameterTable = MANAGED
+    # Whether it is just being configured and activated by itself.
+    starts_itself = False
 
     def __init__(self, name: str, **kwargs: Any):
         # The mixin does not pass arguments on; it is initialised when the node is there.
@@ -48,15 +50,15 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         # What was there before it was configured, and before it was activated.
         self._before: list[set[Any]] = []
         self._health = Diagnostics(self, {'state': self._state_status})
-        self._starts_itself = self.values['autostart']
-        if not self._starts_itself:
+        self.starts_itself = self.values['autostart']
+        if not self.starts_itself:
             self.get_logger().info('waits for a lifecycle manager to configure it')
             return
         for step in (self.trigger_configure, self.trigger_activate):
             step()
             if self._failure is not None:
                 raise self._failure
-        self._starts_itself = False
+        self.starts_itself = False
 
     # --- for the subclass
 
@@ -132,11 +134,11 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
             transition()
         except Exception as error:
             self._failure = error
-            if not self._starts_itself:  # else the process ends with it
+            if not self.starts_itself:  # else the process ends with it
                 self.get_logger().error(f'not {done}: {_in_words(error)}')
             foreseen = isinstance(error, PaintError)
             return TransitionCallbackReturn.FAILURE if foreseen else TransitionCallbackReturn.ERROR
-        if not self._starts_itself:
+        if not self.starts_itself:
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
 
