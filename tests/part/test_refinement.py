@@ -103,3 +103,11 @@ def test_welding_joins_what_lies_within_a_micrometre():
     welded, faces = weld(vertices, np.array([[0, 1, 2], [3, 4, 5]]))
     np.testing.assert_allclose(welded, vertices[[0, 1, 2, 5]])
     np.testing.assert_array_equal(faces, [[0, 1, 2], [0, 1, 3]])
+
+
+def test_a_mesh_that_is_too_fine_itself_is_not_told_to_cut_less(monkeypatch):
+    monkeypatch.setattr('paint_deposition.part.refinement.MAX_TRIANGLES', 1)
+    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
+    faces = np.array([[0, 1, 2], [0, 2, 3]])
+    with pytest.raises(MeshError, match='the mesh has 2 triangles, more than 1; export it'):
+        Surface.from_triangles(vertices, faces, 2.0)

@@ -192,13 +192,8 @@ def compile_kernel(
 
     Args:
         flux_factors, pattern_scales: each a law and how many parameters it takes; parameters are
-    <<<<<<< HEAD
-            passed in one flat array, those of the flux factors first.
-        shadowed: whether lines of sight count.
-    =======
             passed in one row for each brush, those of the flux factors first.
-        shadowed: whether the visibility table is used.
-    >>>>>>> brush
+        shadowed: whether lines of sight count.
         real: precision of the points, np.float32 or np.float64.
         apart: whether the film's terms are kept apart instead of summed.
         parallel: whether blocks are shared among threads.

@@ -7,7 +7,7 @@ from paint_deposition.errors import MeshError
 from paint_deposition.part.half_edges import edges_of
 from paint_deposition.part.slivers import CutEdges, cut_edges, cut_slivers, find_slivers
 
-MAX_TRIANGLES = 4_000_000
+MAX_TRIANGLES = 5_000_000
 KEY_BASE = np.int64(1) << 31
 
 
@@ -243,6 +243,10 @@ def _halves(vertices_m: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def _refuse_too_many(vertices_m: np.ndarray, faces: np.ndarray, edge_m: float) -> None:
+    if len(faces) > MAX_TRIANGLES:
+        raise MeshError(
+            f'the mesh has {len(faces)} triangles, more than {MAX_TRIANGLES}; export it coarser'
+        )
     longest = edge_lengths_m(vertices_m, faces).max(axis=1)
     # Halving ends between half the length and the length: up to 8 triangles an edge squared.
     by_area = 8.0 * face_areas_m2(vertices_m, faces) / edge_m**2
