@@ -75,7 +75,10 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
 @pytest.mark.parametrize(
     ('values', 'reason'),
     [
-        ({'mesh_file': 'other.stl'}, 'cannot change while the node is configured: the film so far lies on'),
+        (
+            {'mesh_file': 'other.stl'},
+            'cannot change while the node is configured: the film so far lies on',
+        ),
         ({'max_edge_length_m': 0.01}, 'the film so far lies on this mesh'),
         ({'frame_id': 'other'}, 'in this frame'),
         ({'pose_queue_depth': 10}, 'the subscriptions and the pose memory are made with it'),
