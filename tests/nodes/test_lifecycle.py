@@ -222,6 +222,26 @@ def test_a_run_that_is_there_is_not_overwritten(recorder, manager, tmp_path):
     assert not list((tmp_path / 'run').iterdir())
 
 
+def test_what_it_reads_can_be_changed_while_it_is_not_configured(simulator, manager, tmp_path):
+    node = simulator(autostart=False)
+    managed = manager(node)
+    other = write_panel(tmp_path / 'other.stl')
+
+    def told(**values) -> str:
+        return node.set_parameters_atomically(parameters(**values)).reason
+
+    assert told(mesh_file=str(other), max_edge_length_m=0.2, atomizers=['left', 'right']) == ''
+    assert 'not all zero' in told(down=[0.0, 0.0, 0.0])
+    assert managed.configure() == (True, 'inactive')
+    assert (node.mesh_file, node.gun_names) == (str(other), ['left', 'right'])
+    refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
+    assert told(max_edge_length_m=0.1).startswith(refused)
+    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    managed.cleanup()
+    assert told(max_edge_length_m=0.1) == ''
+    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+
+
 SLOW = """
 import sys, time
 from paint_deposition.nodes.runtime.managed_node import ManagedNode

@@ -19,7 +19,7 @@ from .shop import Campaign
 ATOMIZER_STATE = Path(__file__).parents[2] / 'ros2_ws/src/paint_msgs/msg/AtomizerState.msg'
 STATE_TYPE = 'paint_msgs/msg/AtomizerState'
 SET_POINTS = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv', 'flow_cm3_per_min')
-NOT_KNOWN = dict.fromkeys(SET_POINTS, float('nan'))
+NOT_KNOWN = dict.fromkeys((*SET_POINTS, 'programmed_speed_m_per_s'), float('nan'))
 POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
 
 

@@ -75,7 +75,10 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
 @pytest.mark.parametrize(
     ('values', 'reason'),
     [
-        ({'mesh_file': 'other.stl'}, 'cannot change while the node runs: the film so far lies on'),
+        (
+            {'mesh_file': 'other.stl'},
+            'cannot change while the node is configured: the film so far lies on',
+        ),
         ({'max_edge_length_m': 0.01}, 'the film so far lies on this mesh'),
         ({'frame_id': 'other'}, 'in this frame'),
         ({'pose_queue_depth': 10}, 'the subscriptions and the pose memory are made with it'),
@@ -104,7 +107,7 @@ def test_every_parameter_says_what_it_is_and_whether_it_can_change(simulator):
         descriptor = node.describe_parameter(name)
         assert len(descriptor.description) > 10, name
         assert '[' in descriptor.description, name
-        assert descriptor.read_only == bool(row.fixed_because), name
+        assert descriptor.read_only == row.is_read_only, name
         if descriptor.read_only:
             assert 'cannot change' in descriptor.additional_constraints
 

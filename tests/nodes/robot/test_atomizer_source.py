@@ -151,6 +151,18 @@ def test_a_number_is_the_brush(source, driver, viewer, wait_until):
     assert [(state.spraying, state.brush) for state in told] == [(True, 3), (True, 4)]
 
 
+def test_the_programmed_speed_is_told(source, driver, viewer, wait_until):
+    source(trigger='/gun', speed='/speed_mm_s', speed_scale=0.001)
+    robot = driver(('/gun', Bool), ('/speed_mm_s', UInt16))
+    robot.signals['/gun'].publish(Bool(data=True))
+    robot.signals['/speed_mm_s'].publish(UInt16(data=350))
+    wait_until(lambda: viewer.heard['atomizer/state'], what='the state')
+    robot.signals['/speed_mm_s'].publish(UInt16(data=500))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the next speed')
+    told = [viewer.decoded('atomizer/state', row).programmed_speed_m_per_s for row in range(2)]
+    assert told == pytest.approx([0.35, 0.5], rel=1e-12)
+
+
 def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
     source(trigger='/io.level > 1')
     robot = driver(('/io', UInt16))

@@ -152,8 +152,8 @@ def test_a_running_recorder_says_why_it_refuses(ros_context, executor, tmp_path)
     (result,) = recorder.set_parameters([Parameter('compression', value='none')])
     assert not result.successful
     assert result.reason == (
-        "compression cannot change while the node runs: the run's file is open; call ~/stop and "
-        'start another recorder'
+        'compression cannot change while the node is configured: the run is made with it; clean '
+        'the node up, or call ~/stop and start another recorder'
     )
 
 

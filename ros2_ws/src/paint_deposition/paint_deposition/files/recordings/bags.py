@@ -236,8 +236,9 @@ def _state(
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
     header = _header(types, time_ns, frame_id)
-    wet, *others = set_points or (float('nan'),) * 4
-    return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet)
+    unknown = float('nan')
+    wet, *others = set_points or (unknown,) * 4
+    return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
 
 
 def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:

@@ -29,6 +29,7 @@ float64 bell_speed_rpm
 float64 voltage_kv
 int32 brush
 float64 flow_cm3_per_min
+float64 programmed_speed_m_per_s
 """
 
 

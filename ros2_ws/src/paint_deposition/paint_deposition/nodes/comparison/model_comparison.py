@@ -38,7 +38,8 @@ COMPARISON = dict(
     measurements_file=NodeParameter(
         '',
         'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
-        fixed_because='the film is painted where they were taken; restart the node',
+        fixed_because='the film is painted where they were taken; clean the node up or restart it',
+        read_to_configure=True,
     ),
     color_max_um=thickness(
         'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'

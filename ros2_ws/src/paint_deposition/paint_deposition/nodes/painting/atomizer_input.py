@@ -16,6 +16,7 @@ from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
 from paint_deposition.motion.intervals import Intervals
 from paint_deposition.motion.jumps import Jumps
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.speed_now import SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
@@ -78,6 +79,8 @@ class AtomizerInput:
         refusals_of_states: why, in words, each once.
         states_without_flow: states that spray with flow 0, since the last reset.
         intervals: rhythm of the stamps since the last reset.
+        speed: of the TCP now.
+        programmed_m_per_s: of the newest state, 0 or NaN where it is not known [m/s].
         jumps: steps between poses that no robot makes, since the last reset.
         pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
@@ -92,6 +95,8 @@ class AtomizerInput:
         self.poses_received = self.states_received = 0
         self.refused_s = self.pose_s = -math.inf
         self.sprays = False
+        self.speed = SpeedNow()
+        self.programmed_m_per_s = 0.0
         self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._handed_on_s = -math.inf
@@ -180,6 +185,7 @@ class AtomizerInput:
         self._stamps.clear()
         self._poses.clear()
         self.intervals.add(stamps)
+        self.speed.add(stamps, positions)
         self._look_for_jumps(stamps, positions)
         self._node.add_poses(self.number, PoseBatch(stamps, positions, quaternions))
 
@@ -254,6 +260,7 @@ class AtomizerInput:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
             self.states_without_flow += 1
         self.sprays = flow > 0.0
+        self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     def _report_progress(self) -> None:
         message = PoseProgress(

@@ -46,6 +46,10 @@ def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
+        'speed [m/s]': f'{source.speed.m_per_s:.3f}',
+        'programmed speed [m/s]': f'{source.programmed_m_per_s:.3f}'
+        if source.programmed_m_per_s > 0.0
+        else 'unknown',
         'steps faster than a robot': source.jumps.count,
         'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'publishers of poses': ' '.join(source.pose_publishers) or 'none',

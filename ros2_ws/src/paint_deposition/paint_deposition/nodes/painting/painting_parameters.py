@@ -17,15 +17,16 @@ from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizer_names,
     direction,
-    fixed,
     mesh_parameters,
+    read_to_configure,
 )
 from paint_deposition.part.surface import Surface
 
 PAINTING = dict(
     **MANAGED,
-    **fixed(
-        'the film so far lies on this mesh, in this frame; restart the node for another part',
+    **read_to_configure(
+        'the film so far lies on this mesh, in this frame; clean the node up or restart it for '
+        'another part',
         **mesh_parameters(max_edge_length_m=0.01),
         down=direction(
             'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
@@ -54,9 +55,8 @@ PAINTING = dict(
         'at its own stamp [s]',
         (0.0, 10.0),
     ),
-    **fixed(
-        'the subscriptions and the pose memory are made with it when the node starts; restart '
-        'the node',
+    **read_to_configure(
+        'the subscriptions and the pose memory are made with it; clean the node up or restart it',
         atomizers=atomizer_names('that paint this part'),
         pose_queue_depth=NodeParameter(
             5000,

@@ -5,12 +5,21 @@ from __future__ import annotations
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS
 from paint_deposition.nodes.runtime.file_names import FILE_NAME, FILE_NAME_WORDS
 from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.parameters import NodeParameter, atomizer_names, fixed
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    atomizer_names,
+    read_to_configure,
+)
 
 RECORDER = dict(
     **MANAGED,
-    **fixed(
-        "the run's file is open; call ~/stop and start another recorder",
+    output_directory=NodeParameter(
+        'runs',
+        'Folder to make the run in [path]',
+        fixed_because='the network does not choose where files are written; restart the node',
+    ),
+    **read_to_configure(
+        'the run is made with it; clean the node up, or call ~/stop and start another recorder',
         topics=NodeParameter(
             [],
             'Topics to record; empty: motion, film, plan, diagnostics and parameter changes '
@@ -18,7 +27,6 @@ RECORDER = dict(
             element=str,
         ),
         atomizers=atomizer_names('whose run is recorded'),
-        output_directory=NodeParameter('runs', 'Folder to make the run in [path]'),
         name=NodeParameter(
             '',
             "Run's name; empty: run_<date>_<time> [text]",

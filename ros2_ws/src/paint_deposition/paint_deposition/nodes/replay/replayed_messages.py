@@ -66,6 +66,7 @@ def _state_of_bool(message: RawMessage) -> bytes:
             bell_speed_rpm=math.nan,
             voltage_kv=math.nan,
             flow_cm3_per_min=math.nan,
+            programmed_speed_m_per_s=math.nan,
         )
     )
 

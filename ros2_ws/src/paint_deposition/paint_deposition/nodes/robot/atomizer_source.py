@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -33,7 +34,7 @@ QUEUE_DEPTH = 5000
 # Who comes late must know whether the gun is open; who is slow must miss no change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
-SIGNALS = ('trigger', 'flow', 'brush')
+SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # (topic, message, what the middleware says of it)
 TakeMessage = Callable[[str, Any, 'MessageInfo'], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
@@ -65,6 +66,12 @@ SOURCE = fixed(
     brush=NodeParameter(
         '', f'What tells the number of the brush: {SIGNAL}; empty: the only one [topic]'
     ),
+    speed=NodeParameter(
+        '', f'What tells the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
+    ),
+    speed_scale=NodeParameter(
+        1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
+    ),
     calibrated_flow=NodeParameter(
         1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
     ),
@@ -94,7 +101,7 @@ class AtomizerSource(PaintNode):
         for signal in self._signals.values():
             self._missing[signal.topic] = self._take_signals
         self._values: dict[str, float] = {}
-        self._told: tuple[bool, float, int] | None = None
+        self._told: tuple[bool, float, int, float | None] | None = None
         self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
@@ -108,7 +115,7 @@ class AtomizerSource(PaintNode):
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
                 'frame in which tf knows its tip'
             )
-        alone = [name for name in ('flow', 'brush') if values[name] and not values['trigger']]
+        alone = [name for name in SIGNALS[1:] if values[name] and not values['trigger']]
         if alone:
             raise PaintError(f'{alone[0]} is given without a trigger: name what opens the gun')
         for name in SIGNALS:
@@ -197,10 +204,12 @@ class AtomizerSource(PaintNode):
         full = self.values['calibrated_flow']
         flow = self._values['flow'] / full if 'flow' in self._values else 1.0
         brush = int(self._values.get('brush', ONLY_BRUSH))
-        if (on, flow, brush) == self._told:
+        speed = self._values.get('speed', math.nan) * self.values['speed_scale']
+        told = on, flow, brush, speed if 'speed' in self._values else None
+        if told == self._told:
             return
-        self._told = on, flow, brush
-        state = AtomizerState(spraying=on, flow=flow, brush=brush)
+        self._told = told
+        state = AtomizerState(spraying=on, flow=flow, brush=brush, programmed_speed_m_per_s=speed)
         state.header.frame_id = self._motion.base
         state.header.stamp = Time(nanoseconds=stamp).to_msg()
         self._state_publisher.publish(state)

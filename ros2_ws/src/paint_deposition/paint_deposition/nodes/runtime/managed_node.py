@@ -41,14 +41,14 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     starts_itself = False
 
     def __init__(self, name: str, **kwargs: Any):
+        # What was there before it was configured, and before it was activated.
+        self._before: list[set[Any]] = []
         # The mixin does not pass arguments on; it is initialised when the node is there.
         PaintNode.__init__(self, name, **kwargs)
 
     def _begin(self) -> None:
         LifecycleNodeMixin.__init__(self)
         self._failure: Exception | None = None
-        # What was there before it was configured, and before it was activated.
-        self._before: list[set[Any]] = []
         self._health = Diagnostics(self, {'state': self._state_status})
         self.starts_itself = self.values['autostart']
         if not self.starts_itself:

@@ -17,7 +17,11 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.parameters import ParameterTable, declare_parameters
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    ParameterTable,
+    declare_parameters,
+)
 
 
 class PaintNode(Node):
@@ -125,15 +129,21 @@ class PaintNode(Node):
         """Refuse to change what is fixed with the reason, which rclpy leaves out."""
         for change in parameter_list:
             row = self.PARAMETERS.get(change.name)
-            # While they are declared, parameters can still be set.
-            if row and row.fixed_because and self.describe_parameter(change.name).read_only:
-                reason = f'{change.name} cannot change while the node runs: {row.fixed_because}'
+            if row and row.fixed_because and self._is_fixed(change.name, row):
+                state, why = row.fixed_while, row.fixed_because
+                reason = f'{change.name} cannot change while the node {state}: {why}'
                 return SetParametersResult(successful=False, reason=reason)
         return super().set_parameters_atomically(parameter_list)
 
     def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:
         """As if each were set on its own."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
+
+    def _is_fixed(self, name: str, row: NodeParameter) -> bool:
+        if row.is_read_only:
+            # While they are declared, parameters can still be set.
+            return self.describe_parameter(name).read_only
+        return self.configured
 
     def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
         new = {change.name: change.value for change in changes}

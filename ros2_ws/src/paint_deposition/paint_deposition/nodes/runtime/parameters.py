@@ -45,7 +45,7 @@ class NodeParameter:
     front of the value is the home folder, as in a shell. `bounds` are inclusive, the upper one
     may be infinite. `constraints` is the plain English of what `allows` (value -> bool) checks
     beyond them. `fixed_because` makes the parameter read-only and says why it cannot change at
-    run time.
+    run time; with `read_to_configure` it can while a managed node is not configured.
     """
 
     default: bool | int | float | str | list
@@ -56,6 +56,17 @@ class NodeParameter:
     allows: Callable[[Any], bool] | None = None
     element: type | None = None
     fixed_because: str = ''
+    read_to_configure: bool = False
+
+    @property
+    def is_read_only(self) -> bool:
+        """Whether it cannot change in any state of the node."""
+        return bool(self.fixed_because) and not self.read_to_configure
+
+    @property
+    def fixed_while(self) -> str:
+        """The states in which it cannot change."""
+        return 'is configured' if self.read_to_configure else 'runs'
 
     @property
     def ros_type(self) -> Parameter.Type:
@@ -67,12 +78,12 @@ class NodeParameter:
     def descriptor(self) -> ParameterDescriptor:
         texts = ['one of ' + ', '.join(self.choices) if self.choices else self.constraints]
         if self.fixed_because:
-            texts.append(f'cannot change while the node runs: {self.fixed_because}')
+            texts.append(f'cannot change while the node {self.fixed_while}: {self.fixed_because}')
         descriptor = ParameterDescriptor(
             type=self.ros_type.value,
             description=self.description,
             additional_constraints='; '.join(filter(None, texts)),
-            read_only=bool(self.fixed_because),
+            read_only=self.is_read_only,
         )
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:
             least, most = (int(min(bound, INT64_MAX)) for bound in self.bounds)
@@ -165,6 +176,14 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
 def fixed(because: str, **rows: NodeParameter) -> ParameterTable:
     """The same rows, none of which can change while the node runs, with the reason."""
     return {name: replace(row, fixed_because=because) for name, row in rows.items()}
+
+
+def read_to_configure(because: str, **rows: NodeParameter) -> ParameterTable:
+    """The same rows, which can change only while a managed node is not configured."""
+    return {
+        name: replace(row, fixed_because=because, read_to_configure=True)
+        for name, row in rows.items()
+    }
 
 
 def _is_direction(value: list[float]) -> bool:
