@@ -28,14 +28,7 @@ import numpy as np
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
-from benchmarks.file_to_film import (  # noqa: E402
-    COARSER_THAN_ANY_M,
-    HEIGHT_M,
-    LENGTH_M,
-    STANDOFF_M,
-    body_side,
-    write_stl,
-)
+from benchmarks import file_to_film as side  # noqa: E402
 
 GUNS = ('robot_1', 'robot_2')
 RATE_HZ = 250
@@ -67,7 +60,7 @@ def start_simulator(running: ExitStack, folder: Path) -> tuple[subprocess.Popen,
     """The simulator on the folder's part, and the time to `ready` in its log [s]."""
     return start_node(
         running, folder, 'deposition_simulator', mesh_file=folder / 'part.stl',
-        max_edge_length_m=COARSER_THAN_ANY_M,
+        max_edge_length_m=side.COARSER_THAN_ANY_M,
     )  # fmt: skip
 
 
@@ -187,7 +180,7 @@ class Robots:
         message = PoseStamped()
         message.header.frame_id = 'part'
         q, p = message.pose.orientation, message.pose.position
-        q.x, q.w, p.y = -float(np.sqrt(0.5)), float(np.sqrt(0.5)), -STANDOFF_M
+        q.x, q.w, p.y = -float(np.sqrt(0.5)), float(np.sqrt(0.5)), -side.STANDOFF_M
         began_s, stamps = time.monotonic(), []
         for row in range(round(seconds * RATE_HZ)):
             at_s = row / RATE_HZ
@@ -196,10 +189,10 @@ class Robots:
             now = time.time_ns()
             message.header.stamp = Time(nanoseconds=now).to_msg()
             stamps.append(now)
-            number, along = divmod(at_s * SPEED_M_PER_S / LENGTH_M, 1.0)
+            number, along = divmod(at_s * SPEED_M_PER_S / side.LENGTH_M, 1.0)
             for gun, publisher in enumerate(self._poses):
-                p.x = LENGTH_M * (along if (number + gun) % 2 == 0 else 1.0 - along)
-                p.z = HEIGHT_M / 2 * (gun + (0.15 + 0.2 * number) % 1.0)
+                p.x = side.LENGTH_M * (along if (number + gun) % 2 == 0 else 1.0 - along)
+                p.z = side.HEIGHT_M / 2 * (gun + (0.15 + 0.2 * number) % 1.0)
                 if row == 0:
                     state = AtomizerState(spraying=True)
                     state.header.stamp = message.header.stamp
@@ -275,8 +268,8 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         os.environ['PAINT_CACHE_DIR'] = str(folder / 'cache')
-        corners, faces = body_side(given.vertices)
-        write_stl(folder / 'part.stl', corners, faces)
+        corners, faces = side.body_side(given.vertices)
+        side.write_stl(folder / 'part.stl', corners, faces)
         with ExitStack() as running:
             new_s = start_simulator(running, folder)[1]
         print(
