@@ -32,7 +32,7 @@ from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.mesh_tiles import MeshTiles
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.painting_parameters import PAINTING, read_part
+from paint_deposition.nodes.painting.painting_parameters import PAINTING, bare_films, read_part
 from paint_deposition.nodes.painting.part_change import PartChange
 from paint_deposition.nodes.painting.parts import PreparedPart
 from paint_deposition.nodes.runtime import qos
@@ -153,7 +153,7 @@ class DepositionSimulator(PaintingNode):
         """Read a part that is to come; in a thread of its own."""
         surface = read_part(self.values, mesh_file)
         points = self._points_on(surface)
-        film = self._film_on(surface, points, self._models)
+        film = bare_films(surface, points, self._models, self.values)
         film.warm_up()
         look_at_once(surface)
         return PreparedPart(surface, points, film, ShownFilm(surface, self.frame.frame_id))

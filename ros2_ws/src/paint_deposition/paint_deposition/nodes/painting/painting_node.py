@@ -5,24 +5,22 @@ from __future__ import annotations
 import itertools
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 from rclpy.timer import Timer
 
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.between_brushes import require_its_brush
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
-from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting import early
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.catching_up import CatchingUp
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.outward_side import OutwardSide
-from paint_deposition.nodes.painting.painting_parameters import read_part
+from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
 from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
 from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
@@ -95,7 +93,7 @@ class PaintingNode(ManagedNode, ABC):
         self._read_part()
         loading = early.load_what_paints(self._models, self.values.get('precision', 'double'))
         self._take_surface(read_part(self.values, self.mesh_file))
-        self.film = self._film_on(self.surface, self.points, self._models)
+        self.film = bare_films(self.surface, self.points, self._models, self.values)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
         loading.join()
         self.film.warm_up()
@@ -169,7 +167,7 @@ class PaintingNode(ManagedNode, ABC):
                   film: LiveFilms) -> None:  # fmt: skip
         """Paint another part from bare metal on, as the guns are now; the counts begin anew."""
         if any(new.model != now for new, now in zip(film.guns, self._models, strict=True)):
-            film = self._film_on(surface, points, self._models)
+            film = bare_films(surface, points, self._models, self.values)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
@@ -205,24 +203,6 @@ class PaintingNode(ManagedNode, ABC):
         self._tend()
 
     # --- the part and the model
-
-    def _film_on(
-        self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
-    ) -> LiveFilms:
-        """Bare films of a model for each gun."""
-        films = (
-            LiveFilm(
-                points,
-                model,
-                precision=self.values.get('precision', 'double'),
-                occluder=surface.occluder,
-                max_pose_gap_s=self.values['max_pose_gap_s'],
-                trigger_latency_s=self.values['trigger_latency_s'],
-                limit_poses=self.values['pose_memory'],
-            )
-            for model in models
-        )
-        return LiveFilms(tuple(films))
 
     def _check(self, values: Mapping[str, Any]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
@@ -267,7 +247,7 @@ class PaintingNode(ManagedNode, ABC):
             for effect in itertools.chain.from_iterable(model.effects for model in models):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return self._film_on(surface, points, models)
+            return bare_films(surface, points, models, self.values)
 
         self.repainting = Repainting(self.film, make, from_start)
 
@@ -299,7 +279,7 @@ class PaintingNode(ManagedNode, ABC):
             return
         self._take_surface(faced)
         models = [gun.model for gun in self.film.guns]
-        turned = self._film_on(self.surface, self.points, models)
+        turned = bare_films(self.surface, self.points, models, self.values)
         for new, old in zip(turned.guns, self.film.guns, strict=True):
             new.follow(old.log.events())
         self.film = turned

@@ -1,14 +1,17 @@
-"""Parameters that the nodes which paint have in common."""
+"""Parameters that the nodes which paint have in common, and what is made as they say."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 from paint_deposition.nodes.runtime.managed_node import MANAGED
@@ -20,6 +23,7 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     read_to_configure,
 )
+from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 PAINTING = dict(
@@ -107,3 +111,24 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
         raise PaintError("mesh_file is empty: give the part's mesh")
     down = np.array(values['down']) if values['down'] else None
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
+
+
+def bare_films(
+    surface: Surface,
+    points: SurfacePoints,
+    models: Iterable[DepositionModel],
+    values: Mapping[str, Any],
+) -> LiveFilms:
+    """Films of a model for each gun, without paint, as a node's parameters say."""
+    return LiveFilms(tuple(
+        LiveFilm(
+            points,
+            model,
+            precision=values.get('precision', 'double'),
+            occluder=surface.occluder,
+            max_pose_gap_s=values['max_pose_gap_s'],
+            trigger_latency_s=values['trigger_latency_s'],
+            limit_poses=values['pose_memory'],
+        )
+        for model in models
+    ))  # fmt: skip
