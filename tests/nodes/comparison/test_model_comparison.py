@@ -162,12 +162,9 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
-    wait_until(
-        lambda: (
-            viewer.newest('comparison/mesh')
-            and _at(viewer.newest('comparison/mesh').header.stamp) == MOTION.stamps_ns[-1]
-        )
-    )
+    newest = MOTION.stamps_ns[-1]
+    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: _at(m.header.stamp) == newest))
+    wait_until(lambda: viewer.newest('comparison/legend'), what='the legend')
     mesh = viewer.newest('comparison/mesh')
     colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
     corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
