@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -161,6 +162,7 @@ def standoff_drift_m(
 
     both_ways = not parallel.alike
 
+    @cache  # the search for a crossing asks for its ends again
     def sigma_n(standoff_m: float) -> float:
         there = replace(setup, standoff_m=standoff_m, one_way=setup.one_way or not both_ways)
         return there.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
