@@ -48,7 +48,7 @@ soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for 
 	@$(IN_ENVIRONMENT) python benchmarks/soak.py $(ARGS)
 
 numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
-	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 $(ARGS)
+	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)
 
 lint: build  ## check style, types and the order of the rooms
 	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports
