@@ -40,8 +40,8 @@ def test_speeds_are_told_by_pass_and_drawn(run, tmp_path):
     lines = done.stdout.splitlines()
     assert [line.split(':')[0] for line in lines[:4]] == ['pass 1', 'pass 2', 'pass 3', 'all']
     assert 'programmed 0.500 m/s' in lines[0]
-    assert '; film +0.0%' in lines[1]
-    assert lines[4] == '100% of the way sprayed lies on the programme'
+    assert '; film +0.0 %' in lines[1]
+    assert lines[4] == '100 % of the way sprayed lies on the programme'
     with Image.open(tmp_path / 'speed.png') as picture:
         colours = {colour for _, colour in picture.convert('RGB').getcolors(1 << 24)}
     assert bytes.fromhex('00708c') in map(bytes, colours)
@@ -60,4 +60,4 @@ def test_what_does_not_go_together_is_refused(run, tmp_path):
     away = (*STATES, '--part-pose', 0, 1, 0, 0, 0, 0, 1)
     done = paint('inspect', recorded, '--programmed', module, *away)
     assert done.returncode == 2
-    assert 'only 0% of the way sprayed lies within 50 mm of the programme' in done.stderr
+    assert 'only 0 % of the way sprayed lies within 50 mm of the programme' in done.stderr

@@ -100,5 +100,5 @@ def test_a_slow_end_of_a_pass_is_what_integrates_by_hand(noise_m):
 
 def test_a_programme_of_another_part_is_refused():
     driven = replace(programme(), positions_m=programme().positions_m + np.array([0.0, 0.1, 0.0]))
-    with pytest.raises(RecordingError, match='only 0% of the way sprayed lies within 50 mm'):
+    with pytest.raises(RecordingError, match='only 0 % of the way sprayed lies within 50 mm'):
         compared(driven)

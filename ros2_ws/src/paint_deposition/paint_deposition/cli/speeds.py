@@ -42,6 +42,6 @@ def show_speeds(
     for one in speed.passes:
         click.echo(f'pass {one.number}: {one.sentence}')
     click.echo(f'all: {speed.whole.sentence}')
-    click.echo(f'{speed.on_programme:.0%} of the way sprayed lies on the programme')
+    click.echo(f'{100 * speed.on_programme:.0f} % of the way sprayed lies on the programme')
     if output is not None:
         click.echo(f'  {output}')

@@ -53,11 +53,12 @@ class PassSpeed:
     @property
     def sentence(self) -> str:
         """The figures in a line."""
-        at_ends = f', {self.slower_at_ends:.0%} of that at ends' if self.slower else ''
+        change = round(100.0 * (self.film - 1.0), 1) + 0.0  # no -0.0
+        at_ends = f', {100 * self.slower_at_ends:.0f} % of that at ends' if self.slower else ''
         return (
             f'programmed {self.programmed_m_per_s:.3f} m/s, driven {self.driven_m_per_s:.3f} (at '
-            f'least {self.slowest_m_per_s:.3f}) over {self.way_m:.2f} m; {self.slower:.0%} of the '
-            f'way more than {TOLERANCE:.0%} slower{at_ends}; film {self.film - 1.0:+.1%}'
+            f'least {self.slowest_m_per_s:.3f}) over {self.way_m:.2f} m; {100 * self.slower:.0f} % '
+            f'of the way more than {100 * TOLERANCE:.0f} % slower{at_ends}; film {change:+.1f} %'
         )
 
 
@@ -111,8 +112,8 @@ def driven_speed(driven: SprayPath, programmed: SprayPath) -> DrivenSpeed:
     on_programme = float(step_m[near].sum() / step_m.sum())
     if on_programme < 0.5:
         raise RecordingError(
-            f'only {on_programme:.0%} of the way sprayed lies within {1e3 * NEAR_M:.0f} mm of the '
-            'programme: are both of the same part, and in the same frame? see --part-pose'
+            f'only {100 * on_programme:.0f} % of the way sprayed lies within {1e3 * NEAR_M:.0f} mm '
+            'of the programme: are both of the same part, and in the same frame? see --part-pose'
         )
     rows = [
         found

@@ -38,7 +38,7 @@ def write_speed_picture(path: str | Path, speed: DrivenSpeed, title: str) -> Pat
         axes.fill_between(
             way_m, driven[rows], programmed[rows], color=SLOWER_COLOUR, alpha=0.35, linewidth=0,
             where=(driven[rows] < (1.0 - TOLERANCE) * programmed[rows]).tolist(),
-            label=f'more than {TOLERANCE:.0%} slower' if first else None,
+            label=f'more than {100 * TOLERANCE:.0f} % slower' if first else None,
         )  # fmt: skip
         axes.annotate(
             str(number), (0.5 * (way_m[0] + way_m[-1]), 0.0), xytext=(0, 3),
