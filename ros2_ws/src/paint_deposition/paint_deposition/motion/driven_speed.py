@@ -57,8 +57,8 @@ class PassSpeed:
         at_ends = f', {100 * self.slower_at_ends:.0f} % of that at ends' if self.slower else ''
         return (
             f'programmed {self.programmed_m_per_s:.3f} m/s, driven {self.driven_m_per_s:.3f} (at '
-            f'least {self.slowest_m_per_s:.3f}) over {self.way_m:.2f} m; {100 * self.slower:.0f} % '
-            f'of the way more than {100 * TOLERANCE:.0f} % slower{at_ends}; film {change:+.1f} %'
+            f'least {self.slowest_m_per_s:.3f}) over {self.way_m:.2f} m; {100 * self.slower:.0f} '
+            f'% of the way more than {100 * TOLERANCE:.0f} % slower{at_ends}; film {change:+.1f} %'
         )
 
 
@@ -112,8 +112,9 @@ def driven_speed(driven: SprayPath, programmed: SprayPath) -> DrivenSpeed:
     on_programme = float(step_m[near].sum() / step_m.sum())
     if on_programme < 0.5:
         raise RecordingError(
-            f'only {100 * on_programme:.0f} % of the way sprayed lies within {1e3 * NEAR_M:.0f} mm '
-            'of the programme: are both of the same part, and in the same frame? see --part-pose'
+            f'only {100 * on_programme:.0f} % of the way sprayed lies within '
+            f'{1e3 * NEAR_M:.0f} mm of the programme: are both of the same part, and in the same '
+            'frame? see --part-pose'
         )
     rows = [
         found
