@@ -105,9 +105,8 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
         source.send(MOTION, rows)
         newest = MOTION.stamps_ns[rows][-1]
         wait_until(
-            lambda newest=newest: (
-                viewer.newest('comparison/stats')
-                and _at(viewer.newest('comparison/stats').header.stamp) == newest
+            lambda newest=newest: viewer.shows(
+                'comparison/stats', lambda m: _at(m.header.stamp) == newest
             )
         )
         errors.append(viewer.newest('comparison/stats').rmse_um)

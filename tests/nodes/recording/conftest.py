@@ -8,16 +8,15 @@ import pytest
 @pytest.fixture
 def record(ros_context, spin, tmp_path):
     """`record(**parameters)`: a recorder of the run `run`, running."""
-    from rclpy.parameter import Parameter
-
+    from nodes.cell import parameters
     from paint_deposition.nodes.recording.run_recorder import RunRecorder
 
-    def record(namespace='', **parameters) -> RunRecorder:
-        values = {'output_directory': str(tmp_path), 'name': 'run'} | parameters
+    def record(namespace='', **chosen) -> RunRecorder:
+        values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen
         recorder = RunRecorder(
             context=ros_context,
             namespace=namespace,
-            parameter_overrides=[Parameter(name, value=value) for name, value in values.items()],
+            parameter_overrides=parameters(**values),
         )
         spin(recorder)
         return recorder

@@ -13,16 +13,15 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 @pytest.fixture
 def play(ros_context, spin):
     """`play(bag, **parameters)`: a player of this bag, running."""
-    from rclpy.parameter import Parameter
-
+    from nodes.cell import parameters
     from paint_deposition.nodes.replay.bag_player import BagPlayer
 
-    def play(bag, namespace='', **parameters) -> BagPlayer:
-        values = {'bag': str(bag)} | parameters
+    def play(bag, namespace='', **chosen) -> BagPlayer:
+        values = {'bag': str(bag)} | chosen
         player = BagPlayer(
             context=ros_context,
             namespace=namespace,
-            parameter_overrides=[Parameter(name, value=value) for name, value in values.items()],
+            parameter_overrides=parameters(**values),
         )
         spin(player)
         return player

@@ -148,15 +148,13 @@ class FilmIntegrator:
         self.used += PaintUsed.of(self.model, path)
         for start in range(0, len(path), BATCH):
             part = path.select(slice(start, start + BATCH))
-            self.paint(self._steps(part, model_constants(self.model)))
+            self.paint(self._steps(part))
             if progress:
                 progress(min(start + BATCH, len(path)))
 
     def steps(self, path: SprayPath) -> Steps:
         """A path prepared for this model's effects and projection, to be painted repeatedly."""
-        constants = model_constants(self.model)
-        constants[:, REACH] = ANY_REACH_M
-        return self._steps(self.sprayed(path)[0], constants)
+        return self._steps(self.sprayed(path)[0], ANY_REACH_M)
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""
@@ -193,11 +191,15 @@ class FilmIntegrator:
         row = np.searchsorted([brush.number for brush in self.model.brushes[:-1]], path.brush)
         return SprayPath.by_row(moved, np.array([kinds.index(e) for e in effects])[row])
 
-    def _steps(self, path: SprayPath, constants: np.ndarray) -> Steps:
+    def _steps(self, path: SprayPath, reach: float | None = None) -> Steps:
+        """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
         if not (self._lines_of_sight and self._shadowed):
             return Steps(rows, Sight.free(len(rows), len(self._blocks.spheres)), brush)
+        constants = model_constants(self.model)
+        if reach is not None:
+            constants[:, REACH] = reach
         sight, self._traced_from = self._lines_of_sight.along(
             emission_points_m(self.model, path), rows, brush,
             constants.astype(self._real), self._traced_from,

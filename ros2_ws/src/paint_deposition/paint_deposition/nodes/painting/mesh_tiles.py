@@ -51,10 +51,11 @@ class MeshTiles:
             )
         count = len(self._told)
         for tile in ((self.sent + k) % count for k in range(count)):
-            told, now = self._told[tile], rows[self._shown_as.corners(tile)]
-            if told is not None and (
-                told[0] == edition or (count > 1 and np.array_equal(told[1], now))
-            ):
+            told = self._told[tile]
+            if told is not None and told[0] == edition:
+                continue
+            now = rows[self._shown_as.corners(tile)]
+            if told is not None and count > 1 and np.array_equal(told[1], now):
                 continue
             self._told[tile] = edition, now
             self.sent += 1
