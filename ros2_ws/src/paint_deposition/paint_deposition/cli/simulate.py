@@ -31,6 +31,7 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
+from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     import numpy as np
@@ -102,7 +103,7 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
-    with Progress('simulate') as tell:
+    with Progress('simulate') as tell, DrawingProcess('film') as drawing:
         tell('loading')
         from paint_deposition.files.gun_motions import read_gun_motions
         from paint_deposition.files.motion_source import MotionSource
@@ -127,7 +128,9 @@ def simulate_command(
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         tell('writing and drawing')
-        files = write_results(film, output, made_from=made_from, pictures=pictures)
+        files = write_results(
+            film, output, made_from=made_from, pictures=pictures, drawing=drawing
+        )
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
     say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
