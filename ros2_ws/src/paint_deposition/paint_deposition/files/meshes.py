@@ -1,6 +1,5 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
-from functools import reduce
 from itertools import repeat
 from pathlib import Path
 
@@ -11,7 +10,8 @@ from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.creases import Edges
-from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
+from paint_deposition.part.points import box_extent_m
+from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.welding import weld
 
@@ -151,7 +151,7 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
     used = np.zeros(len(vertices_m), dtype=bool)
     used[faces] = True
     corners_m = vertices_m if used.all() else vertices_m[used]
-    extent = float(np.ptp(corners_m, axis=0).max())
+    extent = float(box_extent_m(corners_m).max())
     if extent > LARGEST_M:
         raise MeshError(
             f'{path}: the part would be {extent:.4g} m large, it looks like millimetres; '
@@ -167,8 +167,8 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
 def _without_degenerate(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
-    longest = reduce(np.maximum, edge_lengths_m(vertices_m, faces).T)
-    good = 2.0 * face_areas_m2(vertices_m, faces) > LEAST_HEIGHT_M * longest
+    heights_wanted = LEAST_HEIGHT_M * longest_edges_m(vertices_m, faces)
+    good = 2.0 * face_areas_m2(vertices_m, faces) > heights_wanted
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
     if not good.all():

@@ -1,5 +1,7 @@
 """From the triangles of a file to a conforming mesh of bounded edge length."""
 
+from functools import reduce
+
 import numpy as np
 from numba import njit
 
@@ -13,22 +15,23 @@ KEY_BASE = np.int64(1) << 31
 
 def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F,) areas [m^2]."""
-    return 0.5 * np.linalg.norm(_face_vectors(vertices_m, faces), axis=1)
+    return 0.5 * _face_vectors(*_plain(vertices_m, faces))[1]
 
 
 def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) unit normals by the right-hand rule."""
-    vectors = _face_vectors(vertices_m, faces)
-    return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+    vectors, lengths = _face_vectors(*_plain(vertices_m, faces))
+    return vectors / lengths[:, None]
+
+
+def longest_edges_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F,) lengths of the longest edges of the triangles [m]."""
+    return reduce(np.maximum, edge_lengths_m(vertices_m, faces).T)
 
 
 def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) lengths of the edges from each corner to the next [m]."""
     return _edge_lengths(*_plain(vertices_m, faces))
-
-
-def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    return _cross_products(*_plain(vertices_m, faces))
 
 
 def _plain(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -39,8 +42,9 @@ def _plain(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nd
 
 
 @njit(cache=True, nogil=True)
-def _cross_products(vertices, faces):
-    vectors = np.empty((len(faces), 3))
+def _face_vectors(vertices, faces):
+    """(F, 3) normals as long as the parallelograms are large, and their lengths (F,)."""
+    vectors, lengths = np.empty((len(faces), 3)), np.empty(len(faces))
     for f in range(len(faces)):
         i, j, k = faces[f]
         ax = vertices[j, 0] - vertices[i, 0]
@@ -49,10 +53,10 @@ def _cross_products(vertices, faces):
         bx = vertices[k, 0] - vertices[i, 0]
         by = vertices[k, 1] - vertices[i, 1]
         bz = vertices[k, 2] - vertices[i, 2]
-        vectors[f, 0] = ay * bz - az * by
-        vectors[f, 1] = az * bx - ax * bz
-        vectors[f, 2] = ax * by - ay * bx
-    return vectors
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        vectors[f, 0], vectors[f, 1], vectors[f, 2] = x, y, z
+        lengths[f] = np.sqrt(x * x + y * y + z * z)
+    return vectors, lengths
 
 
 @njit(cache=True, nogil=True)
@@ -102,7 +106,10 @@ def refine(
     Raises:
         MeshError: it would have more than MAX_TRIANGLES triangles.
     """
-    _refuse_too_many(vertices_m, faces, max_edge_length_m)
+    longest_m = longest_edges_m(vertices_m, faces)
+    if len(faces) <= MAX_TRIANGLES and not np.any(longest_m > max_edge_length_m):
+        return vertices_m, normals, faces
+    _refuse_too_many(face_areas_m2(vertices_m, faces), longest_m, max_edge_length_m)
     mesh = _Growing(vertices_m, normals)
     while True:
         edges, of_face = edges_of(faces)
@@ -242,15 +249,15 @@ def _halves(vertices_m: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.n
     return quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]
 
 
-def _refuse_too_many(vertices_m: np.ndarray, faces: np.ndarray, edge_m: float) -> None:
-    if len(faces) > MAX_TRIANGLES:
+def _refuse_too_many(areas_m2: np.ndarray, longest_m: np.ndarray, edge_m: float) -> None:
+    """By the areas (F,) and longest edges (F,) of the triangles."""
+    if len(areas_m2) > MAX_TRIANGLES:
         raise MeshError(
-            f'the mesh has {len(faces)} triangles, more than {MAX_TRIANGLES}; export it coarser'
+            f'the mesh has {len(areas_m2)} triangles, more than {MAX_TRIANGLES}; export it coarser'
         )
-    longest = edge_lengths_m(vertices_m, faces).max(axis=1)
     # Halving ends between half the length and the length: up to 8 triangles an edge squared.
-    by_area = 8.0 * face_areas_m2(vertices_m, faces) / edge_m**2
-    expected = float(np.maximum(np.maximum(by_area, 4.0 * longest / edge_m), 1.0).sum())
+    by_area = 8.0 * areas_m2 / edge_m**2
+    expected = float(np.maximum(np.maximum(by_area, 4.0 * longest_m / edge_m), 1.0).sum())
     if expected > MAX_TRIANGLES:
         raise MeshError(
             f'max_edge_length_m = {edge_m:g} m would cut this mesh into about {expected:.2g} '

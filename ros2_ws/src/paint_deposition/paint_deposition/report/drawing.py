@@ -6,6 +6,7 @@ import pickle
 import subprocess
 import sys
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from pkgutil import resolve_name
 from types import TracebackType
 from typing import Any
@@ -25,6 +26,9 @@ class Here:
         return done
 
 
+HERE = Here()
+
+
 class DrawingProcess:
     """A second process, and the pictures that it draws.
 
@@ -41,6 +45,11 @@ class DrawingProcess:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, start_new_session=True,
         )  # fmt: skip
         self._asking = ThreadPoolExecutor(1)
+
+    @property
+    def pid(self) -> int:
+        """Number of the second process."""
+        return self._process.pid
 
     def __enter__(self) -> DrawingProcess:
         return self
@@ -66,7 +75,8 @@ class DrawingProcess:
 
     def _ask(self, picture: str, drawn: tuple[Any, ...]) -> Any:
         question, answer = self._process.stdin, self._process.stdout
-        assert question and answer
+        assert question
+        assert answer
         try:
             pickle.dump((picture, drawn), question, pickle.HIGHEST_PROTOCOL)
             question.flush()
@@ -89,14 +99,15 @@ def _answer(module: str) -> None:
     """Draw what is asked for on stdin, until it is closed; results go to stdout, nothing else."""
     questions, answers, sys.stdout = sys.stdin.buffer, sys.stdout.buffer, sys.stderr
     resolve_name(f'{PICTURES}.{module}')
-    while questions.peek(1):
-        picture, drawn = pickle.load(questions)
-        try:
-            result = _draw(picture, drawn)
-        except Exception as error:
-            result = error
-        pickle.dump(result, answers, pickle.HIGHEST_PROTOCOL)
-        answers.flush()
+    with suppress(EOFError):
+        while True:
+            picture, drawn = pickle.load(questions)
+            try:
+                result = _draw(picture, drawn)
+            except Exception as error:
+                result = error
+            pickle.dump(result, answers, pickle.HIGHEST_PROTOCOL)
+            answers.flush()
 
 
 if __name__ == '__main__':

@@ -9,7 +9,7 @@ from typing import Any
 from paint_deposition.api.simulation import Film
 from paint_deposition.api.writers.provenance import with_provenance
 from paint_deposition.files.gauge_readings import write_predictions
-from paint_deposition.report.drawing import DrawingProcess, Here
+from paint_deposition.report.drawing import HERE, DrawingProcess, Here
 from paint_deposition.results.film import write_film
 
 PNG = 'png'
@@ -20,7 +20,7 @@ def film(
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     pictures: str = PNG,
-    drawing: DrawingProcess | Here = Here(),
+    drawing: DrawingProcess | Here = HERE,
 ) -> list[Path]:
     models = {gun.name or 'model': gun.model for gun in result.guns}
     motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
