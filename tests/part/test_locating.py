@@ -3,7 +3,7 @@
 import numpy as np
 from trimesh.triangles import closest_point
 
-from paint_deposition.part.locating import closest_places
+from paint_deposition.part.locating import closest_place
 
 
 def test_places_inside_on_edges_and_at_corners_are_those_of_trimesh():
@@ -13,5 +13,8 @@ def test_places_inside_on_edges_and_at_corners_are_those_of_trimesh():
     corners = vertices[faces[face]]
     points[:500], points[500:1000] = corners[:500, 1], corners[500:1000, 1:].mean(axis=1)
     points[1000:1500] = corners[1000:1500].mean(axis=1)
-    places = closest_places(vertices, faces, face, points, np.arange(5000))
+    places = [
+        closest_place(*map(tuple, (*its, point)))
+        for its, point in zip(corners, points, strict=True)
+    ]
     np.testing.assert_allclose(places, closest_point(corners, points), atol=1e-12)

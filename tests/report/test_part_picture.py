@@ -4,7 +4,6 @@ import numpy as np
 from tests.surfaces import triangulated
 
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.visibility import Occluder
 from paint_deposition.report.pictures import part
 from paint_deposition.report.pictures.part import PartPicture
 
@@ -24,9 +23,7 @@ def test_pixels_show_what_rays_meet(monkeypatch):
     shown = np.isfinite(seen_m[:, :, 0])
     toward = picture.view.toward
     eyes = seen_m[shown] + 2.0 * toward
-    met = Occluder(surface.vertices_m, surface.faces).first_faces(
-        eyes, -np.tile(toward, (len(eyes), 1))
-    )
+    met = surface.first_faces(eyes, -np.tile(toward, (len(eyes), 1)))
     assert np.mean(np.sort(surface.faces[met]) == np.sort(picture.corners[shown])) > 0.999
     assert 0.6 < shown.mean() < 1.0
 

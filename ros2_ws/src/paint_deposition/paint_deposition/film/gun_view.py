@@ -85,7 +85,7 @@ class GunView:
         back = projection.emission_offset_m * self.path.rotation[:, :, 2]
         first = projection.nearest_m / projection.model_plane_m
         starts = (self.path.position_m - back)[:, None] + first * ways
-        face = self.surface.occluder.first_faces(starts.reshape(-1, 3), ways.reshape(-1, 3))
+        face = self.surface.first_faces(starts.reshape(-1, 3), ways.reshape(-1, 3))
         hit = np.flatnonzero(face >= 0)
         normals = face_normals(self.surface.vertices_m, self.surface.faces[face[hit]])
         lands = np.zeros(len(face))

@@ -30,7 +30,7 @@ def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np
     places = np.nan_to_num(np.asarray(from_left_m, dtype=float))
     starts = np.outer(left + places[:, 0], right) + np.outer(low + places[:, 1], up)
     starts += front * outward
-    face = surface.occluder.first_faces(starts, np.broadcast_to(-outward, starts.shape))
+    face = surface.first_faces(starts, np.broadcast_to(-outward, starts.shape))
     hit = (face >= 0) & np.isfinite(from_left_m).all(axis=1)
     corners = vertices[surface.faces[np.maximum(face, 0)]]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])

@@ -91,7 +91,7 @@ def _met(
     """What poses look at, and tool z (M, 3) of those that look at the surface."""
     some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
     positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
-    face = surface.occluder.first_faces(positions_m, z_axes)
+    face = surface.first_faces(positions_m, z_axes)
     met = face >= 0
     normals = face_normals(surface.vertices_m, surface.faces[face[met]])
     front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))

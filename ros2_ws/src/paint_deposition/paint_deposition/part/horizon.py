@@ -2,14 +2,14 @@
 
 import math
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 from numba import get_num_threads, njit
 
-# Faces in a leaf of the tree.
-LEAF = 8
+from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree, support
+
 # Lower horizons are not told apart [sine]: hardly any paint comes from there.
 LEAST_SINE = 0.05
 # What rounding may hide [sine], and how near a point a face passes through it [m].
@@ -18,133 +18,27 @@ SLACK_SINE, TOUCHING_M = 0.03, 1e-6
 LEAST_BLOCK = 2048
 # Points with a part of the surface as high over them [sine] are not looked at any longer.
 HIGH_SINE = 0.8
-# A node of the tree: centre and half the sides of its box, half their diagonal, mean normal of its
-# faces, and half their thickness along it.
-BOX, RADIUS, NORMAL, THICKNESS = 3, 6, 7, 10
-NODE = 11
 
 
-@dataclass(frozen=True)
-class Horizon:
-    """The faces of a part in a tree of boxes, each cut to the slab that its faces lie in.
+def horizon_sines(tree: FaceTree, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(N,) sine of the highest elevation at which a point sees any of the part.
 
-    Attributes:
-        vertices_m: (V, 3) [m].
-        faces: (F, 3) in the order of the leaves, neighbours together.
-        nodes: (2 L - 1, 11) from the root down; the children of node i are 2 i + 1 and 2 i + 2.
+    Elevations are those over the plane at right angles to the point's normal (N, 3). A ray that
+    comes to the point from higher up meets nothing on its way. No less than LEAST_SINE, and 1
+    where it is above HIGH_SINE.
     """
+    found = np.empty(len(points_m))
+    blocks = max(1, min(get_num_threads(), len(points_m) // LEAST_BLOCK))
+    bounds = np.linspace(0, len(points_m), blocks + 1).astype(np.int64)
+    points = np.ascontiguousarray(points_m, dtype=np.float64)
+    upward = np.ascontiguousarray(normals, dtype=np.float64)
 
-    vertices_m: np.ndarray
-    faces: np.ndarray
-    nodes: np.ndarray
+    def fill(part: tuple[int, int]) -> None:
+        _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, *part, found)
 
-    @staticmethod
-    def of(vertices_m: np.ndarray, faces: np.ndarray) -> 'Horizon':
-        """Sort (F, 3) faces of (V, 3) vertices [m] along a space-filling curve."""
-        vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
-        low, extent = vertices.min(axis=0), max(float(np.ptp(vertices, axis=0).max()), 1e-12)
-        order = np.argsort(_places_on_the_curve(vertices, faces, low, 1023.0 / extent))
-        faces = np.ascontiguousarray(faces[order], dtype=np.int64)
-        leaves = 1 << math.ceil(math.log2(max(1.0, len(faces) / LEAF)))
-        return Horizon(vertices, faces, _nodes(vertices, faces, leaves))
-
-    def sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) sine of the highest elevation at which a point sees any of the part.
-
-        Elevations are those over the plane at right angles to the point's normal (N, 3). A ray
-        that comes to the point from higher up meets nothing on its way. No less than LEAST_SINE,
-        and 1 where it is above HIGH_SINE.
-        """
-        found = np.empty(len(points_m))
-        blocks = max(1, min(get_num_threads(), len(points_m) // LEAST_BLOCK))
-        bounds = np.linspace(0, len(points_m), blocks + 1).astype(np.int64)
-        points = np.ascontiguousarray(points_m, dtype=np.float64)
-        upward = np.ascontiguousarray(normals, dtype=np.float64)
-
-        def fill(part: tuple[int, int]) -> None:
-            _fill(points, upward, self.vertices_m, self.faces, self.nodes, *part, found)
-
-        with ThreadPoolExecutor(blocks) as threads:
-            list(threads.map(fill, pairwise(bounds)))
-        return found
-
-
-@njit(cache=True, nogil=True)
-def _places_on_the_curve(vertices, faces, low, scale):
-    """(F,) place of each face's centre on Morton's curve through 1024^3 cells."""
-    places = np.zeros(len(faces), dtype=np.int32)
-    for f in range(len(faces)):
-        for k in range(3):
-            centre = (
-                vertices[faces[f, 0], k] + vertices[faces[f, 1], k] + vertices[faces[f, 2], k]
-            ) / 3.0
-            cell = int((centre - low[k]) * scale)
-            for bit in range(10):
-                places[f] |= ((cell >> bit) & 1) << (3 * bit + k)
-    return places
-
-
-@njit(cache=True, nogil=True)
-def _support(node, x, y, z):
-    """How far a node reaches from its centre along a unit vector [m]."""
-    along = min(1.0, abs(node[NORMAL] * x + node[NORMAL + 1] * y + node[NORMAL + 2] * z))
-    across = math.sqrt(1.0 - along * along)
-    return min(node[RADIUS], along * node[THICKNESS] + across * node[RADIUS])
-
-
-@njit(cache=True, nogil=True)
-def _along_normal(node, place):
-    """How far a place lies from a node's centre along its normal [m]."""
-    return (
-        (place[0] - node[0]) * node[NORMAL]
-        + (place[1] - node[1]) * node[NORMAL + 1]
-        + (place[2] - node[2]) * node[NORMAL + 2]
-    )
-
-
-@njit(cache=True, nogil=True)
-def _nodes(vertices, faces, leaves):
-    """(2 L - 1, 11) boxes around all nodes, and slabs around what is in them."""
-    nodes = np.zeros((2 * leaves - 1, NODE))
-    low, high = np.full((len(nodes), 3), np.inf), np.full((len(nodes), 3), -np.inf)
-    areas = np.zeros((len(nodes), 3))
-    for node in range(len(nodes) - 1, -1, -1):
-        at, leaf = nodes[node], node - (leaves - 1)
-        inner = leaf < 0
-        first = 0 if inner else len(faces) * leaf // leaves
-        last = 0 if inner else len(faces) * (leaf + 1) // leaves
-        for f in range(first, last):
-            a, b, c = faces[f]
-            for k in range(3):
-                low[node, k] = min(low[node, k], vertices[a, k], vertices[b, k], vertices[c, k])
-                high[node, k] = max(high[node, k], vertices[a, k], vertices[b, k], vertices[c, k])
-                i, j = (k + 1) % 3, (k + 2) % 3
-                areas[node, k] += (vertices[b, i] - vertices[a, i]) * (
-                    vertices[c, j] - vertices[a, j]
-                ) - (vertices[b, j] - vertices[a, j]) * (vertices[c, i] - vertices[a, i])
-        children = range(2 * node + 1, 2 * node + 3 if inner else 2 * node + 1)
-        for child in children:
-            for k in range(3):
-                low[node, k] = min(low[node, k], low[child, k])
-                high[node, k] = max(high[node, k], high[child, k])
-                areas[node, k] += areas[child, k]
-        squared, area2 = 0.0, 1e-300
-        for k in range(3):
-            at[k] = 0.5 * (low[node, k] + high[node, k])
-            at[BOX + k] = 0.5 * (high[node, k] - low[node, k])
-            squared += at[BOX + k] ** 2
-            area2 += areas[node, k] ** 2
-        at[RADIUS] = math.sqrt(squared)
-        for k in range(3):
-            at[NORMAL + k] = areas[node, k] / math.sqrt(area2)
-        for f in range(first, last):
-            for corner in faces[f]:
-                at[THICKNESS] = max(at[THICKNESS], abs(_along_normal(at, vertices[corner])))
-        for child in children:
-            reach = _support(nodes[child], at[NORMAL], at[NORMAL + 1], at[NORMAL + 2])
-            at[THICKNESS] = max(at[THICKNESS], abs(_along_normal(at, nodes[child])) + reach)
-        at[THICKNESS] = min(at[THICKNESS], at[RADIUS])
-    return nodes
+    with ThreadPoolExecutor(blocks) as threads:
+        list(threads.map(fill, pairwise(bounds)))
+    return found
 
 
 @njit(cache=True, nogil=True)
@@ -199,10 +93,11 @@ def _face_sine(p, n, vertices, face):
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _bound(p, n, node):
     """No part of a node is seen from p under a higher sine of elevation, if that is below 1."""
     x, y, z = node[0] - p[0], node[1] - p[1], node[2] - p[2]
-    height = n[0] * x + n[1] * y + n[2] * z + _support(node, n[0], n[1], n[2])
+    height = n[0] * x + n[1] * y + n[2] * z + support(node, n[0], n[1], n[2])
     if height <= 0.0:
         return 0.0
     x = max(0.0, abs(x) - node[BOX])
@@ -213,9 +108,10 @@ def _bound(p, n, node):
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _fill(points, normals, vertices, faces, nodes, start, stop, found):
     leaves = (len(nodes) + 1) // 2
-    waiting, bounds = np.empty(64, dtype=np.int64), np.empty(64)
+    waiting, bounds = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     highest_face = 0
     for i in range(start, stop):
         p = (points[i, 0], points[i, 1], points[i, 2])

@@ -4,16 +4,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.spatial import cKDTree
+
+from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree
 
 # How much further away than the nearest surface the side that a normal points out of may be.
 THICKNESS_M = 0.06
 # Surface that leans further than this from the side that is painted is its back.
 BACK_COSINE = -0.5
-# Beyond this distance the place is only good to a triangle: nobody paints or measures there.
-FAR_M = 0.3
-FEW = 32
-BLOCK = 2048
 
 
 @dataclass(frozen=True)
@@ -37,125 +34,142 @@ class Location:
     angle_rad: np.ndarray
 
 
-class SurfaceLocator:
-    """Finds closest places on a refined mesh.
+def locate(
+    tree: FaceTree,
+    vertex_normals: np.ndarray,
+    points_m: np.ndarray,
+    normals: np.ndarray | None = None,
+    side: np.ndarray | None = None,
+) -> Location:
+    """See ``Surface.locate``.
 
     Args:
-        vertices_m: (V, 3) [m].
-        faces: (F, 3).
-        normals: (V, 3) outward unit normals.
+        tree: of the refined mesh.
+        vertex_normals: (V, 3) outward unit normals of its vertices.
+        points_m, normals: (N, 3).
+        side: (3,) outward unit normal of the only side that is painted, or None; where there are
+            no normals, its back is not taken.
     """
-
-    def __init__(self, vertices_m: np.ndarray, faces: np.ndarray, normals: np.ndarray) -> None:
-        self._vertices_m, self._faces, self._normals = vertices_m, faces, normals
-        # A corner at a time: all together take much memory on a fine mesh.
-        self._centres = sum(vertices_m[corner] for corner in faces.T) / 3.0
-        self._reach_m = max(
-            float(np.linalg.norm(vertices_m[corner] - self._centres, axis=1).max())
-            for corner in faces.T
-        )
-        self._tree = cKDTree(self._centres)
-
-    def locate(
-        self,
-        points_m: np.ndarray,
-        normals: np.ndarray | None = None,
-        side: np.ndarray | None = None,
-    ) -> Location:
-        """See ``Surface.locate``.
-
-        Args:
-            points_m, normals: (N, 3).
-            side: (3,) outward unit normal of the only side that is painted, or None; where there
-                are no normals, its back is not taken.
-        """
-        points_m = np.asarray(points_m, dtype=np.float64).reshape(-1, 3)
-        face = np.empty(len(points_m), dtype=np.int64)
-        place = np.empty((len(points_m), 3))
-        for start in range(0, len(points_m), BLOCK):
-            block = slice(start, start + BLOCK)
-            wanted = None if normals is None else np.asarray(normals, dtype=np.float64)[block]
-            face[block], place[block] = self._closest(points_m[block], wanted, side)
-        weights = _barycentric(self._vertices_m[self._faces[face]], place)
-        outward = np.einsum('nk,nki->ni', weights, self._normals[self._faces[face]])
-        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-        distance = np.linalg.norm(points_m - place, axis=1)
-        return Location(place, outward, face, weights, distance, _angle(outward, normals))
-
-    def _closest(
-        self, points_m: np.ndarray, normals: np.ndarray | None, side: np.ndarray | None
-    ) -> tuple[np.ndarray, np.ndarray]:
-        nearest, few = self._tree.query(points_m, k=min(FEW, len(self._faces)))
-        nearest, few = nearest.reshape(len(points_m), -1), few.reshape(len(points_m), -1)
-        # No point of a triangle is further from its centre than the reach.
-        radius = (
-            nearest[:, 0]
-            + self._reach_m
-            + (0.0 if normals is None and side is None else THICKNESS_M)
-        )
-        far = nearest[:, 0] > FAR_M
-        near = self._tree.query_ball_point(points_m, np.where(far, 0.0, radius))
-        near = [few[n] if far[n] else faces for n, faces in enumerate(near)]
-        point = np.repeat(np.arange(len(points_m)), [len(faces) for faces in near])
-        face = np.concatenate([np.asarray(faces, dtype=np.int64) for faces in near])
-        place = closest_places(self._vertices_m, self._faces, face, points_m, point)
-        distance = np.linalg.norm(place - points_m[point], axis=1)
-        if normals is not None or side is not None:
-            facing = self._normals[self._faces[face]].mean(axis=1)
-            if normals is not None:
-                averse = np.einsum('ij,ij->i', facing, normals[point]) < 0.0
-            else:
-                averse = facing @ side < BACK_COSINE
-            distance = distance + THICKNESS_M * averse
-        order = np.lexsort((distance, point))
-        first = order[np.unique(point[order], return_index=True)[1]]
-        return face[first], place[first]
+    points: np.ndarray = np.ascontiguousarray(points_m, dtype=np.float64).reshape(-1, 3)
+    if not np.isfinite(points).all():
+        raise ValueError('points to be located are not finite')
+    wanted: np.ndarray
+    if normals is not None:
+        wanted, least = np.ascontiguousarray(normals, dtype=np.float64).reshape(-1, 3), 0.0
+    elif side is not None:
+        wanted, least = np.broadcast_to(side, points.shape).astype(np.float64), BACK_COSINE
+    else:
+        wanted, least = np.zeros_like(points), -1.0
+    face, place = np.empty(len(points), dtype=np.int64), np.empty(points.shape)
+    _find(
+        points, wanted, least, tree.vertices_m, vertex_normals, tree.faces, tree.nodes, face, place
+    )
+    corners = tree.faces[face]
+    weights = _barycentric(tree.vertices_m[corners], place)
+    outward = np.einsum('nk,nki->ni', weights, vertex_normals[corners])
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    distance = np.linalg.norm(points - place, axis=1)
+    angle = _angle(outward, None if normals is None else wanted)
+    return Location(place, outward, tree.order[face], weights, distance, angle)
 
 
 @njit(cache=True, nogil=True)
-def closest_places(vertices, faces, face, points, point):
-    """(P, 3) place on each of P triangles that is closest to a point.
+def closest_place(a, b, c, p):
+    """The place on a triangle that is closest to a point; all are (x, y, z).
 
-    Ericson, Real-Time Collision Detection (2005), section 5.1.5. The function of trimesh does the
-    same; loading trimesh for it takes longer than all that it computes here.
-
-    Args:
-        vertices, faces: (V, 3) [m] and (F, 3).
-        face, point: (P,) rows of ``faces`` and of ``points``.
-        points: (N, 3) [m].
+    Ericson, Real-Time Collision Detection (2005), section 5.1.5.
     """
-    places = np.empty((len(face), 3))
-    ab, ac, ap = np.empty(3), np.empty(3), np.empty(3)
-    for k in range(len(face)):
-        a, b, c = faces[face[k]]
-        d1, d2, abab, abac, acac = 0.0, 0.0, 0.0, 0.0, 0.0
-        for i in range(3):
-            ab[i], ac[i] = vertices[b, i] - vertices[a, i], vertices[c, i] - vertices[a, i]
-            ap[i] = points[point[k], i] - vertices[a, i]
-            d1, d2 = d1 + ab[i] * ap[i], d2 + ac[i] * ap[i]
-            abab, abac, acac = abab + ab[i] ** 2, abac + ab[i] * ac[i], acac + ac[i] ** 2
-        # The same from b and from c, and the areas of the triangles that the point makes.
-        d3, d4, d5, d6 = d1 - abab, d2 - abac, d1 - abac, d2 - acac
-        of_a, of_b, of_c = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
-        if d1 <= 0.0 and d2 <= 0.0:
-            v, w = 0.0, 0.0
-        elif d3 >= 0.0 and d4 <= d3:
-            v, w = 1.0, 0.0
-        elif of_c <= 0.0 <= d1 and d3 <= 0.0:
-            v, w = d1 / (d1 - d3), 0.0
-        elif d6 >= 0.0 and d5 <= d6:
-            v, w = 0.0, 1.0
-        elif of_b <= 0.0 <= d2 and d6 <= 0.0:
-            v, w = 0.0, d2 / (d2 - d6)
-        elif of_a <= 0.0 and d4 >= d3 and d5 >= d6:
-            w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
-            v = 1.0 - w
-        else:
-            area = of_a + of_b + of_c
-            v, w = of_b / area, of_c / area
-        for i in range(3):
-            places[k, i] = vertices[a, i] + v * ab[i] + w * ac[i]
-    return places
+    abx, aby, abz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+    acx, acy, acz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    apx, apy, apz = p[0] - a[0], p[1] - a[1], p[2] - a[2]
+    d1 = abx * apx + aby * apy + abz * apz
+    d2 = acx * apx + acy * apy + acz * apz
+    abab = abx * abx + aby * aby + abz * abz
+    abac = abx * acx + aby * acy + abz * acz
+    acac = acx * acx + acy * acy + acz * acz
+    # The same from b and from c, and the areas of the triangles that the point makes.
+    d3, d4, d5, d6 = d1 - abab, d2 - abac, d1 - abac, d2 - acac
+    of_a, of_b, of_c = d3 * d6 - d5 * d4, d5 * d2 - d1 * d6, d1 * d4 - d3 * d2
+    if d1 <= 0.0 and d2 <= 0.0:
+        v, w = 0.0, 0.0
+    elif d3 >= 0.0 and d4 <= d3:
+        v, w = 1.0, 0.0
+    elif of_c <= 0.0 <= d1 and d3 <= 0.0:
+        v, w = d1 / (d1 - d3), 0.0
+    elif d6 >= 0.0 and d5 <= d6:
+        v, w = 0.0, 1.0
+    elif of_b <= 0.0 <= d2 and d6 <= 0.0:
+        v, w = 0.0, d2 / (d2 - d6)
+    elif of_a <= 0.0 and d4 >= d3 and d5 >= d6:
+        w = (d4 - d3) / ((d4 - d3) + (d5 - d6))
+        v = 1.0 - w
+    else:
+        area = of_a + of_b + of_c
+        v, w = of_b / area, of_c / area
+    return a[0] + v * abx + w * acx, a[1] + v * aby + w * acy, a[2] + v * abz + w * acz
+
+
+@njit(cache=True, nogil=True)
+def _corner(values, v):
+    return values[v, 0], values[v, 1], values[v, 2]
+
+
+@njit(cache=True, nogil=True)
+def _away(p, node):
+    """How far a point is from a box [m]."""
+    x = max(0.0, abs(p[0] - node[0]) - node[BOX])
+    y = max(0.0, abs(p[1] - node[1]) - node[BOX + 1])
+    z = max(0.0, abs(p[2] - node[2]) - node[BOX + 2])
+    return np.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, nogil=True)
+def _agreement(normals, face, wanted):
+    """Mean of the normals of a triangle's corners along a vector."""
+    total = 0.0
+    for k in range(3):
+        total += wanted[k] * (normals[face[0], k] + normals[face[1], k] + normals[face[2], k])
+    return total / 3.0
+
+
+@njit(cache=True, nogil=True)
+def _find(points, wanted, least, vertices, normals, faces, nodes, found, places):
+    """Set the row in ``faces`` and the place (N, 3) closest to each point.
+
+    Surface that agrees less than ``least`` with what is wanted counts as THICKNESS_M further away.
+    """
+    leaves = (len(nodes) + 1) // 2
+    waiting, away = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
+    for i in range(len(points)):
+        p, nearest = _corner(points, i), np.inf
+        waiting[0], away[0], left = 0, 0.0, 1
+        while left:
+            left -= 1
+            if not away[left] < nearest:
+                continue
+            node = waiting[left]
+            leaf = node - (leaves - 1)
+            if leaf < 0:
+                one, other = 2 * node + 1, 2 * node + 2
+                first, second = _away(p, nodes[one]), _away(p, nodes[other])
+                # The nearer one is looked at first.
+                if first < second:
+                    one, other, first, second = other, one, second, first
+                waiting[left], away[left] = one, first
+                waiting[left + 1], away[left + 1] = other, second
+                left += 2
+                continue
+            for f in range(len(faces) * leaf // leaves, len(faces) * (leaf + 1) // leaves):
+                a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+                x, y, z = closest_place(
+                    _corner(vertices, a), _corner(vertices, b), _corner(vertices, c), p
+                )
+                distance = np.sqrt((x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2)
+                if distance < nearest and _agreement(normals, faces[f], wanted[i]) < least:
+                    distance += THICKNESS_M
+                if distance < nearest:
+                    nearest, found[i] = distance, f
+                    places[i, 0], places[i, 1], places[i, 2] = x, y, z
 
 
 def _barycentric(corners_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:

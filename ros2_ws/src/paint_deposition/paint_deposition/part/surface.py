@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.part import creases, curvature, edge_distance, hems, slope
+from paint_deposition.part import creases, curvature, edge_distance, hems, locating, rays, slope
+from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
-from paint_deposition.part.locating import Location, SurfaceLocator
+from paint_deposition.part.locating import Location
 from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
 from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
@@ -130,7 +131,11 @@ class Surface:
     @cached_property
     def occluder(self) -> Occluder:
         """The part as an obstacle to rays."""
-        return Occluder(self.vertices_m, self.faces)
+        return Occluder(self._tree)
+
+    def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(N,) the triangle that each ray meets first, -1 for none; see ``rays.first_faces``."""
+        return rays.first_faces(self._tree, starts_m, directions)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""
@@ -152,7 +157,7 @@ class Surface:
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
                 agrees is taken. Without them it is the one that the gun paints, if only one is.
         """
-        return self._locator.locate(points_m, normals, self._only_side)
+        return locating.locate(self._tree, self.normals, points_m, normals, self._only_side)
 
     def at(
         self,
@@ -199,8 +204,8 @@ class Surface:
         }
 
     @cached_property
-    def _locator(self) -> SurfaceLocator:
-        return SurfaceLocator(self.vertices_m, self.faces, self.normals)
+    def _tree(self) -> FaceTree:
+        return FaceTree.of(self.vertices_m, self.faces)
 
     @property
     def _only_side(self) -> np.ndarray | None:

@@ -1,6 +1,5 @@
 """Lines of sight: which points a gun sees, and how much of the sky a point sees (Embree)."""
 
-from functools import cached_property
 from threading import Lock
 
 import numpy as np
@@ -8,7 +7,9 @@ from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
 from paint_deposition.part.curvature import tangents
-from paint_deposition.part.horizon import Horizon
+from paint_deposition.part.face_tree import FaceTree
+from paint_deposition.part.horizon import horizon_sines
+from paint_deposition.part.points import box_centre_m
 
 # The last bit of a ray before the point that it goes to, and how far above the surface a ray
 # starts.
@@ -25,14 +26,13 @@ class Occluder:
     """The part as an obstacle to rays.
 
     Args:
-        vertices_m: (V, 3) [m].
-        faces: (F, 3).
+        tree: of its faces.
     """
 
-    def __init__(self, vertices_m: np.ndarray, faces: np.ndarray) -> None:
-        self._vertices_m, self._faces = vertices_m, faces
+    def __init__(self, tree: FaceTree) -> None:
+        self._tree = tree
         # Embree works in single precision: keep coordinates small.
-        self._origin_m = 0.5 * (vertices_m.min(axis=0) + vertices_m.max(axis=0))
+        self._origin_m = box_centre_m(tree.vertices_m)
         self._building = Lock()
         self._built: tuple[EmbreeScene, TriangleMesh] | None = None
 
@@ -42,9 +42,10 @@ class Occluder:
         with self._building:
             if self._built is None:
                 scene = EmbreeScene(robust=True)
-                corners = (self._vertices_m - self._origin_m).astype(np.float32)
+                corners = (self._tree.vertices_m - self._origin_m).astype(np.float32)
                 # The scene does not keep the mesh alive by itself.
-                self._built = scene, TriangleMesh(scene, corners, self._faces.astype(np.int32))
+                faces = self._tree.faces.astype(np.int32)
+                self._built = scene, TriangleMesh(scene, corners, faces)
             return self._built[0]
 
     def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
@@ -67,16 +68,12 @@ class Occluder:
         )
         return ~blocked.reshape(length.shape)
 
-    @cached_property
-    def _horizon(self) -> Horizon:
-        return Horizon.of(self._vertices_m, self._faces)
-
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) sine of the elevation above which nothing of the part hides a point.
 
-        See ``Horizon.sines``.
+        See ``horizon.horizon_sines``.
         """
-        return self._horizon.sines(points_m, normals)
+        return horizon_sines(self._tree, points_m, normals)
 
     def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
@@ -99,12 +96,6 @@ class Occluder:
             hidden = np.bincount(point, blocked * weights[ray], minlength=len(up))
             open_share[part] = 1.0 - hidden
         return open_share
-
-    def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(N,) the triangle that each ray meets first, -1 for none."""
-        return self._scene.run(
-            (starts_m - self._origin_m).astype(np.float32), directions.astype(np.float32)
-        )
 
     def _blocked(
         self, starts_m: np.ndarray, directions: np.ndarray, lengths_m: np.ndarray

@@ -198,4 +198,4 @@ def _in_front(surface: Surface, axes: PassAxes) -> np.ndarray:
     """(V,) whether nothing of the part lies between the vertex and the gun's side."""
     starts = surface.vertices_m + LIFT_M * axes.outward
     directions = np.broadcast_to(axes.outward, starts.shape)
-    return surface.occluder.first_faces(starts, np.ascontiguousarray(directions)) < 0
+    return surface.first_faces(starts, np.ascontiguousarray(directions)) < 0

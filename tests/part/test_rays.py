@@ -1,0 +1,63 @@
+"""What rays meet first, against every triangle tried and against Embree."""
+
+import numpy as np
+import pytest
+from tests.surfaces import triangulated
+from trimesh.creation import box
+
+from paint_deposition.part.surface import Surface
+
+
+@pytest.fixture(scope='module')
+def waves():
+    vertices, faces = triangulated(
+        lambda x, z: 0.05 * np.sin(20 * x) * np.cos(15 * z), 0.02, jitter=0.3
+    )
+    return Surface.from_triangles(vertices, faces, 0.05)
+
+
+@pytest.fixture
+def rays():
+    rng = np.random.default_rng(3)
+    return rng.uniform(-0.15, 0.15, (4000, 3)), rng.normal(size=(4000, 3))
+
+
+def crossings(surface, start, way):
+    """Where a ray crosses the plane of each triangle, inf beside the triangle or behind."""
+    a, b, c = surface.vertices_m[surface.faces].transpose(1, 0, 2)
+    columns = np.stack([b - a, c - a, np.broadcast_to(-way, a.shape)], axis=2)
+    one, other, along = np.linalg.solve(columns, (start - a)[:, :, np.newaxis])[:, :, 0].T
+    return np.where(
+        (np.minimum(one, other) >= 0) & (one + other <= 1) & (along >= 0), along, np.inf
+    )
+
+
+def test_the_first_of_all_triangles_that_a_ray_crosses(waves, rays):
+    starts, ways = (each[:300] for each in rays)
+    met = waves.first_faces(starts, ways)
+    for start, way, face in zip(starts, ways, met, strict=True):
+        along = crossings(waves, start, way)
+        assert face == (np.argmin(along) if np.isfinite(along.min()) else -1)
+    assert 0.1 < np.mean(met >= 0) < 0.9
+
+
+def test_embree_sees_the_same(waves, rays):
+    from embreex.mesh_construction import TriangleMesh
+    from embreex.rtcore_scene import EmbreeScene
+
+    scene = EmbreeScene(robust=True)
+    mesh = TriangleMesh(scene, waves.vertices_m.astype('f4'), waves.faces.astype('i4'))
+    seen = scene.run(*(each.astype('f4') for each in rays))
+    assert np.mean(seen == waves.first_faces(*rays)) > 0.999
+    del mesh
+
+
+def test_no_ray_slips_between_triangles():
+    cube = box((1.0, 1.0, 1.0))
+    surface = Surface.from_triangles(cube.vertices, np.asarray(cube.faces), 0.03)
+    middles = surface.vertices_m[surface.faces[:, [0, 1]]].mean(axis=1)
+    ends = np.concatenate([surface.vertices_m, middles])
+    assert surface.first_faces(np.zeros_like(ends), ends).min() >= 0
+    # Along an axis, in the plane of four of the sides.
+    assert surface.first_faces(np.array([[0.5, 0.1, -2.0]]), np.array([[0.0, 0.0, 1.0]]))[0] >= 0
+    assert surface.first_faces(np.array([[0.6, 0.1, -2.0]]), np.array([[0.0, 0.0, 1.0]]))[0] == -1
