@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.spatial import cKDTree
 
 # How much further away than the nearest surface the side that a normal points out of may be.
 THICKNESS_M = 0.06
@@ -54,7 +54,7 @@ class SurfaceLocator:
             float(np.linalg.norm(vertices_m[corner] - self._centres, axis=1).max())
             for corner in faces.T
         )
-        self._tree = cKDTree(self._centres)
+        self._tree = scipy.spatial.cKDTree(self._centres)
 
     def locate(
         self,

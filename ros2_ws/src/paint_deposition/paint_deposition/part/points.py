@@ -1,10 +1,12 @@
 """Points on a part at which the film is wanted, with what the part is like there."""
 
+from __future__ import annotations
+
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_matrix
+import scipy
 
 from paint_deposition.kernel.blocks import Blocks
 from paint_deposition.part.orientation import outward_side
@@ -51,7 +53,7 @@ class SurfacePoints:
         edge_distance_m: Covariate | None = None,
         sky_view_factor: Covariate | None = None,
         height_fraction: Covariate | None = None,
-        slope_per_m: csr_matrix | Callable[[], csr_matrix] | None = None,
+        slope_per_m: scipy.sparse.csr_matrix | Callable[[], scipy.sparse.csr_matrix] | None = None,
     ) -> None:
         self.positions_m = np.ascontiguousarray(positions_m, dtype=np.float64)
         self.normals = np.ascontiguousarray(normals, dtype=np.float64)
@@ -71,7 +73,7 @@ class SurfacePoints:
             'height_fraction': _default(
                 height_fraction, lambda: heights(self.positions_m, self.positions_m, self.down)
             ),
-            'slope_per_m': _default(slope_per_m, lambda: csr_matrix((count, count))),
+            'slope_per_m': _default(slope_per_m, lambda: scipy.sparse.csr_matrix((count, count))),
         }
 
     def __len__(self) -> int:
@@ -110,7 +112,7 @@ class SurfacePoints:
         return self._covariate('height_fraction')
 
     @property
-    def slope_per_m(self) -> csr_matrix:
+    def slope_per_m(self) -> scipy.sparse.csr_matrix:
         """(V, V) sparse derivative along gravity's component in the surface [1/m].
 
         ``points.slope_per_m @ field``: on a vertical surface the change of the field per metre
@@ -119,7 +121,7 @@ class SurfacePoints:
         """
         return self._covariate('slope_per_m')
 
-    def select(self, rows: np.ndarray | slice | list[int]) -> 'SurfacePoints':
+    def select(self, rows: np.ndarray | slice | list[int]) -> SurfacePoints:
         """The chosen rows (mask, slice or indices), covariates computed only if used.
 
         Slopes need neighbours: a row some of whose neighbours are not chosen has slope zero.
@@ -172,7 +174,7 @@ def _default(given: Any, otherwise: Callable[[], Any]) -> Any:
     return otherwise if given is None else given
 
 
-def _slope_among(slope: csr_matrix, rows: np.ndarray) -> csr_matrix:
+def _slope_among(slope: scipy.sparse.csr_matrix, rows: np.ndarray) -> scipy.sparse.csr_matrix:
     whole = slope[rows]
     inside = whole[:, rows]
     complete = np.diff(whole.indptr) == np.diff(inside.indptr)
