@@ -2,11 +2,15 @@
 
 import gc
 import importlib
+import os
 import signal
 import sys
 import threading
 from functools import partial
 from importlib.util import find_spec
+
+# As cli/main.py does, before NumPy is loaded: a node multiplies no large matrices.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 REMEDIES = {
     'rclpy': 'source a ROS 2 installation, or use the one that `make build` installs',

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from paint_deposition.kernel.blocks import Blocks
+from paint_deposition.kernel.blocks import Blocks, bounding_box_m
 from paint_deposition.part.orientation import outward_side
 
 DOWN = (0.0, 0.0, -1.0)
@@ -28,6 +28,8 @@ class SurfacePoints:
         centre_m, extent_m: (3,) centre and sides of the part's bounding box [m]; default those of
             the points.
         area_m2: (V,) surface that each point stands for, or None for gauge readings.
+        neighbours: (V,) the points in the order of ``kernel.blocks.neighbours_together``; default:
+            they are sorted when they are painted.
         curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
         edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
         sky_view_factor: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
@@ -49,6 +51,7 @@ class SurfacePoints:
         centre_m: np.ndarray | None = None,
         extent_m: np.ndarray | None = None,
         area_m2: np.ndarray | None = None,
+        neighbours: np.ndarray | None = None,
         curvature_per_m: Covariate | None = None,
         edge_distance_m: Covariate | None = None,
         sky_view_factor: Covariate | None = None,
@@ -64,6 +67,7 @@ class SurfacePoints:
         self.centre_m = box_centre_m(self.positions_m) if centre_m is None else centre_m
         self.extent_m = box_extent_m(self.positions_m) if extent_m is None else extent_m
         self.area_m2 = area_m2
+        self._neighbours = neighbours
         self._blocks: dict[type, Blocks] = {}
         count = len(self.positions_m)
         self._covariates = {
@@ -82,7 +86,9 @@ class SurfacePoints:
     def blocks(self, precision: type) -> Blocks:
         """The points as the kernel takes them; sorted once for all who paint them."""
         if precision not in self._blocks:
-            self._blocks[precision] = Blocks.of(self.positions_m, self.normals, precision)
+            self._blocks[precision] = Blocks.of(
+                self.positions_m, self.normals, precision, self._neighbours
+            )
         return self._blocks[precision]
 
     def __getstate__(self) -> dict:
@@ -127,7 +133,7 @@ class SurfacePoints:
         Slopes need neighbours: a row some of whose neighbours are not chosen has slope zero.
         """
         rows = np.arange(len(self))[rows]
-        kept = {
+        kept: dict[str, Any] = {
             name: lambda name=name: self._covariate(name)[rows]
             for name in self._covariates
             if name != 'slope_per_m'
@@ -155,12 +161,16 @@ def box_centre_m(positions_m: np.ndarray) -> np.ndarray:
     """(3,) centre of the bounding box of (V, 3) points [m]."""
     if not len(positions_m):
         return np.zeros(3)
-    return 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
+    low, high = bounding_box_m(positions_m)
+    return 0.5 * (low + high)
 
 
 def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
     """(3,) sides of the bounding box of (V, 3) points [m]."""
-    return np.ptp(positions_m, axis=0) if len(positions_m) else np.zeros(3)
+    if not len(positions_m):
+        return np.zeros(3)
+    low, high = bounding_box_m(positions_m)
+    return high - low
 
 
 def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> np.ndarray:

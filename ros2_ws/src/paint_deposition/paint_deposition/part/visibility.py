@@ -7,6 +7,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from paint_deposition.kernel.blocks import bounding_box_m
 from paint_deposition.part.curvature import tangents
 from paint_deposition.part.horizon import Horizon
 
@@ -32,7 +33,8 @@ class Occluder:
     def __init__(self, vertices_m: np.ndarray, faces: np.ndarray) -> None:
         self._vertices_m, self._faces = vertices_m, faces
         # Embree works in single precision: keep coordinates small.
-        self._origin_m = 0.5 * (vertices_m.min(axis=0) + vertices_m.max(axis=0))
+        low, high = bounding_box_m(vertices_m)
+        self._origin_m = 0.5 * (low + high)
         self._building = Lock()
         self._built: tuple[EmbreeScene, TriangleMesh] | None = None
 
