@@ -27,4 +27,6 @@ started=$SECONDS
 python=$("$root/setup/prerequisites.sh")
 environment_is_current || "$root/setup/python_environment.sh" "$python"
 workspace_is_current || "$root/setup/workspace.sh"
+# Where PYTHONDONTWRITEBYTECODE is set, every start would compile the modules anew.
+"$venv/bin/python" -m compileall -q "$workspace/src/paint_deposition/paint_deposition" >>"$log" || true
 say "Ready after $((SECONDS - started)) s."

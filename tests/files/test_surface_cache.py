@@ -35,7 +35,8 @@ def written(path, fold):
 
 
 def assert_same(one: Surface, other: Surface):
-    for name in ('vertices_m', 'faces', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem'):
+    names = 'vertices_m', 'faces', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem'
+    for name in (*names, 'neighbours'):
         a, b = getattr(one, name), getattr(other, name)
         assert a.dtype == b.dtype
         assert np.array_equal(a, b), name

@@ -11,7 +11,13 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
 from paint_deposition.film.layout import model_constants, step_rows
 from paint_deposition.kernel.accumulation import within_reach
-from paint_deposition.kernel.blocks import LANES, LARGEST_BLOCK, SMALLEST_BLOCK, Blocks
+from paint_deposition.kernel.blocks import (
+    LANES,
+    LARGEST_BLOCK,
+    SMALLEST_BLOCK,
+    Blocks,
+    neighbours_together,
+)
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection, flux_um_per_s
 from paint_deposition.motion.path_builder import spray_path
@@ -219,6 +225,15 @@ def test_blocks_hold_every_point_once_within_their_spheres(count):
     for block, (start, stop) in enumerate(zip(blocks.bounds, blocks.bounds[1:], strict=False)):
         away = np.linalg.norm(blocks.points[:, start:stop].T - blocks.spheres[block, :3], axis=1)
         assert away.max() <= blocks.spheres[block, 3] * (1 + 1e-12) + 1e-15
+
+
+def test_blocks_of_points_that_were_sorted_before_are_the_same():
+    positions = np.random.default_rng(5).normal(0.0, 1.0, (5000, 3))
+    normals = np.tile([0.0, 0.0, 1.0], (5000, 1))
+    first = Blocks.of(positions, normals, np.float32)
+    again = Blocks.of(positions, normals, np.float32, neighbours_together(positions))
+    for name, values in vars(first).items():
+        assert np.array_equal(getattr(again, name), values), name
 
 
 def test_blocks_of_a_plane_are_nearly_square():

@@ -26,9 +26,10 @@ from paint_deposition.part.surface import Surface
 FOLDER_VARIABLE = 'PAINT_CACHE_DIR'
 MOST_BYTES = 2_000_000_000
 # Smaller parts are prepared as fast as they are found.
-LEAST_VERTICES = 20_000
+LEAST_VERTICES = 1_000
 LIBRARIES = ('numpy', 'scipy', 'trimesh', 'numba', 'cascadio')
 ARRAYS = ('vertices_m', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem')
+INDICES = ('faces', 'neighbours')
 
 
 def place_of(path: Path, *asked: object) -> Path | None:
@@ -52,11 +53,13 @@ def find(place: Path) -> Surface | None:
             _refuse_claims(kept.zip)
             arrays = {name: kept[name] for name in ARRAYS}
             curved = [kept[f'curved_{item.name}'] for item in fields(CurvedEdges)]
-            faces, notes = kept['faces'].astype(np.int64), tuple(kept['notes'].tolist())
+            faces, neighbours = (kept[name].astype(np.int64) for name in INDICES)
+            notes = tuple(kept['notes'].tolist())
         os.utime(place)
     except Exception:  # whatever broken bytes provoke in NumPy; the part is prepared anew
         return None
-    return Surface(faces=faces, notes=notes, curved_edges=CurvedEdges(*curved), **arrays)
+    arrays |= {'faces': faces, 'neighbours': neighbours}
+    return Surface(notes=notes, curved_edges=CurvedEdges(*curved), **arrays)
 
 
 def _refuse_claims(package: ZipFile) -> None:
@@ -73,12 +76,14 @@ def _refuse_claims(package: ZipFile) -> None:
 
 def keep(place: Path, surface: Surface) -> None:
     """Keep a part for the next time, if it is large and the folder can be written."""
-    if len(surface.vertices_m) < LEAST_VERTICES or surface.in_hem is None:
+    if len(surface.vertices_m) < LEAST_VERTICES:
+        return
+    if surface.in_hem is None or surface.neighbours is None:  # not of ``Surface.from_triangles``
         return
     arrays = {name: getattr(surface, name) for name in ARRAYS}
     for item in fields(CurvedEdges):
         arrays[f'curved_{item.name}'] = getattr(surface.curved_edges, item.name)
-    arrays['faces'] = surface.faces.astype(np.int32)
+    arrays |= {name: getattr(surface, name).astype(np.int32) for name in INDICES}
     arrays['notes'] = np.array(surface.notes, dtype=np.str_)
     try:
         with replacing(place) as temporary:
@@ -110,7 +115,10 @@ def _size(path: Path) -> int:
 def _prepared_by() -> tuple[str, ...]:
     """Digest of the code that prepares parts, and the versions of what it is built on."""
     package = Path(__file__).parent.parent
-    sources = [*package.glob('part/*.py'), *package.glob('files/*mesh*.py'), Path(__file__)]
+    sources = [
+        *package.glob('part/*.py'), *package.glob('files/*mesh*.py'), Path(__file__),
+        package / 'kernel/blocks.py',
+    ]  # fmt: skip
     code = hashlib.sha256(b'\0'.join(file.read_bytes() for file in sorted(sources)))
     return (code.hexdigest(), *(_version(name) for name in LIBRARIES))
 

@@ -34,18 +34,29 @@ class Blocks:
     bounds: np.ndarray
 
     @staticmethod
-    def of(positions_m: np.ndarray, normals: np.ndarray, precision: type) -> 'Blocks':
-        """Sort (V, 3) positions [m] and normals into blocks."""
-        origin = 0.5 * (positions_m.min(axis=0) + positions_m.max(axis=0))
+    def of(
+        positions_m: np.ndarray,
+        normals: np.ndarray,
+        precision: type,
+        neighbours: np.ndarray | None = None,
+    ) -> 'Blocks':
+        """Sort (V, 3) positions [m] and normals into blocks.
+
+        Args:
+            neighbours: (V,) what ``neighbours_together`` gives for these positions, if known.
+        """
+        if neighbours is None:
+            neighbours = neighbours_together(positions_m)
+        origin = _centre_m(positions_m)
         local = np.ascontiguousarray((positions_m - origin).T)
         count = len(positions_m)
-        size = min(LARGEST_BLOCK, max(SMALLEST_BLOCK, count // 16 // LANES * LANES))
-        members = _neighbours(local, np.arange(count), size)
+        size = _block_size(count)
+        members = [neighbours[start : start + size] for start in range(0, count, size)]
         members = [block for first in range(SPREAD) for block in members[first::SPREAD]]
         order = np.concatenate(members)
         sizes = [len(block) for block in members]
         bounds = np.concatenate([[0], np.cumsum(sizes)])
-        local = local[:, order]
+        local = local.take(order, axis=1)
         low, high = (
             reduce.reduceat(local, bounds[:-1], axis=1) for reduce in (np.minimum, np.maximum)
         )
@@ -56,17 +67,40 @@ class Blocks:
             order,
             origin,
             np.ascontiguousarray(local, dtype=precision),
-            np.ascontiguousarray(normals[order].T, dtype=precision),
+            np.ascontiguousarray(normals.T, dtype=precision).take(order, axis=1),
             np.column_stack([centre.T, radius]),
             bounds,
         )
+
+
+def neighbours_together(positions_m: np.ndarray) -> np.ndarray:
+    """(V,) rows of positions (V, 3) [m], those of a block one after another."""
+    local = np.ascontiguousarray((positions_m - _centre_m(positions_m)).T)
+    count = len(positions_m)
+    return np.concatenate(_neighbours(local, np.arange(count), _block_size(count)))
+
+
+def bounding_box_m(positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(3,) lowest and (3,) highest coordinates of positions (V, 3) [m]."""
+    # A column at a time: over rows of three NumPy's loop takes twenty times as long.
+    columns = positions_m.T
+    return np.array([c.min() for c in columns]), np.array([c.max() for c in columns])
+
+
+def _centre_m(positions_m: np.ndarray) -> np.ndarray:
+    low, high = bounding_box_m(positions_m)
+    return 0.5 * (low + high)
+
+
+def _block_size(count: int) -> int:
+    return min(LARGEST_BLOCK, max(SMALLEST_BLOCK, count // 16 // LANES * LANES))
 
 
 def _neighbours(points: np.ndarray, rows: np.ndarray, size: int) -> list[np.ndarray]:
     """Halve points (3, V) across their longest extent until no part has more than ``size``.
 
     The points are handed on with their rows: gathering them anew from all would wait for memory.
-    Every cut is at a multiple of ``size``: all blocks but one are full.
+    Every cut is at a multiple of ``size``: all blocks but the last are full.
     """
     if len(rows) <= size:
         return [rows]

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
-from scipy.special import erf
 
 
 class PlanarPattern(BaseModel):
@@ -103,7 +103,8 @@ class PlanarPattern(BaseModel):
         def primitive(u: np.ndarray | float, offset: float) -> np.ndarray:
             # Antiderivative of rho exp(-(rho - offset)^2 / 2 s^2), with u = rho - offset.
             gaussian = -(s**2) * np.exp(-(u**2) / (2.0 * s**2))
-            return gaussian + offset * s * math.sqrt(math.pi / 2.0) * erf(u / (math.sqrt(2) * s))
+            inside = scipy.special.erf(u / (math.sqrt(2) * s))
+            return gaussian + offset * s * math.sqrt(math.pi / 2.0) * inside
 
         ring = primitive(radius - r, r) - primitive(-r, r)
         mirrored = primitive(radius + r, -r) - primitive(r, -r)

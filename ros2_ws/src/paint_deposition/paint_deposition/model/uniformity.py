@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import erf
+import scipy
 
 from paint_deposition.model.collapse import Collapse, ThreeGaussianCollapse
 
@@ -173,5 +173,5 @@ def _variation_of_gaussians(
 
 def _share_between(centre: np.ndarray, sigma: np.ndarray, low: float, high: float) -> np.ndarray:
     """Share of normal distributions between two limits."""
-    scale = math.sqrt(2.0) * sigma
-    return 0.5 * (erf((high - centre) / scale) - erf((low - centre) / scale))
+    low_end, high_end = ((end - centre) / (math.sqrt(2.0) * sigma) for end in (low, high))
+    return 0.5 * (scipy.special.erf(high_end) - scipy.special.erf(low_end))

@@ -1,7 +1,7 @@
 """Distance to the free edges of the surface, and which edges are free."""
 
 import numpy as np
-from scipy.spatial import cKDTree
+import scipy
 
 # Pieces of edges so short that the nearest has one of the nearest middles [m].
 PIECE_M = 0.002
@@ -16,7 +16,8 @@ def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
     if not len(rim_m):
         return np.full(len(points_m), np.inf)
     pieces = cut_segments(rim_m, PIECE_M)[0]
-    near = cKDTree(pieces.mean(axis=1)).query(points_m, k=min(CANDIDATES, len(pieces)))[1]
+    middles = scipy.spatial.cKDTree(pieces.mean(axis=1))
+    near = middles.query(points_m, k=min(CANDIDATES, len(pieces)))[1]
     near = near.reshape(len(points_m), -1)
     return _distance_m(points_m[:, None, :], pieces[near]).min(axis=1)
 
@@ -33,8 +34,8 @@ def without_seams(segments_m: np.ndarray) -> np.ndarray:
     pieces, segment = cut_segments(segments_m, PIECE_M)
     middles = segments_m.mean(axis=1)
     reach_m = 0.5 * PIECE_M + SEAM_M
-    near = cKDTree(middles).sparse_distance_matrix(
-        cKDTree(pieces.mean(axis=1)), reach_m, output_type='ndarray'
+    near = scipy.spatial.cKDTree(middles).sparse_distance_matrix(
+        scipy.spatial.cKDTree(pieces.mean(axis=1)), reach_m, output_type='ndarray'
     )
     one, piece = near['i'], near['j']
     along = segments_m[:, 1] - segments_m[:, 0]

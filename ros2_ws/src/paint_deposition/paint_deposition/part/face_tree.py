@@ -10,6 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
+from paint_deposition.kernel.blocks import bounding_box_m
+
 # Faces in a leaf of the tree.
 LEAF = 8
 # A node of the tree: centre and half the sides of its box, half their diagonal, mean normal of its
@@ -41,8 +43,8 @@ class FaceTree:
     def of(vertices_m: np.ndarray, faces: np.ndarray) -> 'FaceTree':
         """Sort (F, 3) faces of (V, 3) vertices [m] along a space-filling curve."""
         vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
-        low = np.array([along.min() for along in vertices.T])
-        extent = max(float(max(np.ptp(along) for along in vertices.T)), 1e-12)
+        low, high = bounding_box_m(vertices)
+        extent = max(float((high - low).max()), 1e-12)
         order = np.argsort(_places_on_the_curve(vertices, faces, low, 1023.0 / extent))
         faces = np.ascontiguousarray(faces[order], dtype=np.int64)
         leaves = 1 << math.ceil(math.log2(max(1.0, len(faces) / LEAF)))

@@ -17,8 +17,8 @@ and lean shows that, too.
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.spatial import cKDTree
 
 from paint_deposition.part.half_edges import edges_of
 
@@ -71,7 +71,7 @@ class CurvedEdges:
         if not len(self):
             return np.zeros_like(positions_m), np.zeros_like(positions_m)
         near = min(NEAR_EDGES, len(self))
-        away_m, edge = cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
+        away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
         fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
         off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
         return (

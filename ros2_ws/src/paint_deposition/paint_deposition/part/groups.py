@@ -3,8 +3,8 @@
 from collections.abc import Iterator
 
 import numpy as np
+import scipy
 from numba import njit
-from scipy.spatial import cKDTree
 
 BLOCK = 4096
 
@@ -62,10 +62,10 @@ def near_pairs(
     Yields:
         The block, and of each pair the row in the block, the row of the other and the distance.
     """
-    tree = cKDTree(others_m)
+    tree = scipy.spatial.cKDTree(others_m)
     for start in range(0, len(points_m), BLOCK):
         block = slice(start, start + BLOCK)
-        near = cKDTree(points_m[block]).sparse_distance_matrix(
+        near = scipy.spatial.cKDTree(points_m[block]).sparse_distance_matrix(
             tree, radius_m, output_type='ndarray'
         )
         yield block, near['i'], near['j'], near['v']

@@ -1,7 +1,9 @@
 """Derivative of a field on the surface along the pull of gravity in it."""
 
+from __future__ import annotations
+
 import numpy as np
-from scipy.sparse import csr_matrix
+import scipy
 
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 
@@ -13,7 +15,7 @@ def downhill(normals: np.ndarray, down: np.ndarray) -> np.ndarray:
 
 def slope_operator(
     vertices_m: np.ndarray, faces: np.ndarray, normals: np.ndarray, down: np.ndarray
-) -> csr_matrix:
+) -> scipy.sparse.csr_matrix:
     """Sparse (V, V) matrix to the derivative of a vertex field along ``downhill`` [1/m].
 
     On each triangle the gradient is that of the linear interpolant; a vertex takes the mean of
@@ -31,12 +33,13 @@ def slope_operator(
     rows = np.broadcast_to(faces[:, :, None], values.shape)
     columns = np.broadcast_to(faces[:, None, :], values.shape)
     count = len(vertices_m)
-    return csr_matrix((values.ravel(), (rows.ravel(), columns.ravel())), shape=(count, count))
+    entries = values.ravel(), (rows.ravel(), columns.ravel())
+    return scipy.sparse.csr_matrix(entries, shape=(count, count))
 
 
 def slope_at_stencil(
     centres_m: np.ndarray, above_m: np.ndarray, below_m: np.ndarray, way: np.ndarray
-) -> csr_matrix:
+) -> scipy.sparse.csr_matrix:
     """Slope at n points from a field on (points, neighbours above, neighbours below).
 
     Args:
@@ -53,7 +56,7 @@ def slope_at_stencil(
     usable = distance > 1e-6
     value = np.where(usable, steepness / np.where(usable, distance, 1.0), 0.0)
     points = np.arange(count)
-    return csr_matrix(
+    return scipy.sparse.csr_matrix(
         (
             np.concatenate([-value, value]),
             (np.tile(points, 2), np.concatenate([count + points, 2 * count + points])),

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.kernel.blocks import neighbours_together
 from paint_deposition.part import creases, curvature, edge_distance, hems, locating, rays, slope
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
@@ -38,6 +39,8 @@ class Surface:
             of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
         curved_edges: where the mesh as it was read is coarser than its curvature.
+        neighbours: (V,) vertices in the order in which they are painted, see
+            ``kernel.blocks.neighbours_together``; None: they are sorted when they are.
     """
 
     vertices_m: np.ndarray
@@ -50,6 +53,7 @@ class Surface:
     gun_side: np.ndarray | None = None
     in_hem: np.ndarray | None = None
     curved_edges: CurvedEdges = NO_EDGES
+    neighbours: np.ndarray | None = None
 
     def __repr__(self) -> str:
         return f'Surface({len(self.vertices_m)} vertices, {self.area_m2:.2f} m²)'
@@ -105,6 +109,7 @@ class Surface:
             notes,
             in_hem=hems.carried_over(strip, fine, len(vertices)),
             curved_edges=CurvedEdges.of(corners, read_normals, patches),
+            neighbours=neighbours_together(vertices),
         )
 
     @cached_property
@@ -143,6 +148,7 @@ class Surface:
             self.vertices_m,
             self.normals,
             area_m2=self.vertex_areas_m2,
+            neighbours=self.neighbours,
             slope_per_m=lambda: slope.slope_operator(
                 self.vertices_m, self.faces, self.normals, self.down
             ),

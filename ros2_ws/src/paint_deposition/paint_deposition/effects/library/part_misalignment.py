@@ -2,7 +2,7 @@
 
 from types import MappingProxyType
 
-from scipy.spatial.transform import Rotation
+import scipy
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
 from paint_deposition.motion.path import SprayPath
@@ -39,7 +39,8 @@ class PartMisalignment(Effect):
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         shift = self.shift_down_m * context.downhill + self.shift_across_m * context.across
-        back = Rotation.from_rotvec(-self.yaw_rad * context.outward).as_matrix()
+        turn = scipy.spatial.transform.Rotation.from_rotvec(-self.yaw_rad * context.outward)
+        back = turn.as_matrix()
         from_centre = path.position_m - context.centre_m - shift
         return path.with_(
             position_m=from_centre @ back.T + context.centre_m,

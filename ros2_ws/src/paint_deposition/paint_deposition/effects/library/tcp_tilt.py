@@ -1,6 +1,6 @@
 """A bell axis that is not the tool's z axis."""
 
-from scipy.spatial.transform import Rotation
+import scipy
 
 from paint_deposition.effects.base import Effect, PathContext, parameter
 from paint_deposition.motion.path import SprayPath
@@ -30,5 +30,6 @@ class TcpTilt(Effect):
     )  # fmt: skip
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
-        tilt = Rotation.from_rotvec([self.tilt_x_rad, self.tilt_y_rad, 0.0]).as_matrix()
-        return path.with_(rotation=path.rotation @ tilt)
+        turn = [self.tilt_x_rad, self.tilt_y_rad, 0.0]
+        tilt = scipy.spatial.transform.Rotation.from_rotvec(turn)
+        return path.with_(rotation=path.rotation @ tilt.as_matrix())

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import importlib
+import sys
 import threading
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
@@ -22,6 +24,26 @@ if TYPE_CHECKING:
 
 # After the node has told that it is ready.
 LOOK_AFTER_S = 0.1
+
+
+def load_numba_without_scipy() -> None:
+    """Load what Numba has for arrays, without all of `scipy.linalg`: a tenth of the start.
+
+    Numba looks for SciPy's BLAS just then, for `np.convolve` alone; what else multiplies matrices
+    looks when it is compiled.
+    """
+    if 'scipy.linalg' in sys.modules:
+        return
+    modules: dict[str, Any] = sys.modules
+    modules['scipy.linalg.cython_blas'] = None
+    try:
+        importlib.import_module('numba.np.arraymath')
+    finally:
+        del modules['scipy.linalg.cython_blas']
+
+
+# While it is imported, before another thread can look for the same.
+load_numba_without_scipy()
 
 
 def paint_in_one_thread() -> None:

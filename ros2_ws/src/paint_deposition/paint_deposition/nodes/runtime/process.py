@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import gc
 import os
 import signal
 import sys
@@ -48,6 +49,7 @@ def run_node(
             return 0
         _init()
         node = _made(make_node)
+        gc.enable()
         exit_code = _spin(node, told_to_stop)
     except KeyboardInterrupt:
         exit_code = 0

@@ -1,0 +1,60 @@
+"""A simulator is ready soon: it loads only what it uses."""
+
+from __future__ import annotations
+
+import pytest
+
+pytest.importorskip('rclpy')
+
+import numpy as np
+import trimesh
+
+from nodes.processes import NodeProcess
+from paint_deposition.files.meshes import read_mesh
+
+# Each takes a tenth of a second or more, and none is needed to paint a part that is kept.
+SLOW = ('matplotlib', 'trimesh', 'scipy.linalg', 'scipy.spatial', 'scipy.special', 'networkx')
+START = f"""
+import atexit, sys
+from paint_deposition.nodes.executables import deposition_simulator
+atexit.register(lambda: print('loaded', set({SLOW!r}) & set(sys.modules)))
+sys.exit(deposition_simulator())
+"""
+
+
+@pytest.fixture
+def part(tmp_path, monkeypatch):
+    """A curved sheet of 4225 vertices, prepared and kept."""
+    monkeypatch.setenv('PAINT_CACHE_DIR', str(tmp_path / 'cache'))
+    across = np.linspace(-0.4, 0.4, 65)
+    x, z = (axis.ravel() for axis in np.meshgrid(across, across))
+    row, column = (axis.ravel() for axis in np.indices((64, 64)))
+    a = 65 * row + column
+    faces = np.concatenate([np.stack([a, a + 1, a + 66], 1), np.stack([a, a + 66, a + 65], 1)])
+    sheet = trimesh.Trimesh(np.stack([x, 0.1 * x**2, z], axis=1), faces, process=False)
+    sheet.export(tmp_path / 'part.stl')
+    read_mesh(tmp_path / 'part.stl', max_edge_length_m=0.05)
+    assert list((tmp_path / 'cache' / 'parts').iterdir())
+    return tmp_path / 'part.stl'
+
+
+def test_it_loads_nothing_that_it_does_not_use(part, ros_domain, wait_until, tmp_path):
+    with NodeProcess(
+        tmp_path / 'simulator', '', code=START, mesh_file=part, max_edge_length_m=0.05
+    ) as simulator:
+        wait_until(lambda: ': ready' in simulator.err, what='ready')
+        simulator.terminate()
+        assert simulator.wait() == 0, simulator.err
+        assert 'loaded set()' in simulator.out
+
+
+def test_compiled_code_still_finds_what_multiplies_matrices(ros_domain, tmp_path):
+    """An effect of the user's own may call what Numba takes from SciPy."""
+    code = (
+        'import paint_deposition.nodes.painting.early, numpy as np, numba\n'
+        'product = numba.njit(lambda a: np.linalg.norm(a) + np.dot(a, a) + np.convolve(a, a)[0])\n'
+        'print(product(np.array([3.0, 4.0])))\n'
+    )
+    with NodeProcess(tmp_path / 'product', '', code=code) as process:
+        assert process.wait() == 0, process.err
+        assert float(process.out) == pytest.approx(5.0 + 25.0 + 9.0)
