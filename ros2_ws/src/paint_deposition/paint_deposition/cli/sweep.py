@@ -50,9 +50,9 @@ def sweep_command(
     the folder `finished` of the output: a run that was cut off computes the rest only, and so does
     a sweep with more cases.
     """
-    from paint_deposition.cluster.needed import require_libraries
+    from paint_deposition.files.parquet import MANY, require_libraries
 
-    require_libraries('paint sweep')
+    require_libraries('paint sweep', MANY)
     from paint_deposition.cluster.finished import NAME, Finished
     from paint_deposition.cluster.run import finish
     from paint_deposition.cluster.workers import require_alone

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paint_deposition.cluster.packing import packed
-from paint_deposition.files.atomic import replacing
 from paint_deposition.files.json_files import json_text
+from paint_deposition.files.parquet import write_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -59,12 +59,3 @@ class Finished:
 
     def _path(self, digest: str) -> Path:
         return self.folder / f'{digest}.parquet'
-
-
-def write_parquet(path: Path, table: pa.Table) -> Path:
-    """Write a table, whole or not at all."""
-    import pyarrow.parquet as pq
-
-    with replacing(path) as temporary:
-        pq.write_table(table, temporary)
-    return path

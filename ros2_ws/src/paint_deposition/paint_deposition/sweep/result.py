@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.cluster.finished import Finished, write_parquet
+from paint_deposition.cluster.finished import Finished
 from paint_deposition.files.json_files import json_text, write_json
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.sweep.case import FILM, PREDICTED
 from paint_deposition.sweep.job import Job
