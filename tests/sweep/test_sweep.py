@@ -103,7 +103,12 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
         ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
         ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
         ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
-        ({'campaign': 'campaign.yaml'}, ['speed_factor varies', 'campaign']),
+        ({'grid': {'own.gain': [0.1]}}, ["nothing called 'own.gain' can vary"]),
+        ({'campaign': str(DOOR / 'campaign.yaml')}, ['speed_factor varies', 'campaign']),
+        (
+            {'campaign': str(DOOR / 'campaign.yaml'), 'grid': {'planar.K2': [0.1]}},
+            ['campaign.yaml names no model', 'give model'],
+        ),
     ],
 )
 def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path, changed, words):
@@ -112,6 +117,18 @@ def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path,
     path.write_text(yaml.safe_dump(TOLD | inputs | changed))
     assert_refused(paint('sweep', path, '-o', tmp_path / 'out'), *words)
     assert not (tmp_path / 'out').exists()
+
+
+def test_a_campaigns_own_model_is_varied(tmp_path):
+    door = yaml.safe_load((DOOR / 'campaign.yaml').read_text())['experiments'][:1]
+    door[0] |= {key: str(DOOR / door[0][key]) for key in ('mesh', 'trajectory', 'measurements')}
+    (tmp_path / 'model.yaml').write_text('planar: {K2: 0.4, r_m: 0.3}')
+    campaign = {'experiments': door, 'model': 'model.yaml'}
+    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(campaign))
+    told = {'campaign': 'campaign.yaml', 'grid': {'planar.K2': [0.1]}}
+    (case,) = Job.of(SweepFile.model_validate(told), tmp_path).cases
+    planar = case.given['model'].planar
+    assert (planar.K2, planar.r_m) == (0.1, 0.3)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
@@ -137,11 +154,12 @@ class Own(Effect):
 
 @pytest.mark.slow
 def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
-    """Its text is part of what a case is known by, too."""
+    """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
     file.write_text(OWN)
     model_file.write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
-    told = TOLD | {'grid': {'model': [str(model_file)], 'speed_factor': SPEEDS[:1]}}
+    varied = {'model': [str(model_file)], 'speed_factor': SPEEDS[:1], 'own.gain': [0.5, -0.25]}
+    told = TOLD | {'grid': varied}
     sweep = SweepFile.model_validate(told)
     job = Job.of(sweep, DOOR)
     surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
@@ -151,7 +169,8 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
     finished = Finished(tmp_path / NAME)
     with workers(count=1) as client:
         run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
-    (row,) = finished.table([job.cases[0].digest]).to_pylist()
-    assert row['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+    as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
+    assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+    assert weaker['mean_um'] < as_told['mean_um']
     file.write_text(OWN.replace('1.0 + gain', '1.5 + gain'))
     assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest

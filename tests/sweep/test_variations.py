@@ -8,6 +8,8 @@ from scipy.spatial.transform import Rotation
 from booth import spot
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
+from paint_deposition.model.brush import Brush
+from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.sweep.sweep_file import SweepFile, read_sweep
 from paint_deposition.sweep.variations import variations, varied_model
@@ -91,6 +93,18 @@ def test_a_model_is_varied_and_its_bounds_hold():
         varied_model(DepositionModel(), {'planar.K2': 1.5})
     with pytest.raises(ManyError, match="the model has no effect 'sag'; it has: none"):
         varied_model(DepositionModel(), {'effects': ['sag']})
+
+
+def test_a_pattern_of_brushes_is_varied_brush_by_brush():
+    model = DepositionModel.of_brushes([Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
+    file = SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
+    (values,) = variations(file, [model])
+    first, other = varied_model(model, values).patterns
+    assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
+    with pytest.raises(ManyError, match=r'vary brush_1\.K2 or brush_4\.K2'):
+        varied_model(model, {'planar.K2': 0.2})
+    with pytest.raises(ManyError, match=r"nothing called 'brush_4\.K1_cm3_per_s' can vary"):
+        variations(file)
 
 
 def test_a_motion_runs_faster_further_off_and_with_more_flow():

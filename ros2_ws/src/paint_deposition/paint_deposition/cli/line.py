@@ -42,9 +42,9 @@ def line_command(
     parts that were measured, under the names of their recordings. Finished runs are kept in the
     folder `finished` of the output: the next time only new runs are computed.
     """
-    from paint_deposition.cluster.needed import require_libraries
+    from paint_deposition.files.parquet import MANY, require_libraries
 
-    require_libraries('paint line')
+    require_libraries('paint line', MANY)
     from paint_deposition.cluster.finished import NAME, Finished
     from paint_deposition.cluster.run import finish
     from paint_deposition.cluster.workers import require_alone

@@ -31,6 +31,7 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
+from paint_deposition.files.parquet import require_libraries
 from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
@@ -78,6 +79,10 @@ if TYPE_CHECKING:
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
+@click.option(
+    '--parquet', is_flag=True,
+    help='Also write film.parquet: the table of film.csv to the last bit, with normals and areas.',
+)  # fmt: skip
 @PICTURES
 @JSON
 def simulate_command(
@@ -93,6 +98,7 @@ def simulate_command(
     body: str | None,
     max_edge_length_m: float,
     down: np.ndarray | None,
+    parquet: bool,
     pictures: str,
     as_json: bool,
     **wanted: float,
@@ -103,6 +109,8 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
+    if parquet:
+        require_libraries('--parquet')
     with Progress('simulate') as tell, DrawingProcess('film') as drawing:
         tell('loading')
         from paint_deposition.files.gun_motions import read_gun_motions
@@ -129,7 +137,12 @@ def simulate_command(
         }
         tell('writing and drawing')
         files = write_results(
-            film, output, made_from=made_from, pictures=pictures, drawing=drawing
+            film,
+            output,
+            made_from=made_from,
+            pictures=pictures,
+            drawing=drawing,
+            parquet=parquet,
         )
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -16,6 +17,7 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import Progress
 from paint_deposition.cli.results_folder import results_in
+from paint_deposition.errors import ManyError
 
 SCHEDULER = click.option(
     '--scheduler',
@@ -27,6 +29,15 @@ WORKERS = click.option(
     '--workers', 'count', type=click.IntRange(min=1),
     help='Processes on this machine, of one thread each; default: one a core.',
 )  # fmt: skip
+
+MOST_WARNINGS = 5
+
+
+def say_warnings(lines: Sequence[str], file: Path) -> None:
+    """Print some of many warnings on stderr, and where the others are."""
+    say_all('warning', lines[:MOST_WARNINGS])
+    if len(lines) > MOST_WARNINGS:
+        say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
 
 
 @click.command('sweep')
@@ -50,9 +61,9 @@ def sweep_command(
     the folder `finished` of the output: a run that was cut off computes the rest only, and so does
     a sweep with more cases.
     """
-    from paint_deposition.cluster.needed import require_libraries
+    from paint_deposition.files.parquet import MANY, require_libraries
 
-    require_libraries('paint sweep')
+    require_libraries('paint sweep', MANY)
     from paint_deposition.cluster.finished import NAME, Finished
     from paint_deposition.cluster.run import finish
     from paint_deposition.cluster.workers import require_alone
@@ -72,9 +83,11 @@ def sweep_command(
         say_all('note', [f'workers: {told}'])
         tell('writing and drawing')
         found = Sweep.of(job, finished, done, told)
+        if len(found.errors) == len(job.cases):
+            raise ManyError(f'no case has a result; {found.warnings[0]}')
         with results_in(output) as folder:
             files = [output / file.name for file in write_sweep(found, folder, pictures)]
-    say_all('warning', (f'case {number}: {error}' for number, error in found.errors[:5]))
+    say_warnings(found.warnings, output / 'cases.parquet')
     if as_json:
         click.echo((output / 'sweep.json').read_text(encoding='utf-8'), nl=False)
         return

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paint_deposition.cluster.packing import packed
-from paint_deposition.files.atomic import replacing
 from paint_deposition.files.json_files import json_text
+from paint_deposition.files.parquet import write_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -31,9 +31,15 @@ def content_digest(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Finished:
-    """A folder of finished cases."""
+    """A folder of finished cases.
+
+    Attributes:
+        folder: a Parquet file for each.
+        given_up: columns of those that could not be computed; they are not kept.
+    """
 
     folder: Path
+    given_up: dict[str, Columns] = field(default_factory=dict)
 
     def has(self, digest: str) -> bool:
         """Whether a case is there; files appear whole."""
@@ -49,22 +55,22 @@ class Finished:
 
         write_parquet(self._path(digest), pa.table(dict(columns)))
 
+    def give_up(self, digest: str, columns: Columns) -> None:
+        """Let a case have these columns until the next run tries it again."""
+        self.given_up[digest] = columns
+
     def table(self, digests: Iterable[str]) -> pa.Table:
         """These cases, one after the other; columns that a case has not are empty in its rows."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
-        parts = [pq.read_table(self._path(digest)) for digest in digests]
+        parts = [
+            pa.table(dict(self.given_up[digest]))
+            if digest in self.given_up
+            else pq.read_table(self._path(digest))
+            for digest in digests
+        ]
         return pa.concat_tables(parts, promote_options='permissive')
 
     def _path(self, digest: str) -> Path:
         return self.folder / f'{digest}.parquet'
-
-
-def write_parquet(path: Path, table: pa.Table) -> Path:
-    """Write a table, whole or not at all."""
-    import pyarrow.parquet as pq
-
-    with replacing(path) as temporary:
-        pq.write_table(table, temporary)
-    return path

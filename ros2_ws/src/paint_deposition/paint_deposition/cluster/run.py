@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import pickle
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -19,6 +22,9 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]
 # Inputs that a worker keeps open.
 OPENED = 8
+# How often results are looked for, and workers; and for how long there may be none.
+RESULTS_S, WORKERS_S, PATIENCE_S = 0.02, 3.0, 60.0
+AGAIN = 'finished cases are kept, run the same command again'
 
 
 @dataclass(frozen=True)
@@ -29,11 +35,13 @@ class Case:
         digest: of all that it is computed from; the same digest is never computed twice.
         given: what is its own, small.
         inputs: names of what it shares with others, such as a part or a motion.
+        about: columns of its row that are known without computing it.
     """
 
     digest: str
     given: Mapping[str, Any]
     inputs: tuple[str, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
 
 
 def finish(
@@ -74,7 +82,9 @@ def run(
 
     An input is sent once. It travels as the result of a task of its own: the scheduler can make
     it anew when the only worker that holds it dies, and workers hand it to each other. Cases of a
-    worker that dies are run again by another one.
+    worker that dies are run again by another one. A case that ends its worker again and again, or
+    fails in a way that is not foreseen, says so in its column ``error`` and is tried again by the
+    next run.
 
     Args:
         client: of ``workers``.
@@ -85,10 +95,8 @@ def run(
         progress: called with what is being done and the share of it that is done.
 
     Raises:
-        ManyError: a case ends its worker again and again.
+        ManyError: the scheduler, or all workers, are lost.
     """
-    from distributed import as_completed
-
     left = {case.digest: case for case in cases if not finished.has(case.digest)}
     sent = _sent(client, {name for case in left.values() for name in case.inputs}, inputs)
     futures: dict[Future, Case] = {
@@ -100,9 +108,13 @@ def run(
     }  # fmt: skip
     done = len(cases) - len(left)
     progress(f'{done} of {len(cases)} cases', done / max(len(cases), 1))
-    for future in as_completed(list(futures)):
+    for future in _as_done(client, list(futures)):
         case = futures.pop(future)
-        finished.add(case.digest, _result(future, case))
+        columns, why_not = _result(future)
+        if why_not is None:
+            finished.add(case.digest, columns)
+        else:
+            finished.give_up(case.digest, {**case.about, 'error': [why_not]})
         future.release()
         done += 1
         progress(f'{done} of {len(cases)} cases', done / len(cases))
@@ -128,13 +140,49 @@ def _unpacked(work: Callable[..., Columns], given: bytes, *inputs: bytes) -> Col
     return work(pickle.loads(given), *map(_opened, inputs))
 
 
-def _result(future: Future, case: Case) -> Columns:
+def _as_done(client: Client, futures: Sequence[Future]) -> Iterator[Future]:
+    """The futures in the order in which they are done.
+
+    Raises:
+        ManyError: there has been no worker for a while.
+    """
+    from distributed import as_completed
+
+    coming = as_completed(futures)
+    looked_s = there_s = time.monotonic()
+    while not coming.is_empty():
+        if coming.has_ready():
+            yield next(coming)
+            continue
+        time.sleep(RESULTS_S)
+        now_s = time.monotonic()
+        if now_s < looked_s + WORKERS_S:
+            continue
+        looked_s = now_s
+        # Of a scheduler that is lost the futures tell.
+        with suppress(OSError):
+            if client.scheduler_info(n_workers=-1)['workers']:
+                there_s = now_s
+        if now_s > there_s + PATIENCE_S:
+            raise ManyError(f'no worker has been there for {PATIENCE_S:.0f} s; {AGAIN}')
+
+
+def _result(future: Future) -> tuple[Columns, str | None]:
+    """The columns of a case, or why there are none.
+
+    Raises:
+        ManyError: the scheduler is lost.
+    """
     from distributed.scheduler import KilledWorker
 
     try:
-        return future.result()
+        return future.result(), None
+    except CancelledError:
+        raise ManyError(f'the scheduler is lost; {AGAIN}') from None
     except KilledWorker as error:
-        raise ManyError(
-            f'case {case.digest} was given up: {error.allowed_failures + 1} workers ended while '
-            'they ran it; give workers more memory, or run fewer of them with --workers'
-        ) from None
+        return {}, (
+            f'given up: {error.allowed_failures + 1} workers ended while they computed it; give '
+            'workers more memory, or run fewer of them with --workers'
+        )
+    except Exception as error:
+        return {}, f'not computed: {type(error).__name__}: {" ".join(str(error).split())}'

@@ -36,6 +36,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
     """
     import dask
     from distributed import Client, LocalCluster
+    from distributed.utils import silence_logging_cmgr
 
     # Inputs travel with the tasks that hold them, see ``run``; they are large on purpose.
     settings = {
@@ -61,7 +62,8 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
                 f'no scheduler answers at {scheduler} ({type(error).__name__}); start one with '
                 '`dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`'
             ) from None
-        with client:
+        # Of a lost connection the caller tells in a line.
+        with silence_logging_cmgr(logging.CRITICAL), client:
             _require_same_version(client, scheduler)
             yield client
 

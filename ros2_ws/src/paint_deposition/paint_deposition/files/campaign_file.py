@@ -143,10 +143,7 @@ def read_campaign(
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
     """
     path = Path(path)
-    content = read_yaml(path, 'campaign', ReadingsError)
-    if not isinstance(content, dict):
-        raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
-    file = checked(_File, f'{path}: campaign', content, ReadingsError)
+    file = _read_file(path)
     experiments: list[Experiment] = []
     for number, written in enumerate(file.experiments, start=1):
         entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
@@ -160,10 +157,30 @@ def read_campaign(
             experiments.append(_read_experiment(path.parent, name, entry, progress))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
-    start = None if file.model is None else str(path.parent / file.model)
     return Campaign(
-        tuple(experiments), start, str(path), file.head, file.target_um, file.tolerance_um
-    )
+        tuple(experiments), _start(path, file), str(path), file.head, file.target_um,
+        file.tolerance_um,
+    )  # fmt: skip
+
+
+def model_of_campaign(path: str | Path) -> str | None:
+    """The start model's file that a campaign names, or None; nothing else is read.
+
+    Raises:
+        ReadingsError: the campaign's own file is at fault.
+    """
+    return _start(Path(path), _read_file(Path(path)))
+
+
+def _read_file(path: Path) -> _File:
+    content = read_yaml(path, 'campaign', ReadingsError)
+    if not isinstance(content, dict):
+        raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
+    return checked(_File, f'{path}: campaign', content, ReadingsError)
+
+
+def _start(path: Path, file: _File) -> str | None:
+    return None if file.model is None else str(path.parent / file.model)
 
 
 def _read_experiment(

@@ -5,22 +5,29 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.errors import ModelError
 from paint_deposition.files.posterior import Posterior
 from paint_deposition.fitting.parameters import FreeParameters
 
 # Values of a learned curve so many knots apart are hardly off together.
 KNOTS_TOGETHER = 2.0
+# A posterior of which less than one draw in so many is physical belongs to another model.
+MOST_ROUNDS = 1000
 
 
 def drawn(
     model: DepositionModel, posterior: Posterior, count: int, seed: int
 ) -> list[DepositionModel]:
-    """So many models from the posterior of a model, values outside their bounds kept at them.
+    """So many models from the posterior of a model, the normal distribution within its bounds.
 
-    Learned curves vary within their band, by themselves.
+    Draws with a value outside its bounds are drawn anew: none is unphysical, and none piles up at
+    a bound. Learned curves vary within their band, by themselves.
 
     Args:
         model: that the posterior belongs to; it has every effect that the posterior names.
+
+    Raises:
+        ModelError: next to no draw lies within the bounds.
     """
     varied = [
         (effect.id, name)
@@ -32,9 +39,21 @@ def drawn(
     order = [posterior.names.index(name) for name in parameters.coordinates]
     covariance = posterior.matrix[np.ix_(order, order)]
     rng = np.random.default_rng(seed)
-    values = rng.multivariate_normal(posterior.centre[order], covariance, count, method='cholesky')
-    vectors = (values - parameters.offset) / parameters.scale
-    models = [parameters.decode(vector) for vector in np.clip(vectors, *parameters.bounds)]
+    vectors = np.empty((0, len(order)))
+    for _ in range(MOST_ROUNDS):
+        values = rng.multivariate_normal(
+            posterior.centre[order], covariance, count, method='cholesky'
+        )
+        fresh = (values - parameters.offset) / parameters.scale
+        vectors = np.concatenate([vectors, fresh[parameters.are_physical(fresh)]])
+        if len(vectors) >= count:
+            break
+    else:
+        raise ModelError(
+            f'posterior: of {MOST_ROUNDS * count} draws {len(vectors)} are within the bounds of '
+            'the parameters; copy the section from the file that was written for this model'
+        )
+    models = [parameters.decode(vector) for vector in vectors[:count]]
     return [
         one.model_copy(update={'effects': tuple(_bent(effect, rng) for effect in one.effects)})
         for one in models

@@ -13,7 +13,7 @@ from scipy.linalg import block_diag
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.posterior import Posterior
-from paint_deposition.fitting.pattern_vector import PatternVector
+from paint_deposition.fitting.pattern_vector import COS, SIN, PatternVector
 from paint_deposition.fitting.prior import Prior
 from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
 
@@ -146,6 +146,13 @@ class FreeParameters:
             ends.append((first, second))
         low, high = zip(*ends, strict=True)
         return np.array(low), np.array(high)
+
+    def are_physical(self, vectors: np.ndarray) -> np.ndarray:
+        """(n,) bool, whether vectors (n, k) lie within the bounds, K3 <= 1 among them."""
+        low, high = self.bounds
+        patterns = self.pattern.of_patterns(vectors[:, : len(self.pattern)])
+        asymmetry = np.hypot(patterns[..., COS], patterns[..., SIN])
+        return ((low <= vectors) & (vectors <= high)).all(axis=1) & (asymmetry <= 1.0).all(axis=1)
 
     @property
     def weak_prior(self) -> Prior:

@@ -35,7 +35,11 @@ def line_cases(
     shared = [code_digest(), file.model_dump(), model_digest(model), *told]
     given = {'file': file, 'folder': str(folder), 'model': model}
     cases = [
-        Case(digest_of(*shared, run.name, *_contents(run)), given | {'run': run})
+        Case(
+            digest_of(*shared, run.name, *_contents(run)),
+            given | {'run': run},
+            about={'part': [run.name]},
+        )
         for run in runs_in(folder)
     ]
     return cases, file, model

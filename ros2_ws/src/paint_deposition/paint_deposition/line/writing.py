@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paint_deposition.cluster.finished import write_parquet
 from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.line.picture import write_line_picture
 from paint_deposition.line.report import write_line_report
 from paint_deposition.line.result import DERIVATIVES, Line

@@ -11,6 +11,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.meshes import write_mesh_ply
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
@@ -62,6 +63,21 @@ def write_film(
             _write_rows(temporary, np.column_stack([surface.vertices_m, film_um]))
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
+
+
+def write_film_table(path: Path, surface: Surface, film_um: np.ndarray) -> Path:
+    """Write the film at the vertices as Parquet, to the last bit, whole or not at all.
+
+    The columns of the CSV, and what a mean over the surface needs: ``nx``, ``ny``, ``nz``, the
+    outward unit normal, and ``area_m2``, the share of the surface that belongs to the vertex.
+    """
+    import pyarrow as pa
+
+    named = zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True)
+    normals = zip(('nx', 'ny', 'nz'), surface.normals.T, strict=True)
+    columns = {**dict(named), 'thickness_um': film_um, **dict(normals)}
+    columns['area_m2'] = surface.vertex_areas_m2
+    return write_parquet(path, pa.table(columns))
 
 
 def _write_rows(path: Path, rows: np.ndarray) -> None:

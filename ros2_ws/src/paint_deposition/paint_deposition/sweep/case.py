@@ -19,6 +19,7 @@ from paint_deposition.sweep.varied_motion import varied_motion
 
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
 FILM, PREDICTED = 'film_um', 'predicted_um'
+WARNINGS = 'warnings'
 Columns = dict[str, list[Any]]
 
 
@@ -65,7 +66,7 @@ def _painted(
         'sigma_n': statistics.std_dev_um / statistics.mean_um if statistics.mean_um else None,
         'spraying_time_s': film.path.spraying_time_s,
         'film_sha256': hashlib.sha256(film.film_um.tobytes()).hexdigest(),
-        'warnings': '; '.join(film.warnings),
+        WARNINGS: '; '.join(film.warnings),
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()

@@ -11,9 +11,10 @@ from typing import Any
 from paint_deposition.cluster.code import code_digest
 from paint_deposition.cluster.finished import content_digest, digest_of
 from paint_deposition.cluster.run import Case
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
-from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
@@ -27,6 +28,8 @@ from paint_deposition.sweep.variations import (
     OF_MOTION,
     OF_PASSES,
     Values,
+    effects_of,
+    named_models,
     variations,
     varied_model,
 )
@@ -45,6 +48,7 @@ class Job:
         inputs: what they share, by name.
         files: read for it, by what they are.
         notes: for the user, a line each.
+        effects: by id, those of the library and users' own of the models.
     """
 
     file: SweepFile
@@ -54,6 +58,7 @@ class Job:
     inputs: dict[str, Any] = field(default_factory=lambda: {NOTHING: None})
     files: dict[str, Path] = field(default_factory=dict)
     notes: dict[str, None] = field(default_factory=dict)
+    effects: dict[str, type[Effect]] = field(default_factory=dict)
     _read: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @staticmethod
@@ -63,7 +68,10 @@ class Job:
         Raises:
             PaintError: a file that cannot be used, or values that do not go together.
         """
-        job = Job(file, folder, variations(file))
+        job = Job(file, folder)
+        models = job._named_models()
+        job.effects = effects_of(models)
+        job.values = variations(file, models)
         for number, values in enumerate(job.values):
             if number % 100 == 0:
                 tell(f'preparing case {number + 1} of {len(job.values)}')
@@ -71,9 +79,11 @@ class Job:
         return job
 
     def _case(self, values: Values) -> Case:
-        model = self._model(values)
-        if self._named('campaign', values):
+        campaign = self._named('campaign', values)
+        if campaign:
             self._refuse_beside_a_campaign(values)
+        model = self._model(values)
+        if campaign:
             inputs: tuple[str, ...] = (self._campaign(values),)
             options: dict[str, Any] = {}
         else:
@@ -104,22 +114,38 @@ class Job:
 
         return self._once((what, path, key), take)
 
-    def _model(self, values: Values) -> DepositionModel | None:
-        """The model of a case; None: a campaign's own."""
-        path = self._named('model', values)
-        changes = 'effects' in values or any('.' in name for name in values) or DRAW in values
-        if path is None:
-            if DRAW in values:
-                raise ManyError('sample: posterior is true, but no model is given; give model')
-            if self._named('campaign', values) and not changes:
-                return None
-            return varied_model(DepositionModel(), values)
-        file: ModelFile = self._once(('model', path), lambda: read_model_file(path))
+    def _named_models(self) -> list[DepositionModel]:
+        """All models that the sweep names, those of campaigns included."""
+        paths = [self.folder / name for name in named_models(self.file, 'model')]
+        for name in named_models(self.file, 'campaign'):
+            own = model_of_campaign(self.folder / name)
+            paths += [Path(own)] if own else []
+        return [self._model_file(path).model for path in paths]
+
+    def _model_file(self, path: Path) -> ModelFile:
         self.files[f'model {path.name}'] = path
+        return self._once(('model', path), lambda: read_model_file(path))
+
+    def _model(self, values: Values) -> DepositionModel | None:
+        """The model of a case; None: a campaign's own, or one fitted to it."""
+        path = self._named('model', values)
+        campaign = self._named('campaign', values)
+        changes = 'effects' in values or any('.' in name for name in values) or DRAW in values
+        if path is None and campaign:
+            if not changes:
+                return None
+            own = self._once(('start', campaign), partial(model_of_campaign, campaign))
+            path = Path(own) if own else None
+        if path is None and (campaign or DRAW in values):
+            what = f'{campaign} names no model' if campaign else 'no model is given'
+            raise ManyError(f'{what}, and the parameters of one vary; give model')
+        if path is None:
+            return varied_model(DepositionModel(), values, self.effects)
+        file = self._model_file(path)
         model = file.model
         if DRAW in values:
             model = self._draws(path, file)[values[DRAW]]
-        return varied_model(model, values)
+        return varied_model(model, values, self.effects)
 
     def _draws(self, path: Path, file: ModelFile) -> list[DepositionModel]:
         sample, posterior = self.file.sample, file.posterior

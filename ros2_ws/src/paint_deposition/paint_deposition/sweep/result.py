@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.cluster.finished import Finished, write_parquet
-from paint_deposition.files.json_files import json_text, write_json
+from paint_deposition.cluster.finished import Finished
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
-from paint_deposition.sweep.case import FILM, PREDICTED
+from paint_deposition.sweep.case import FILM, PREDICTED, WARNINGS
 from paint_deposition.sweep.job import Job
 from paint_deposition.sweep.picture import write_sweep_picture
 
@@ -72,6 +74,21 @@ class Sweep:
         """Number of each case without a result, and why."""
         told = enumerate(self.table['error'].to_pylist(), start=1)
         return [(number, error) for number, error in told if error]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What is odd about cases or why they have no result, each reason once."""
+        told = list(self.errors)
+        if WARNINGS in self.table.column_names:
+            told += enumerate(self.table[WARNINGS].to_pylist(), start=1)
+        cases: dict[str, list[int]] = {}
+        for number, line in told:
+            if line:
+                cases.setdefault(line, []).append(number)
+        return [
+            f'case {first}{f" and {len(others)} more" if others else ""}: {line}'
+            for line, (first, *others) in cases.items()
+        ]
 
     @property
     def judged(self) -> str | None:
@@ -169,8 +186,7 @@ def _column(values: Sequence[Any]) -> pa.Array:
     import pyarrow as pa
 
     if any(isinstance(value, list) for value in values):
-        texts = [None if v is None else ' '.join(json_text({'': v}).split())[5:-2] for v in values]
-        return pa.array(texts)
+        return pa.array([None if value is None else json.dumps(value) for value in values])
     if any(isinstance(value, float) for value in values):
         return pa.array([None if value is None else float(value) for value in values])
     return pa.array(values)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, did_you_mean
@@ -22,30 +23,51 @@ INPUTS = ('mesh', 'trajectory', 'campaign', 'model')
 OF_PASSES = ('index_m', 'standoff_m', 'speed_m_per_s')
 OF_MOTION = ('speed_factor', 'standoff_change_m', 'flow_factor')
 SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
+# Of the pattern of one brush of several: 'brush_2.K1_cm3_per_s'.
+BRUSH = 'brush_'
 # Which draw from the posterior a case has.
 DRAW = 'draw'
 
 Values = dict[str, Any]
 
 
-def known_names() -> list[str]:
-    """Everything that may vary."""
+def effects_of(models: Iterable[DepositionModel]) -> dict[str, type[Effect]]:
+    """Effects by id: those of the library, and users' own that the models have."""
+    own = {e.id: type(e) for model in models for e in model.effects if e.file is not None}
+    return EFFECTS | own
+
+
+def known_names(models: Sequence[DepositionModel] = ()) -> list[str]:
+    """Everything that may vary of these models."""
     of_model = [f'{section}.{n}' for section, cls in SECTIONS.items() for n in cls.model_fields]
-    of_effects = [f'{e.id}.{name}' for e in EFFECTS.values() for name in e.parameters()]
+    numbers = dict.fromkeys(brush.number for model in models for brush in model.brushes)
+    of_brushes = [f'{BRUSH}{k}.{n}' for k in numbers for n in PlanarPattern.model_fields]
+    of_effects = [f'{e.id}.{n}' for e in effects_of(models).values() for n in e.parameters()]
     others = (*INPUTS, 'part_pose', 'effects', *OF_PASSES, *OF_MOTION)
-    return [*others, *of_model, *of_effects]
+    return [*others, *of_model, *of_brushes, *of_effects]
 
 
-def variations(file: SweepFile) -> list[Values]:
+def named_models(file: SweepFile, key: str) -> list[str]:
+    """Files that a sweep names under ``key``, a model or a campaign: each once."""
+    varied = (*file.grid.get(key, ()), *(case[key] for case in file.cases if key in case))
+    return [n for n in dict.fromkeys((getattr(file, key), *varied)) if isinstance(n, str)]
+
+
+def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[Values]:
     """The values of each case, in the order grid, cases, draws, the last one running fastest.
+
+    Args:
+        file: the sweep.
+        models: that it names; the parameters of their effects may vary.
 
     Raises:
         ManyError: an unknown name, a name in two blocks, or too many cases.
     """
     names = [list(file.grid), sorted({n for case in file.cases for n in case}), _drawn_names(file)]
     seen: set[str] = set()
+    known = known_names(models)
     for name in (name for block in names for name in block):
-        _require_known(name)
+        _require_known(name, known)
         if name in seen:
             raise ManyError(f'{name} varies twice, in two of grid, cases, sample; keep one')
         seen.add(name)
@@ -84,8 +106,7 @@ def _draws(file: SweepFile) -> list[Values]:
             for k in range(file.sample.count)]  # fmt: skip
 
 
-def _require_known(name: str) -> None:
-    known = known_names()
+def _require_known(name: str, known: Sequence[str]) -> None:
     if name not in known:
         near = [other for other in known if other.split('.')[-1] == name]
         remedy = f'did you mean {near[0]!r}?' if near else did_you_mean(name, known)
@@ -118,8 +139,15 @@ def _require(holds: object, name: str, value: Any, expected: str) -> None:
         raise ManyError(f'{name} is {value!r}; expected {expected}')
 
 
-def varied_model(model: DepositionModel, values: Values) -> DepositionModel:
+def varied_model(
+    model: DepositionModel, values: Values, effects: Mapping[str, type[Effect]] = EFFECTS
+) -> DepositionModel:
     """The model with the values of a case; an effect that it lacks is added.
+
+    Args:
+        model: as in its file.
+        values: of the case.
+        effects: that may be added, by id.
 
     Raises:
         ManyError: a value that the parameter cannot have, or an effect that the model has not.
@@ -130,13 +158,32 @@ def varied_model(model: DepositionModel, values: Values) -> DepositionModel:
         owner, dot, field = name.partition('.')
         if not dot:
             continue
+        if owner == 'planar' and model.brushes:
+            numbers = [f'{BRUSH}{brush.number}' for brush in model.brushes]
+            raise ManyError(
+                f'{name} varies, but the model has a pattern for each brush; vary '
+                f'{" or ".join(f"{number}.{field}" for number in numbers)}'
+            )
         if owner in SECTIONS:
             section = _changed(getattr(model, owner), field, value, name)
             model = model.model_copy(update={owner: section})
+        elif owner.startswith(BRUSH):
+            model = _with_brush(model, int(owner.removeprefix(BRUSH)), field, value, name)
         else:
-            effect = model.effect(owner) or EFFECTS[owner]()
+            effect = model.effect(owner) or effects[owner]()
             model = model.with_effect(_changed(effect, field, value, name))
     return model
+
+
+def _with_brush(
+    model: DepositionModel, number: int, field: str, value: float, name: str
+) -> DepositionModel:
+    model.with_brush(number)  # which says so where there is none of that number
+    patterns = [
+        _changed(brush.planar, field, value, name) if brush.number == number else brush.planar
+        for brush in model.brushes
+    ]
+    return model.with_patterns(patterns)
 
 
 def _with_effects(model: DepositionModel, wanted: Iterable[str]) -> DepositionModel:

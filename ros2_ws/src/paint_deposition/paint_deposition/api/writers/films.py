@@ -10,7 +10,7 @@ from paint_deposition.api.simulation import Film
 from paint_deposition.api.writers.provenance import with_provenance
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.report.drawing import HERE, DrawingProcess, Here
-from paint_deposition.results.film import write_film
+from paint_deposition.results.film import write_film, write_film_table
 
 PNG = 'png'
 
@@ -21,6 +21,7 @@ def film(
     made_from: Mapping[str, Any] | None = None,
     pictures: str = PNG,
     drawing: DrawingProcess | Here = HERE,
+    parquet: bool = False,
 ) -> list[Path]:
     models = {gun.name or 'model': gun.model for gun in result.guns}
     motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
@@ -35,6 +36,9 @@ def film(
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
     )
+    if parquet:
+        table = Path(folder) / 'film.parquet'
+        files.append(write_film_table(table, result.surface, result.film_um))
     if result.readings is not None and result.predicted_um is not None:
         files.append(Path(folder) / 'predicted.csv')
         write_predictions(files[-1], result.readings.source, result.predicted_um)

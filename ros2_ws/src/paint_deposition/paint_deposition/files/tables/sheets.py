@@ -8,6 +8,7 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.parquet import MAGIC, require_libraries
 from paint_deposition.files.tables.far_cells import refuse_far_cells
 from paint_deposition.files.text import decoded
 
@@ -18,7 +19,7 @@ SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', '|': 'bars'}
 # Columns of a printed list stand apart by blanks; headings of two words by one only.
 BLANKS = (re.compile(r'\s{2,}|\t'), re.compile(r'\s+'))
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-EXPECTED = 'give gauge readings as CSV, TSV or TXT, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give gauge readings as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -56,6 +57,8 @@ def sheets_of(path: Path) -> list[Sheet]:
         raise ReadingsError(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
     if content.startswith(WORKBOOKS):
         return _sheets_of_workbook(path, content)
+    if content.startswith(MAGIC):
+        return [_sheet_of_parquet(path, content)]
     found = decoded(content)
     if found is None:
         raise ReadingsError(f'{path}: cannot be read as text; {EXPECTED}')
@@ -103,6 +106,24 @@ def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
         )
         for name, rows in tables.items()
     ]
+
+
+def _sheet_of_parquet(path: Path, content: bytes) -> Sheet:
+    require_libraries(str(path))
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        table = pq.read_table(BytesIO(content))
+    except (pa.ArrowException, OSError) as error:
+        reason = ' '.join(str(error).split())
+        raise ReadingsError(f'{path}: cannot be read as Parquet ({reason})') from None
+    columns = [
+        ['' if value is None or value != value else _cell(value) for value in column.to_pylist()]
+        for column in table.columns
+    ]
+    rows = [list(table.column_names), *map(list, zip(*columns, strict=True))]
+    return Sheet.of(enumerate(rows, 1), 'Parquet')
 
 
 def _cell(value: object) -> Cell:

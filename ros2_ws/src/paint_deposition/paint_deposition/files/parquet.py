@@ -1,0 +1,43 @@
+"""Parquet tables, and what to install where a library of the extra `many` is missing."""
+
+from __future__ import annotations
+
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from paint_deposition.errors import ManyError
+from paint_deposition.files.atomic import replacing
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MAGIC = b'PAR1'
+PYARROW = 'pyarrow'
+MANY = ('distributed', PYARROW, 'ruptures')
+
+
+def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> None:
+    """Refuse to begin without libraries of the extra.
+
+    Args:
+        what: needs them: a command, an option or a file.
+
+    Raises:
+        ManyError: naming those that are missing.
+    """
+    missing = [name for name in libraries if find_spec(name) is None]
+    if missing:
+        raise ManyError(
+            f'{what} needs {" and ".join(missing)}, which is not installed; run: pip install '
+            f'{" ".join(missing)}, or install paint_deposition[many]'
+        )
+
+
+def write_parquet(path: Path, table: pa.Table) -> Path:
+    """Write a table, whole or not at all."""
+    import pyarrow.parquet as pq
+
+    with replacing(path) as temporary:
+        pq.write_table(table, temporary)
+    return path
