@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
-from scipy.linalg import eigh, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
 from paint_deposition.fitting.least_squares import Fit, covariance_factor
@@ -20,6 +20,8 @@ from paint_deposition.fitting.least_squares import Fit, covariance_factor
 KNOWN_NOISE = 1e9
 # An entry of a fit this close to a bound has been stopped by it.
 AT_BOUND = 1e-6
+# A direction whose squared length, in standard deviations, is less cannot be seen.
+UNSEEN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,9 +85,9 @@ class Principal:
     """Whitened directions of one explanation, turned to be orthogonal to each other.
 
     Attributes:
-        columns: (P, n) the directions.
-        axes: (n, n) what each amplitude, a row, is along them.
-        signed: (q, n) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
+        columns: (P, m) the directions.
+        axes: (n, m) what each amplitude, a row, is along them.
+        signed: (q, m) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
     """
 
     columns: np.ndarray
@@ -95,10 +97,24 @@ class Principal:
 
     @staticmethod
     def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':
-        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known."""
-        _, axes = eigh(columns.T @ columns)
+        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known.
+
+        Where none is known, directions that do not show are left out: a map of hundreds of knots
+        has no more of them than there are readings.
+        """
         known = sides != 0.0
-        return Principal(columns @ axes, axes, axes[known], sides[known])
+        if known.any():
+            _, axes = np.linalg.eigh(columns.T @ columns)
+            return Principal(columns @ axes, axes, axes[known], sides[known])
+        wide = columns.shape[1] > len(columns)
+        squares, turned = np.linalg.eigh(columns @ columns.T if wide else columns.T @ columns)
+        shown = squares > UNSEEN
+        turned, lengths = turned[:, shown], np.sqrt(squares[shown])
+        if wide:
+            turned, axes = turned * lengths, columns.T @ (turned / lengths)
+        else:
+            turned, axes = columns @ turned, turned
+        return Principal(turned, axes, axes[known], sides[known])
 
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.
