@@ -8,6 +8,7 @@ pattern's parameters; every explanation then adds a low-rank term to the identit
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
@@ -116,6 +117,16 @@ class Principal:
             turned, axes = columns @ turned, turned
         return Principal(turned, axes, axes[known], sides[known])
 
+    @cached_property
+    def squares(self) -> np.ndarray:
+        """(m,) squared lengths of the directions."""
+        return np.sum(self.columns**2, axis=0)
+
+    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> float:
+        """By how many standard deviations original amplitudes (n,), or some of them, move all."""
+        along = self.axes[some].T @ amplitudes[some]
+        return math.sqrt(self.squares @ along**2)
+
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.
 
@@ -123,7 +134,7 @@ class Principal:
             deviation: (P,) whitened.
             sizes: (S,) standard deviations of the amplitudes before the readings.
         """
-        precision = sizes[:, np.newaxis] ** -2.0 + np.sum(self.columns**2, axis=0)
+        precision = sizes[:, np.newaxis] ** -2.0 + self.squares
         return (self.columns.T @ deviation / precision) @ self.axes.T
 
     def log_bayes_factors(
@@ -138,7 +149,7 @@ class Principal:
         """
         scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
         sizes = sizes[:, np.newaxis]
-        precision = 1.0 + sizes**2 * np.sum(self.columns**2, axis=0)
+        precision = 1.0 + sizes**2 * self.squares
         explained = (sizes**2 / precision) @ scores**2
         factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
         if np.isfinite(freedom):
