@@ -279,6 +279,8 @@ class ModelSpace:
     def _most_probable(self, models: Iterable[Model], count: int) -> list[Model]:
         """The best ones, weighed with the explanations that they have."""
         all_models = list(models)
+        if not all_models:
+            return []
         evidence = log_evidence_of_each(
             self._directions,
             np.array([model.chosen for model in all_models]),
