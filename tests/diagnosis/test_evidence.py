@@ -222,3 +222,26 @@ def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
     assert null.columns == pytest.approx(columns)
     away = (stopped.vector - prior.centre)[rest]
     assert null.raw == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)
+
+
+@pytest.mark.parametrize('count', [3, 40])
+def test_directions_that_nothing_shows_do_not_count(count: int) -> None:
+    """Whether there are more of them than readings or fewer."""
+    random = np.random.default_rng(4)
+    seen = random.normal(size=(12, count))
+    columns = np.hstack([seen, seen @ random.normal(size=(count, 30))])
+    data = random.normal(size=(12, 5))
+    found = Principal.of(columns, np.zeros(columns.shape[1]))
+    assert found.columns.shape[1] == min(count, 12)
+    factor = found.log_bayes_factors(data, np.array([0.7]), np.inf)[0]
+    covariance = np.eye(12) + 0.49 * columns @ columns.T
+    expected = [
+        multivariate_normal(cov=covariance).logpdf(d)
+        - multivariate_normal(cov=np.eye(12)).logpdf(d)
+        for d in data.T
+    ]
+    np.testing.assert_allclose(factor, expected, rtol=1e-8)
+    amounts = found.amplitudes(data[:, 0], np.array([0.7]))[0]
+    mean = 0.49 * columns.T @ np.linalg.solve(covariance, data[:, 0])
+    np.testing.assert_allclose(amounts, mean, atol=1e-8)
+    assert found.length(amounts) == pytest.approx(float(np.linalg.norm(columns @ amounts)))

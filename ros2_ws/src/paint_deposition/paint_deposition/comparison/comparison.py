@@ -6,8 +6,8 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.stats import spearmanr
 
+from paint_deposition.comparison.rank_correlation import rank_correlation
 from paint_deposition.comparison.regions import Region, misfit_regions
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
@@ -134,8 +134,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     dependences = []
     for covariate in study.covariates(model):
         if covariate.varies:
-            correlation, p_value = spearmanr(covariate.values, points.residual_um)
-            dependences.append(Dependence(covariate.name, float(correlation), float(p_value)))
+            found = rank_correlation(covariate.values, points.residual_um)
+            dependences.append(Dependence(covariate.name, *found))
     return Comparison(
         study,
         readings,

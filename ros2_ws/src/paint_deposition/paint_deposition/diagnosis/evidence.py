@@ -8,10 +8,11 @@ pattern's parameters; every explanation then adds a low-rank term to the identit
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numba import njit
-from scipy.linalg import eigh, solve_triangular
+from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
 from paint_deposition.fitting.least_squares import Fit, covariance_factor
@@ -20,6 +21,8 @@ from paint_deposition.fitting.least_squares import Fit, covariance_factor
 KNOWN_NOISE = 1e9
 # An entry of a fit this close to a bound has been stopped by it.
 AT_BOUND = 1e-6
+# A direction whose squared length, in standard deviations, is less cannot be seen.
+UNSEEN = 1e-9
 
 
 @dataclass(frozen=True)
@@ -83,9 +86,9 @@ class Principal:
     """Whitened directions of one explanation, turned to be orthogonal to each other.
 
     Attributes:
-        columns: (P, n) the directions.
-        axes: (n, n) what each amplitude, a row, is along them.
-        signed: (q, n) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
+        columns: (P, m) the directions.
+        axes: (n, m) what each amplitude, a row, is along them.
+        signed: (q, m) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
     """
 
     columns: np.ndarray
@@ -95,10 +98,34 @@ class Principal:
 
     @staticmethod
     def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':
-        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known."""
-        _, axes = eigh(columns.T @ columns)
+        """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known.
+
+        Where none is known, directions that do not show are left out: a map of hundreds of knots
+        has no more of them than there are readings.
+        """
         known = sides != 0.0
-        return Principal(columns @ axes, axes, axes[known], sides[known])
+        if known.any():
+            _, axes = np.linalg.eigh(columns.T @ columns)
+            return Principal(columns @ axes, axes, axes[known], sides[known])
+        wide = columns.shape[1] > len(columns)
+        squares, turned = np.linalg.eigh(columns @ columns.T if wide else columns.T @ columns)
+        shown = squares > UNSEEN
+        turned, lengths = turned[:, shown], np.sqrt(squares[shown])
+        if wide:
+            turned, axes = turned * lengths, columns.T @ (turned / lengths)
+        else:
+            turned, axes = columns @ turned, turned
+        return Principal(turned, axes, axes[known], sides[known])
+
+    @cached_property
+    def squares(self) -> np.ndarray:
+        """(m,) squared lengths of the directions."""
+        return np.sum(self.columns**2, axis=0)
+
+    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> float:
+        """By how many standard deviations original amplitudes (n,), or some of them, move all."""
+        along = self.axes[some].T @ amplitudes[some]
+        return math.sqrt(self.squares @ along**2)
 
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.
@@ -107,7 +134,7 @@ class Principal:
             deviation: (P,) whitened.
             sizes: (S,) standard deviations of the amplitudes before the readings.
         """
-        precision = sizes[:, np.newaxis] ** -2.0 + np.sum(self.columns**2, axis=0)
+        precision = sizes[:, np.newaxis] ** -2.0 + self.squares
         return (self.columns.T @ deviation / precision) @ self.axes.T
 
     def log_bayes_factors(
@@ -122,7 +149,7 @@ class Principal:
         """
         scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
         sizes = sizes[:, np.newaxis]
-        precision = 1.0 + sizes**2 * np.sum(self.columns**2, axis=0)
+        precision = 1.0 + sizes**2 * self.squares
         explained = (sizes**2 / precision) @ scores**2
         factors = -0.5 * np.log(precision).sum(axis=1, keepdims=True)
         if np.isfinite(freedom):

@@ -55,6 +55,15 @@ class Directions(NamedTuple):
             signed, sides, min(freedom, 2.0 * KNOWN_NOISE), len(deviation),
         )  # fmt: skip
 
+    def amplitudes(self, chosen: Sequence[int], sizes: Sequence[float]) -> list[np.ndarray]:
+        """Posterior means of the amplitudes along chosen explanations together, of each."""
+        widths = np.diff(self.start)[list(chosen)]
+        rows = np.concatenate([np.arange(*self.start[k : k + 2]) for k in chosen])
+        scale = np.repeat(np.asarray(sizes, dtype=float), widths)
+        precision = np.eye(len(rows)) + self.gram[np.ix_(rows, rows)] * np.outer(scale, scale)
+        mean = scale * np.linalg.solve(precision, scale * self.scores[rows])
+        return np.split(mean, np.cumsum(widths)[:-1])
+
 
 @njit(cache=True, nogil=True)
 def log_evidence(directions, chosen, sizes):
@@ -89,6 +98,15 @@ def log_evidence(directions, chosen, sizes):
             products, scores, directions.square, signed[:known], sides[:known], sizes[s][member],
             directions.freedom, directions.readings, orthogonal,
         )  # fmt: skip
+    return found
+
+
+@njit(cache=True, nogil=True)
+def log_evidence_of_each(directions, chosen, sizes):
+    """(M,) log Bayes factors of M sets of chosen explanations (M, c), of sizes (M, c)."""
+    found = np.empty(len(chosen))
+    for m in range(len(chosen)):
+        found[m] = log_evidence(directions, chosen[m], sizes[m : m + 1])[0]
     return found
 
 

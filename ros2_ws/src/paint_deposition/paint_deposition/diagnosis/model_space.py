@@ -16,7 +16,13 @@ from scipy.special import expit, logsumexp
 
 from paint_deposition.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
-from paint_deposition.diagnosis.joint_evidence import NEVER, Directions, log_evidence, refine
+from paint_deposition.diagnosis.joint_evidence import (
+    NEVER,
+    Directions,
+    log_evidence,
+    log_evidence_of_each,
+    refine,
+)
 
 # Prior probability that a cause is missing: an effect of the library, something outside it, and
 # a pattern that is no two Gaussians. No measured pattern is exactly one.
@@ -179,9 +185,9 @@ class ModelSpace:
         if explanation.sensitivity is None:
             return explanation.goes_right(amounts)
         of_law = len(explanation.sensitivity.names)
-        law = np.linalg.norm(own.columns @ (own.axes[:of_law].T @ amounts[:of_law]))
-        error = np.linalg.norm(own.columns @ (own.axes[of_law:].T @ amounts[of_law:]))
-        return bool(error <= max(NOTICED, LARGEST_ERROR * law))
+        law = own.length(amounts, slice(of_law))
+        error = own.length(amounts, slice(of_law, None))
+        return error <= max(NOTICED, LARGEST_ERROR * law)
 
     @cached_property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -194,7 +200,7 @@ class ModelSpace:
             return []
         amounts, own = self.amplitudes(best), self.principal
         moved = {
-            cause: float(np.sum((own[k].columns @ own[k].axes.T @ part) ** 2))
+            cause: own[k].length(part) ** 2
             for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
         }
         least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
@@ -211,20 +217,9 @@ class ModelSpace:
 
     def amplitudes(self, model: Model) -> list[np.ndarray]:
         """Posterior mean amplitudes of each of a model's explanations, in their own units."""
-        parts = [
-            size * self.principal[k].columns
-            for k, size in zip(model.chosen, model.sizes, strict=True)
-        ]
-        columns = np.hstack(parts)
-        precision = np.eye(columns.shape[1]) + columns.T @ columns
-        mean = np.linalg.solve(precision, columns.T @ self.null.deviation)
-        ends = np.cumsum([part.shape[1] for part in parts])
-        return [
-            size * self.principal[k].axes @ part
-            for k, size, part in zip(
-                model.chosen, model.sizes, np.split(mean, ends[:-1]), strict=True
-            )
-        ]
+        along = self._directions.amplitudes(model.chosen, model.sizes)
+        own = (self.principal[k].axes for k in model.chosen)
+        return [axes @ part for axes, part in zip(own, along, strict=True)]
 
     def p_value(self, seed: int) -> float:
         """Probability of at least this much evidence for any cause if none acted.
@@ -283,15 +278,20 @@ class ModelSpace:
 
     def _most_probable(self, models: Iterable[Model], count: int) -> list[Model]:
         """The best ones, weighed with the explanations that they have."""
-        weighed = [
-            replace(
-                model,
-                log_weight=self._log_evidence(model.chosen, model.sizes)
-                + sum(self._averaging[c] for c in model.causes),
-            )
-            for model in models
+        all_models = list(models)
+        if not all_models:
+            return []
+        evidence = log_evidence_of_each(
+            self._directions,
+            np.array([model.chosen for model in all_models]),
+            np.array([model.sizes for model in all_models]),
+        )
+        weights = [
+            value + sum(self._averaging[c] for c in model.causes)
+            for value, model in zip(evidence, all_models, strict=True)
         ]
-        return sorted(weighed, key=lambda m: -m.log_weight)[:count]
+        best = np.argsort(-np.array(weights), kind='stable')[:count]
+        return [replace(all_models[k], log_weight=float(weights[k])) for k in best]
 
     def _refined(self, model: Model) -> Model:
         """The same causes with the explanations and sizes that are best together."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from paint_deposition.fitting.least_squares import Fit
 
@@ -45,12 +45,12 @@ class PatternShift:
     @property
     def usual(self) -> float:
         """Distance that 95 % of jobs stay below if they differ as assumed."""
-        return float(np.sqrt(chi2.ppf(USUAL, len(self.by_coordinate))))
+        return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - USUAL)))
 
     @property
     def is_alarming(self) -> bool:
         """Whether hardly any job differs as much."""
-        return bool(self.distance > np.sqrt(chi2.ppf(ALARMING, len(self.by_coordinate))))
+        return bool(self.distance > np.sqrt(chdtri(len(self.by_coordinate), 1.0 - ALARMING)))
 
     def __str__(self) -> str:
         name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr
 
 from paint_deposition.diagnosis.explanations import LAW_ERROR
 from paint_deposition.diagnosis.model_space import CREDIBLE
@@ -28,7 +28,7 @@ def chance_of_settling(separation: np.ndarray) -> np.ndarray:
     """
     needed = np.log(CREDIBLE / (1.0 - CREDIBLE))
     apart = np.maximum(np.multiply.outer(separation, 1.0 + OFF), 1e-9)
-    return norm.cdf(0.5 * apart - needed / apart) @ WEIGHTS
+    return ndtr(0.5 * apart - needed / apart) @ WEIGHTS
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 197
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtr, ndtri
 
 from paint_deposition.diagnosis.model_space import SIZES
 from paint_deposition.diagnosis.testability import LEVEL
@@ -119,9 +119,9 @@ def power(noncentrality: np.ndarray, tests: int) -> np.ndarray:
         noncentrality: (m,) of effects of typical size.
         tests: how many effects share the level of the test.
     """
-    limit = norm.isf(0.5 * LEVEL / tests)
+    limit = -ndtri(0.5 * LEVEL / tests)
     ratio = SIZES * np.sqrt(noncentrality)[:, np.newaxis]
-    return np.mean(norm.cdf(ratio - limit) + norm.cdf(-ratio - limit), axis=1)
+    return np.mean(ndtr(ratio - limit) + ndtr(-ratio - limit), axis=1)
 
 
 def slope(noncentrality: np.ndarray, tests: int) -> np.ndarray:

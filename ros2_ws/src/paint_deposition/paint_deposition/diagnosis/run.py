@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import f as f_ratio
+from scipy.special import fdtr
 
 from paint_deposition.diagnosis.evidence import NullModel
 from paint_deposition.diagnosis.explanations import Explanation, explanations, law_errors
@@ -276,7 +276,7 @@ def trouble_with(study: Study, fit: Fit) -> str:
         # Of the gauge alone: that a film has little texture is no fault.
         over_gauge = fit.residual * study.sigma_um / study.gauge_um
         reduced = float(over_gauge @ over_gauge) / freedom
-        chance = f_ratio.cdf(reduced, freedom, min(study.noise.degrees_of_freedom, 1e6))
+        chance = fdtr(freedom, min(study.noise.degrees_of_freedom, 1e6), reduced)
         if chance < TOO_GOOD:
             return (
                 f'the readings scatter about the model {np.sqrt(reduced):.2f} times as much as '

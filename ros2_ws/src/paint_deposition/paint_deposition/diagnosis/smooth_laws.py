@@ -9,14 +9,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_weights
+from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_positions
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
-from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
+from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
-from paint_deposition.fitting.smooth_fields import covariance_root, smooth, with_edges
+from paint_deposition.fitting.smooth_fields import root_of_field, smooth, with_edges
 from paint_deposition.fitting.study import Study
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.readings.covariates import Rays
@@ -72,8 +71,10 @@ class Basis:
             among: (K,) bool, knots at which the law is not zero; default all.
         """
         kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
-        away = cdist(self.knots[kept], self.knots[kept]) / max(length, self.shortest)
-        small = covariance_root(with_edges(away) if self.edges else smooth(away), NEGLIGIBLE)
+        small = root_of_field(
+            self.knots[kept], max(length, self.shortest), NEGLIGIBLE,
+            with_edges if self.edges else smooth,
+        )  # fmt: skip
         root = np.zeros((len(self.knots), small.shape[1]))
         root[kept] = size * small
         return RandomLaw(self, root)
@@ -162,16 +163,13 @@ def curve_basis(
         return None
     films, positions = [], []
     for part, value in zip(rays, values, strict=True):
-        weights = knot_weights(law, value, low, high, knots)
+        at = knot_positions(law, value, low, high, knots)
         if kind == 'addition':
-            film = weights[0]
+            films.append(hat_weights(at[0], knots))
         elif value.shape[1] == 1:
-            film = part.share.T @ weights[:, 0]
+            films.append(part.share.T @ hat_weights(at[:, 0], knots))
         else:
-            film = np.einsum(
-                'mp,mpk->pk', part.share, np.broadcast_to(weights, (*part.share.shape, knots))
-            )
-        films.append(film)
+            films.append(hat_sums(part.share, at, knots))
         positions.append(part.mean(law.axis(value)))
     step = (law.axis(high) - law.axis(low)) / (knots - 1)
     step /= max(float(np.std(np.concatenate(positions))), 1e-9)
@@ -240,11 +238,9 @@ def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) ->
     reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
     for rays in parts:
-        near = hat_weights(np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1), RADII)
-        near *= rays.share[:, :, np.newaxis]
-        films.append(
-            np.stack([np.einsum('mpk,mp->pk', near, wave) for wave in waves(rays.x_m, rays.y_m)])
-        )
+        radius = np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1)
+        angle = waves(rays.x_m, rays.y_m)
+        films.append(np.stack([hat_sums(rays.share * wave, radius, RADII) for wave in angle]))
     film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
     radius, wave = np.indices((RADII, WAVES))
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)

@@ -6,10 +6,11 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
-from scipy.stats import norm, qmc
+from scipy.special import ndtri
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.fitting.forward import Forward, Terms
+from paint_deposition.fitting.halton import halton
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.pattern_vector import COS, SIN
 from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
@@ -156,7 +157,7 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
         if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
     ]  # fmt: skip
     width = problem.prior.width
-    spread = norm.ppf(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
+    spread = ndtri(halton(TRIED_A_START * count, len(shape), seed))
     tried = []
     for away in spread:
         vector = first.copy()

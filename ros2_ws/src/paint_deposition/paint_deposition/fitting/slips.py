@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from scipy.special import expit
-from scipy.stats import cauchy
 
 from paint_deposition.fitting.smooth_misfit import Misfit, Scatter
 
@@ -82,7 +81,7 @@ def slips(misfit: Misfit, single: np.ndarray) -> dict[int, tuple[float, float]]:
         left = misfit.select(kept)
         scatter = Scatter.of(left)
         # Nothing is known of a slip but that it is a number of the size of the film.
-        wild = cauchy.logpdf(left.residual_um, scale=film)
+        wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
         log_odds = np.log(SLIP / (1.0 - SLIP)) + wild - scatter.log_density
         log_odds[~single[kept]] = -np.inf
         worst = int(np.argmax(log_odds))

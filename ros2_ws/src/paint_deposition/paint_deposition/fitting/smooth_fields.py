@@ -1,10 +1,16 @@
 """Smooth random fields over parts and covariates, as square roots of their covariances."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import eigh
+from scipy.spatial.distance import cdist
+
+# Places on parts so far from each other have nothing in common [m].
+FAR_M = 1e6
+# Roots that are kept: while models change, most places and lengths stay.
+ROOTS_KEPT = 128
 
 
 def smooth(away: ArrayLike) -> np.ndarray:
@@ -18,22 +24,43 @@ def with_edges(away: ArrayLike) -> np.ndarray:
     return (1.0 + scaled) * np.exp(-scaled)
 
 
-def covariance_root(covariance: np.ndarray, negligible: float) -> np.ndarray:
-    """(N, n) square root of a covariance (N, N).
+def root_of_field(
+    places: np.ndarray,
+    length: float,
+    negligible: float,
+    correlation: Callable[[ArrayLike], np.ndarray] = smooth,
+) -> np.ndarray:
+    """(N, n) square root of the covariance of a field of unit variance; not to be changed.
 
     Args:
-        covariance: of the values.
+        places: (N, D) where its values are.
+        length: of correlation.
         negligible: directions below this share of the largest variance are left out.
+        correlation: at a distance over the length.
     """
-    values, vectors = eigh(covariance)
+    places = np.ascontiguousarray(places, dtype=float)
+    return _root(places.tobytes(), places.shape, length, negligible, correlation)
+
+
+@lru_cache(ROOTS_KEPT)
+def _root(
+    places: bytes,
+    shape: tuple[int, int],
+    length: float,
+    negligible: float,
+    correlation: Callable[[ArrayLike], np.ndarray],
+) -> np.ndarray:
+    at = np.frombuffer(places).reshape(shape)
+    values, vectors = np.linalg.eigh(correlation(cdist(at, at) / length))
     kept = values > negligible * values[-1]
-    return vectors[:, kept] * np.sqrt(values[kept])
+    root = vectors[:, kept] * np.sqrt(values[kept])
+    root.flags.writeable = False
+    return root
 
 
 def field_over_values(values: np.ndarray, length: float, negligible: float) -> np.ndarray:
     """(P, n) root of a field of unit variance over values (P,), with a length of correlation."""
-    away = (values[:, np.newaxis] - values) / length
-    return covariance_root(smooth(away), negligible)
+    return root_of_field(values[:, np.newaxis], length, negligible)
 
 
 def fields_over_parts(
@@ -44,11 +71,7 @@ def fields_over_parts(
     Args:
         owner: (P,) part of each point. positions_m: (P, 3) [m].
         lengths_m: of correlation, one for each field [m].
-        negligible: as in ``covariance_root``.
+        negligible: as in ``root_of_field``.
     """
-    same = owner[:, np.newaxis] == owner
-    square = np.sum((positions_m[:, np.newaxis] - positions_m) ** 2, axis=2)
-    return [
-        covariance_root(np.where(same, smooth(np.sqrt(square) / length), 0.0), negligible)
-        for length in lengths_m
-    ]
+    apart = np.column_stack([positions_m, FAR_M * owner])
+    return [root_of_field(apart, length, negligible) for length in lengths_m]

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.linalg import cho_factor, cho_solve
 from scipy.special import logsumexp
-from scipy.stats import norm
 
 from paint_deposition.fitting.smooth_fields import field_over_values, fields_over_parts
 from paint_deposition.readings.covariates import Covariate
@@ -87,7 +87,7 @@ class Scatter:
     def of(misfit: Misfit) -> 'Scatter':
         """Compute all models."""
         fields = list(_fields(misfit))
-        log_prior = norm.logpdf(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
+        log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
         weights, expected, sigmas = [], [], []
         for field, log_share in fields:
             directions = np.hstack([misfit.free_um, field])
@@ -113,18 +113,24 @@ class Scatter:
     @property
     def log_density(self) -> np.ndarray:
         """(P,) logarithm of the density that the other readings predict for each [1/um]."""
-        own = norm.logpdf(self.residual_um, self.expected_um, self.sigma_um)
+        own = _log_normal(self.residual_um, self.expected_um, self.sigma_um)
         others = self.log_weight[:, np.newaxis] - own
         return logsumexp(self.log_weight) - logsumexp(others, axis=0)
 
     def predicted(self, row: int) -> tuple[float, float]:
         """Residual that the other readings predict for one, and its standard deviation [um]."""
-        own = norm.logpdf(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
+        own = _log_normal(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
         log_weight = self.log_weight - own
         weight = np.exp(log_weight - logsumexp(log_weight))
         mean = float(weight @ self.expected_um[:, row])
         square = float(weight @ (self.sigma_um[:, row] ** 2 + self.expected_um[:, row] ** 2))
         return mean, float(np.sqrt(square - mean**2))
+
+
+def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0) -> np.ndarray:
+    """Logarithm of the normal density."""
+    away = np.subtract(value, mean) / sigma
+    return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
 
 
 def _left_out(

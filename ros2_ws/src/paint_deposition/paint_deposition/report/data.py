@@ -19,7 +19,8 @@ from paint_deposition.fitting.study import Study
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.readings.campaign import Experiment
 from paint_deposition.readings.residuals import root_mean_square
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
+from paint_deposition.report.profile_charts import ModelLine, ProfileChart
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
 from paint_deposition.results.fitted_model import history_as_list
 
 
@@ -164,6 +165,26 @@ class ReportData:
     def profiles(self) -> list[Profile]:
         """Along columns and rows."""
         return profiles_of(self.study, self.models)
+
+    @cached_property
+    def charts(self) -> tuple[ProfileChart, ...]:
+        """Of each profile."""
+        return tuple(map(self._chart, self.profiles))
+
+    def _chart(self, profile: Profile) -> ProfileChart:
+        rows, name = profile.rows, f'{profile.experiment}, ' if len(self.experiments) > 1 else ''
+        measured_um = self.study.measured_um[rows]
+        models = []
+        for k, (called, line) in enumerate(zip(self.model_names, self.lines, strict=True)):
+            residual_um = self.residuals_um[k][rows]
+            film_um = profile.lines_um[k] if len(profile.line_m) else measured_um - residual_um
+            style = line['color'], line['width'], self.colours[k]
+            models.append(ModelLine(called, film_um, residual_um, *style))
+        return ProfileChart(
+            f'{name}{profile.label}:  {self.errors_in_words(rows)}', profile.axis,
+            profile.position_m, measured_um, TWO_SIDED_95 * self.study.sigma_um[rows],
+            profile.line_m, profile.passes_um, tuple(models),
+        )  # fmt: skip
 
     @cached_property
     def painted(self) -> list[list[FilmIntegrator]]:

@@ -15,15 +15,15 @@ from paint_deposition.files.model_file import ModelFile
 from paint_deposition.fitting.calibration import Calibration
 from paint_deposition.fitting.study import Study
 from paint_deposition.report.data import ReportData
+from paint_deposition.report.drawing import HERE, DrawingProcess, Here
 from paint_deposition.report.page.report import write_report
-from paint_deposition.report.pictures.calibration import write_calibration_pictures
-from paint_deposition.report.pictures.profiles import write_comparison_picture
 from paint_deposition.results.calibration import write_calibration
 from paint_deposition.results.fitted_model import write_fitted
 from paint_deposition.results.residual_mesh import file_name, write_residual_meshes
 from paint_deposition.results.residuals import write_residuals
 
 PNG = 'png'
+PROFILES = 'profiles:write_comparison_picture'
 
 
 def calibration(
@@ -31,35 +31,52 @@ def calibration(
 ) -> list[Path]:
     made_with = _of_study(result.study, result.model)
     files = write_calibration(folder, result, start, made_with)
-    return files + write_calibration_pictures(folder, result, pictures)
+    drawn = HERE.start('calibration:write_calibration_pictures', folder, result, pictures)
+    return files + drawn.result()
 
 
-def comparison(result: Comparison, folder: str | Path, pictures: str = PNG) -> list[Path]:
-    return _write_report(Path(folder), 'comparison.json', result, result, pictures)
+def comparison(
+    result: Comparison,
+    folder: str | Path,
+    pictures: str = PNG,
+    drawing: DrawingProcess | Here = HERE,
+) -> list[Path]:
+    return _write_report(Path(folder), 'comparison.json', result, result, pictures, drawing)
 
 
-def side_by_side(result: SideBySide, folder: str | Path, pictures: str = PNG) -> list[Path]:
+def side_by_side(
+    result: SideBySide,
+    folder: str | Path,
+    pictures: str = PNG,
+    drawing: DrawingProcess | Here = HERE,
+) -> list[Path]:
     folder, data = Path(folder), ReportData.of(result)
     files = [folder / name for name in ('comparison.json', f'comparison.{pictures}')]
+    drawn = drawing.start(PROFILES, files[1], data.charts)
     models = {name: comparison.model for name, comparison in result.by_name.items()}
     write_json(files[0], result.to_dict() | _of_study(data.study, models))
-    write_comparison_picture(files[1], data)
     for name, comparison in result.by_name.items():
         files.append(folder / f'residuals_{file_name(name)}.csv')
         write_residuals(files[-1], comparison)
     write_report(folder / 'report.html', data)
+    drawn.result()
     return [*files, folder / 'report.html']
 
 
 def diagnosis(
-    result: Diagnosis, folder: str | Path, start: ModelFile | None = None, pictures: str = PNG
+    result: Diagnosis,
+    folder: str | Path,
+    start: ModelFile | None = None,
+    pictures: str = PNG,
+    drawing: DrawingProcess | Here = HERE,
 ) -> list[Path]:
     folder, start = Path(folder), start or ModelFile(result.history[0].model)
     models = [folder / 'model_before.yaml', folder / 'model.yaml']
     write_fitted(models[0], result.study, result.history[:1], start)
     write_fitted(models[1], result.study, result.history, start)
-    last = result.comparisons[-1]
-    return models + _write_report(folder, 'diagnosis.json', result, last, pictures, start.history)
+    return models + _write_report(
+        folder, 'diagnosis.json', result, result.comparisons[-1], pictures, drawing, start.history
+    )
 
 
 def _of_study(
@@ -78,15 +95,17 @@ def _write_report(
     result: Comparison | Diagnosis,
     last: Comparison,
     pictures: str,
+    drawing: DrawingProcess | Here,
     older: Sequence[Mapping[str, Any]] = (),
 ) -> list[Path]:
     """Figures, the last model's residuals as a table and as meshes, picture and report."""
     data = ReportData.of(result, older)
     names = (figures, 'residuals.csv', f'comparison.{pictures}', 'report.html')
     files = [folder / name for name in names]
+    drawn = drawing.start(PROFILES, files[2], data.charts)
     write_json(files[0], result.to_dict() | _of_study(last.study, last.model))
     write_residuals(files[1], last)
     meshes = write_residual_meshes(folder, last)
-    write_comparison_picture(files[2], data)
     write_report(files[3], data)
+    drawn.result()
     return [*files, *meshes]

@@ -8,7 +8,7 @@ from numba.extending import register_jitable
 from pydantic import Field, model_validator
 
 from paint_deposition.effects.base import PathContext
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied, hat_weights
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied
 from paint_deposition.effects.learned.place import places_m
 from paint_deposition.kernel.ray import Ray
 from paint_deposition.motion.path import SprayPath
@@ -117,13 +117,6 @@ def knot_positions(
     first, last = law.axis(low), law.axis(high)
     position = (law.axis(value) - first) / (last - first) * (count - 1)
     return np.where(np.isfinite(position), position, -2.0)
-
-
-def knot_weights(
-    law: type[LearnedCurve], value: np.ndarray, low: float, high: float, count: int
-) -> np.ndarray:
-    """(..., count) weights of a law's knots at values of its covariate (...)."""
-    return hat_weights(knot_positions(law, value, low, high, count), count)
 
 
 def along_path(path: SprayPath) -> dict[str, np.ndarray]:

@@ -66,6 +66,23 @@ def hat_weights(position: np.ndarray, count: int) -> np.ndarray:
     return np.maximum(0.0, 1.0 - away)
 
 
+def hat_sums(share: np.ndarray, position: np.ndarray, count: int) -> np.ndarray:
+    """(P, count) sums over M of a share (M, P) at positions (M, P), or (1, P), among the knots.
+
+    The share times ``hat_weights``, without the weights of all the knots that are not near.
+    """
+    points = share.shape[1]
+    # A knot before the first and two beyond the last take what is out of reach.
+    place = np.clip(np.broadcast_to(position, share.shape), -1.0, count) + 1.0
+    lower = place.astype(np.int64)
+    upper_share = share * (place - lower)
+    lower += (count + 3) * np.arange(points)
+    size = (count + 3) * points
+    sums = np.bincount(lower.ravel(), (share - upper_share).ravel(), size)
+    sums += np.bincount((lower + 1).ravel(), upper_share.ravel(), size)
+    return sums.reshape(points, count + 3)[:, 1 : count + 1]
+
+
 def applied(film_um: np.ndarray, h: np.ndarray, kind: str) -> np.ndarray:
     """Film (V,) [um] after a law with values h (V,) over the surface; bare metal stays bare."""
     if kind == 'addition':

@@ -5,7 +5,6 @@ from textwrap import wrap
 from typing import Any
 
 import numpy as np
-from scipy.stats import binned_statistic
 
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
@@ -109,9 +108,10 @@ def _conditions(data: ReportData) -> dict[str, np.ndarray]:
 def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Means of the covariate, and of each model's residual, over sixths of the readings."""
     edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
-    means = binned_statistic(x, [x, *residuals], 'mean', edges).statistic
-    filled = means[:, np.isfinite(means[0])]
-    return filled[0], filled[1:]
+    bin_of = np.minimum(np.digitize(x, edges), max(len(edges) - 1, 1))
+    sums = np.array([np.bincount(bin_of, values) for values in (np.ones(len(x)), x, *residuals)])
+    means = sums[1:, sums[0] > 0.0] / sums[0, sums[0] > 0.0]
+    return means[0], means[1:]
 
 
 def history_figure(data: ReportData) -> dict[str, Any] | None:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import f as fisher
+from scipy.special import fdtrc
 
 from paint_deposition.diagnosis.model_space import SURE
 from paint_deposition.diagnosis.procedure import ALPHA
@@ -199,7 +199,7 @@ def _broken(data: ReportData, diagnosis: Diagnosis) -> Headline:
 def _compared(data: ReportData) -> Headline:
     regions, points = data.comparisons[-1].regions, data.comparisons[-1].points
     freedom = min(data.study.noise.degrees_of_freedom, 1e6)
-    by_chance = float(fisher.sf(points.chi_square_per_reading, len(points), freedom))
+    by_chance = float(fdtrc(len(points), freedom, points.chi_square_per_reading))
     title = 'The model agrees with the readings'
     if regions:
         title = 'The model misses the readings in places'

@@ -1,15 +1,15 @@
 """Profiles by column, measured, before and after, as a picture for paper and web."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 
-from paint_deposition.comparison.profiles import Profile
-from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import MM, new_figure, quiet, save_picture
-from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
+from paint_deposition.report.profile_charts import ProfileChart
+from paint_deposition.report.style import BEFORE, INK, MUTED, charts_a_row
 
 TEXT_PT = 8.0
 # A profile's charts, and the room around all of them and between [in].
@@ -17,10 +17,10 @@ CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
 LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
 
 
-def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
+def write_comparison_picture(path: str | Path, charts: Sequence[ProfileChart]) -> Path:
     """Write the film along each column or row, and the residual below it, as PNG."""
-    columns = charts_a_row(len(data.profiles))
-    rows = -(-len(data.profiles) // columns)
+    columns = charts_a_row(len(charts))
+    rows = -(-len(charts) // columns)
     width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
     height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
     figure = new_figure(width_in, height_in, layout=None)
@@ -30,13 +30,13 @@ def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
         wspace=GAP_IN[0] / CHARTS_IN[0], hspace=GAP_IN[1] / CHARTS_IN[1],
     )  # fmt: skip
     film, residual = None, None
-    for k, profile in enumerate(data.profiles):
+    for k, chart in enumerate(charts):
         place = cells[k // columns, k % columns]
         cell = place.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.12)
         film = figure.add_subplot(cell[0], sharey=film)
         residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
-        draw_profile(film, data, profile)
-        draw_residual(residual, data, profile)
+        draw_profile(film, chart)
+        draw_residual(residual, chart)
         film.set_xlabel('')
         film.tick_params(labelbottom=False)
         if k % columns:
@@ -50,45 +50,38 @@ def write_comparison_picture(path: str | Path, data: ReportData) -> Path:
     return save_picture(figure, path)
 
 
-def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw one of ``data.profiles``: readings with the gauge's noise, and the models' film."""
-    name = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
-    title = f'{name}{profile.label}:  {data.errors_in_words(profile.rows)}'
-    quiet(axes, f'{profile.axis} [mm]', 'film [µm]', title, TEXT_PT)
-    line_mm, at_mm = MM * profile.line_m, MM * profile.position_m
-    measured = data.study.measured_um[profile.rows]
+def draw_profile(axes: Axes, chart: ProfileChart) -> None:
+    """Draw readings with the gauge's noise, and the models' film."""
+    quiet(axes, f'{chart.axis} [mm]', 'film [µm]', chart.title, TEXT_PT)
+    at_mm, line_mm = MM * chart.position_m, MM * chart.line_m
     axes.errorbar(
-        at_mm, measured, TWO_SIDED_95 * data.study.sigma_um[profile.rows], fmt='o', ms=3,
-        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge and texture', zorder=5,
+        at_mm, chart.measured_um, chart.bars_um, fmt='o', ms=3, color=INK, elinewidth=0.8,
+        label='measured, bars: 95 % gauge and texture', zorder=5,
     )  # fmt: skip
-    for k, label in enumerate(data.model_names):
-        last = k == len(data.models) - 1
+    for k, model in enumerate(chart.models):
         # The thin line lies over the bold one, so that both are seen where they agree.
         style: dict[str, Any] = {
-            'color': data.lines[k]['color'],
-            'label': label,
-            'zorder': 3 - 0.1 * k,
-        }
+            'color': model.colour, 'label': model.name, 'zorder': 3 - 0.1 * k,
+        }  # fmt: skip
         if len(line_mm):
-            axes.plot(line_mm, profile.lines_um[k], lw=0.85 * data.lines[k]['width'], **style)
+            axes.plot(line_mm, model.film_um, lw=0.85 * model.width, **style)
         else:
-            predicted = measured - data.residuals_um[k][profile.rows]
-            axes.plot(at_mm, predicted, 'o', ms=4, fillstyle='full' if last else 'none', **style)
-    for number, single in enumerate(profile.passes_um):
+            filled = 'full' if model is chart.models[-1] else 'none'
+            axes.plot(at_mm, model.film_um, 'o', ms=4, fillstyle=filled, **style)
+    for number, single in enumerate(chart.passes_um):
         label = '' if number else 'each pass alone'
         axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
     axes.set_ylim(bottom=0.0, auto=None)  # Axes that share the scale may need more of it.
 
 
-def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw measured minus predicted along one of ``data.profiles``, of the last model bold."""
-    quiet(axes, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
-    at_mm = MM * profile.position_m
-    for k, residual in enumerate(data.residuals_um):
-        last = k == len(data.models) - 1
-        bars = TWO_SIDED_95 * data.study.sigma_um[profile.rows] if last else np.zeros(len(at_mm))
+def draw_residual(axes: Axes, chart: ProfileChart) -> None:
+    """Draw measured minus predicted, of the last model with the gauge's noise."""
+    quiet(axes, f'{chart.axis} [mm]', 'residual [µm]', size=TEXT_PT)
+    at_mm = MM * chart.position_m
+    for model in chart.models:
+        last = model is chart.models[-1]
         axes.errorbar(
-            at_mm, residual[profile.rows], bars, fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7,
-            color=data.colours[k],
+            at_mm, model.residual_um, chart.bars_um if last else np.zeros(len(at_mm)),
+            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=model.residual_colour,
         )  # fmt: skip
     axes.axhline(0.0, color=MUTED, lw=0.8)
