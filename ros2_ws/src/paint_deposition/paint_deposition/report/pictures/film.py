@@ -95,7 +95,7 @@ def draw_film(
     low, high = part.window(spray)
     part.dress(axes, low, high)
     seen_um = part.spread(film_um)
-    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > painted_above_um)[:, :, :3] / 255.0)
+    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > painted_above_um))
     part.draw_contours(axes, film_um, scale.low, scale.high)
     draw_tool_path(axes, spray, part.view, low, high)
     return scale
@@ -147,8 +147,7 @@ def _canvas(extent_m: np.ndarray, count: int) -> tuple[Figure, list[_Row]]:
     row_in = max(height, LEAST_HEIGHT_IN)
     pitch = row_in + BOTTOM_IN + 0.3
     total = TOP_IN + BOTTOM_IN + row_in + (count - 1) * pitch
-    figure = new_figure(LEFT_IN + width + RIGHT_IN, total)
-    figure.set_layout_engine('none')
+    figure = new_figure(LEFT_IN + width + RIGHT_IN, total, layout=None)
     bottoms = [BOTTOM_IN + k * pitch + 0.5 * (row_in - height) for k in reversed(range(count))]
     rows = [_Row(figure, (LEFT_IN, bottom, width, height)) for bottom in bottoms]
     for row in rows:
@@ -165,7 +164,8 @@ def _draw_band(
     seen_um = part.spread(film_um)
     band = np.digitize(seen_um, s.band_um, right=True)
     band[seen_um <= s.painted_above_um] = 3
-    part.draw_pixels(row.axes, np.array([to_rgb(c) for c in (BELOW, WITHIN, HIGH, BARE)])[band])
+    colours = 255.0 * np.array([to_rgb(colour) for colour in (BELOW, WITHIN, HIGH, BARE)])
+    part.draw_pixels(row.axes, np.rint(colours).astype(np.uint8)[band])
     draw_tool_path(row.axes, spray, part.view, low, high)
 
 

@@ -94,7 +94,7 @@ def _draw_film(
     axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: LaidFilm
 ) -> None:
     seen = part.spread(laid.film_um)
-    part.draw_pixels(axes, scale.rgba(seen, seen > 1.0)[:, :, :3] / 255.0)
+    part.draw_pixels(axes, scale.rgba(seen, seen > 1.0))
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     draw_tool_path(axes, path, part.view, low, high)
 

@@ -42,7 +42,7 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
     scale, seen_um = film_scale(chosen.film_um), part.spread(chosen.film_um)
     room = 0.03 * (part.high_m - part.low_m).max()
     part.dress(axes, part.low_m - room, part.high_m + room)
-    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > NO_PAINT_UM)[:, :, :3] / 255.0)
+    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > NO_PAINT_UM))
     part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
     places = part.view.flat(chosen.positions_m)
     twice = np.isin(np.arange(len(chosen)), chosen.read_twice)

@@ -84,12 +84,13 @@ class PartPicture:
         return low - room, high + room
 
     def draw_pixels(self, axes: Axes, rgb: np.ndarray) -> None:
-        """Colours (H, W, 3), 0 to 1, as they are: no light falls on them."""
-        shown = np.isfinite(self.weights[:, :, :1]).astype(float)
+        """Colours (H, W, 3) uint8, or greys (H, W, 1), as they are: no light falls on them."""
+        rgba = np.empty((*rgb.shape[:2], 4), dtype=np.uint8)
+        rgba[:, :, :3] = rgb[:, :, :3]
+        rgba[:, :, 3] = np.where(np.isfinite(self.weights[:, :, 0]), 255, 0)
         (left, bottom), (right, top) = self.low_m, self.high_m
         axes.imshow(
-            np.concatenate([rgb, shown], axis=2), extent=(left, right, bottom, top),
-            origin='lower', interpolation='nearest',
+            rgba, extent=(left, right, bottom, top), origin='lower', interpolation='nearest'
         )  # fmt: skip
         axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
 
@@ -97,7 +98,7 @@ class PartPicture:
         """The bare part in grey, lit from above left."""
         lean = self.spread(self.normals @ (LIGHT[0] * self.view.right + LIGHT[1] * self.view.up))
         grey = np.clip(GREY * (1.0 + CONTRAST * np.nan_to_num(lean)), DARKEST, BRIGHTEST)
-        self.draw_pixels(axes, np.repeat(grey[:, :, np.newaxis], 3, axis=2))
+        self.draw_pixels(axes, (255.0 * grey).astype(np.uint8)[:, :, np.newaxis])
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
