@@ -18,12 +18,7 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.trade_off import Point
-from paint_deposition.report.pictures.film import write_film_picture
-from paint_deposition.report.pictures.geometry import write_geometry_picture
-from paint_deposition.report.pictures.improvement import write_improvement_picture
-from paint_deposition.report.pictures.measuring_points import write_measuring_picture
-from paint_deposition.report.pictures.trade_off import write_trade_off
-from paint_deposition.report.pictures.uniformity import write_uniformity
+from paint_deposition.report.drawing import HERE, DrawingProcess, Here
 from paint_deposition.results.improvement import write_improvement
 from paint_deposition.results.measuring import write_chosen_readings
 from paint_deposition.results.plan import write_plan
@@ -43,7 +38,7 @@ def recommendation(
 ) -> list[Path]:
     files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
     write_json(files[0], result.to_dict() | provenance(model, input_files(made_from or {})))
-    write_uniformity(files[1], result)
+    HERE.start('uniformity:write_uniformity', files[1], result).result()
     return files
 
 
@@ -55,26 +50,32 @@ def plan(
     frame_id: str = ROBOT_FRAME,
     pictures: str = PNG,
     trade_off: Sequence[Point] = (),
+    drawing: DrawingProcess | Here = HERE,
 ) -> list[Path]:
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_plan(folder, result, result.surface, about, part)
-    picture = write_film_picture(
-        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
-        result.statistics, 'Planned passes and their film', result.sentence,
+    film = drawing.start(
+        'film:write_film_picture', Path(folder) / f'film.{pictures}', result.surface,
+        result.film_um, result.path, result.statistics, 'Planned passes and their film',
+        result.sentence,
     )  # fmt: skip
+    files = write_plan(folder, result, result.surface, about, part)
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
         geometry = spray_geometry(result.surface, result.path, result.model, frame_id)
         geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
         files.append(Path(folder) / f'passes.{pictures}')
-        title = 'Planned passes over the faces'
-        write_geometry_picture(files[-1], result.surface, result.path, geometry, title)
-        return [*files, picture]
-    plain = result.plain or result
-    return [*files, picture, *_write_trade_off(Path(folder), plain.point, trade_off, pictures)]
+        drawing.start(
+            'geometry:write_geometry_picture', files[-1], result.surface, result.path, geometry,
+            'Planned passes over the faces',
+        ).result()  # fmt: skip
+        return [*files, film.result()]
+    plain, weighed = result.plain or result, []
+    if trade_off:
+        weighed = _write_trade_off(Path(folder), plain.point, trade_off, pictures, drawing)
+    return [*files, film.result(), *weighed]
 
 
 def improvement(
@@ -90,20 +91,25 @@ def improvement(
     about = with_provenance(notes | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_improvement(folder, result, about, part)
-    files.append(write_improvement_picture(Path(folder) / f'improvement.{pictures}', result))
-    return files + _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
+    picture = Path(folder) / f'improvement.{pictures}'
+    # The result has the model in it, with effects that another process may not know.
+    files.append(HERE.start('improvement:write_improvement_picture', picture, result).result())
+    if trade_off:
+        files += _write_trade_off(Path(folder), result.points[0], trade_off, pictures, HERE)
+    return files
 
 
 def _write_trade_off(
-    folder: Path, given: Point, points: Sequence[Point], pictures: str
+    folder: Path,
+    given: Point,
+    points: Sequence[Point],
+    pictures: str,
+    drawing: DrawingProcess | Here,
 ) -> list[Path]:
-    """Table and picture, where other weights were tried."""
-    if not points:
-        return []
-    return [
-        write_trade_off_table(folder / 'pareto.csv', points),
-        write_trade_off(folder / f'pareto.{pictures}', given, points),
-    ]
+    """Table and picture of other weights of the paint."""
+    picture = folder / f'pareto.{pictures}'
+    drawn = drawing.start('trade_off:write_trade_off', picture, given, points)
+    return [write_trade_off_table(folder / 'pareto.csv', points), drawn.result()]
 
 
 def chosen_readings(
@@ -117,4 +123,8 @@ def chosen_readings(
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
     files = write_chosen_readings(folder, result, about, part)
-    return [*files, write_measuring_picture(Path(folder) / f'points.{pictures}', result)]
+    picture = Path(folder) / f'points.{pictures}'
+    return [
+        *files,
+        HERE.start('measuring_points:write_measuring_picture', picture, result).result(),
+    ]
