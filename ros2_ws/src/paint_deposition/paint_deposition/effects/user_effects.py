@@ -16,7 +16,7 @@ from numba import njit
 
 import paint_deposition
 from paint_deposition.effects.base import Effect, PathContext, Ray
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import IDS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import in_precision
 from paint_deposition.model.projection import Projection
@@ -74,7 +74,7 @@ def effect_of(path: Path, source: bytes) -> type[Effect]:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
         _loaded[key].file, _loaded[key].file_content = key[0], source
     effect = _loaded[key]
-    if effect.id in EFFECTS:
+    if effect.id in IDS:
         raise ModelError(
             f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
         )

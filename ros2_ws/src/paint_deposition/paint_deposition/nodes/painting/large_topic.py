@@ -47,7 +47,8 @@ class LargeTopic:
                 listens who has heard nothing yet.
         """
         newcomers = self._watch.newcomers[self._topic]
-        if not self._publisher.get_subscription_count():
+        # Not the publisher's own count: it grows before the newcomer is told of.
+        if not self._watch.listeners[self._topic]:
             self._sent = None
             return
         if (edition == self._sent and newcomers == self._greeted) or not self._is_free():

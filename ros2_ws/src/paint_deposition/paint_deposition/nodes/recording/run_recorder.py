@@ -25,6 +25,7 @@ from paint_deposition.nodes.recording.default_topics import (
 )
 from paint_deposition.nodes.recording.log_time import LogTime
 from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, notes_on
+from paint_deposition.nodes.recording.recorded_qos import as_recorded
 from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
 from paint_deposition.nodes.recording.recorder_parameters import RECORDER
 from paint_deposition.nodes.runtime import qos
@@ -133,7 +134,7 @@ class RunRecorder(ManagedNode):
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
-            offered = [qos.as_recorded(publisher.qos_profile) for publisher in publishers]
+            offered = [as_recorded(publisher.qos_profile) for publisher in publishers]
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
             topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             self._guarded(self.run.add_topic, run_topic)

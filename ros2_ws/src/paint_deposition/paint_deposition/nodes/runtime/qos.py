@@ -4,16 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rclpy.duration import Duration
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
 
 # Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
 # builds one mesh marker, whatever the reliability: a full queue drops its oldest message.
@@ -46,22 +37,3 @@ def offers_less(offered: QoSProfile, subscribed: QoSProfile) -> bool:
     return (
         offered.reliability > subscribed.reliability or offered.durability > subscribed.durability
     )
-
-
-def as_recorded(profile: QoSProfile) -> Qos:
-    """A publisher's profile, as the middleware tells it, the way bags store it."""
-    return Qos(
-        QosHistory[profile.history.name],
-        profile.depth,
-        QosReliability[profile.reliability.name],
-        QosDurability[profile.durability.name],
-        _as_time(profile.deadline),
-        _as_time(profile.lifespan),
-        QosLiveliness[profile.liveliness.name],
-        _as_time(profile.liveliness_lease_duration),
-        profile.avoid_ros_namespace_conventions,
-    )
-
-
-def _as_time(duration: Duration) -> QosTime:
-    return QosTime(*divmod(duration.nanoseconds, 10**9))

@@ -21,8 +21,9 @@ class QosWatch:
 
     Attributes:
         lost_messages: messages that the middleware says it lost.
-        newcomers: subscribers that each topic's publisher has found so far, also those that left
-            since.
+        listeners: subscribers that each topic's publisher has now.
+        newcomers: those that it has found so far, also those that left since; it says so of both
+            at once.
     """
 
     def __init__(self, node: Node) -> None:
@@ -31,6 +32,7 @@ class QosWatch:
         self._outputs: dict[str, Publisher] = {}
         self._told: dict[str, str] = {}
         self.lost_messages = 0
+        self.listeners: Counter[str] = Counter()
         self.newcomers: Counter[str] = Counter()
 
     def subscription(
@@ -58,7 +60,7 @@ class QosWatch:
     def publisher(self, message: type, topic: str, profile: QoSProfile) -> Publisher:
         """Make a publisher, and watch its subscribers."""
         callbacks = PublisherEventCallbacks(
-            matched=partial(self._count_newcomers, topic), use_default_callbacks=False
+            matched=partial(self._count_listeners, topic), use_default_callbacks=False
         )
         self._outputs[topic] = self._node.create_publisher(
             message, topic, profile, event_callbacks=callbacks
@@ -97,7 +99,8 @@ class QosWatch:
     def _asked(self, topic: str) -> QoSProfile:
         return self._inputs[topic].qos_profile
 
-    def _count_newcomers(self, topic: str, event: Any) -> None:
+    def _count_listeners(self, topic: str, event: Any) -> None:
+        self.listeners[topic] = event.current_count
         self.newcomers[topic] += event.total_count_change
 
     def _count_lost(self, event: Any) -> None:
