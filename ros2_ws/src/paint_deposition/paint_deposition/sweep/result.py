@@ -76,19 +76,12 @@ class Sweep:
         return [(number, error) for number, error in told if error]
 
     @property
-    def warnings(self) -> list[str]:
-        """What is odd about cases or why they have no result, each reason once."""
-        told = list(self.errors)
-        if WARNINGS in self.table.column_names:
-            told += enumerate(self.table[WARNINGS].to_pylist(), start=1)
-        cases: dict[str, list[int]] = {}
-        for number, line in told:
-            if line:
-                cases.setdefault(line, []).append(number)
-        return [
-            f'case {first}{f" and {len(others)} more" if others else ""}: {line}'
-            for line, (first, *others) in cases.items()
-        ]
+    def warnings(self) -> list[tuple[int, str]]:
+        """Number of each case with an odd film, and what is odd about it."""
+        if WARNINGS not in self.table.column_names:
+            return []
+        told = enumerate(self.table[WARNINGS].to_pylist(), start=1)
+        return [(number, line) for number, line in told if line]
 
     @property
     def judged(self) -> str | None:
