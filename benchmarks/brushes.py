@@ -91,10 +91,8 @@ def table(records: list[dict]) -> str:
 )
 def main(draws: int, each: int, processes: int, scheduler: str | None, results: Path) -> None:
     """Count false alarms and effects found on parts that two brushes painted."""
-    jobs = [(880_000 + k, None) for k in range(draws)]
-    jobs += [
-        (890_000 + 1000 * row + k, truth) for row, truth in enumerate(HIDDEN) for k in range(each)
-    ]
+    hidden = [*[None] * draws, *(truth for truth in HIDDEN for _ in range(each))]
+    jobs = [(880_000 + number, truth) for number, truth in enumerate(hidden)]
     done = {(r['seed'], r['truth']) for r in kept(results)}
     left = [job for job in jobs if job not in done]
     click.echo(table(add(results, run, left, processes, scheduler)))
