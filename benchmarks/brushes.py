@@ -1,24 +1,26 @@
 """How a diagnosis does on parts that two brushes painted: false alarms and effects found.
 
-    python benchmarks/brushes.py [DRAWS] [EFFECTS]
-
 Doors and panels of the virtual paint shop, whose passes take a brush and a narrower one in turn.
-DRAWS times nothing is missing, each with noise of its own; then each of some effects is hidden in
-as many parts as EFFECTS says. Half of the models are calibrated before, half are fitted anew.
+First nothing is missing, each time with noise of its own; then each of some effects is hidden in
+several parts. Half of the models are calibrated before, half are fitted anew. Results are kept
+line by line, so that a run can be cut off and taken up again.
 """
 
 import os
 import sys
 import tempfile
-import time
 from collections import Counter
 from pathlib import Path
 
+import click
+
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
+    os.environ.setdefault(threads, '1')
 
 import numpy as np  # noqa: E402
+from benchmarks.records import add, kept  # noqa: E402
 from tests.virtual_paint_shop.files import write  # noqa: E402
 from tests.virtual_paint_shop.shop import generate  # noqa: E402
 
@@ -53,27 +55,47 @@ def diagnosed(seed: int, truth: str | None) -> Diagnosis:
     return diagnose(door, known.model, posterior=known.posterior)
 
 
-def main() -> None:
-    draws = int(sys.argv[1]) if len(sys.argv) > 1 else 50
-    each = int(sys.argv[2]) if len(sys.argv) > 2 else 6
-    began = time.perf_counter()
-    seeds = iter(range(880_000, 990_000))
-    print(f'{"hidden":24}{"parts":>6}{"named":>7}{"other":>7}{"open":>6}{"none":>6}{"error":>8}')
-    for truth, count in ((None, draws), *((name, each) for name in HIDDEN)):
-        found: Counter[str] = Counter()
-        errors = []
-        for _ in range(count):
-            result = diagnosed(next(seeds), truth)
-            kind = {'none_missing': 'none', 'effect_missing': 'other'}.get(result.verdict, 'open')
-            if truth is not None and truth in result.accepted:
-                kind = 'named'
-            found[kind] += 1
-            rmse = result.to_dict()['rmse_um']
-            errors.append(rmse['holdout_after'] / rmse['holdout_before'])
-        figures = ''.join(f'{found[key]:{w}}' for key, w in
-                          (('named', 7), ('other', 7), ('open', 6), ('none', 6)))  # fmt: skip
-        print(f'{truth or "nothing":24}{count:6}{figures}{np.median(errors):8.2f}', flush=True)
-    print(f'{time.perf_counter() - began:.0f} s')
+def run(job: tuple[int, str | None]) -> list[dict]:
+    """What the diagnosis of one part says, and the error left of that before."""
+    seed, truth = job
+    result = diagnosed(seed, truth)
+    kind = {'none_missing': 'none', 'effect_missing': 'other'}.get(result.verdict, 'open')
+    if truth is not None and truth in result.accepted:
+        kind = 'named'
+    rmse = result.to_dict()['rmse_um']
+    error = rmse['holdout_after'] / rmse['holdout_before']
+    return [{'seed': seed, 'truth': truth, 'kind': kind, 'error': error}]
+
+
+def table(records: list[dict]) -> str:
+    """A line for each hidden effect."""
+    kinds = ('named', 'other', 'open', 'none')
+    lines = [f'{"hidden":24}{"parts":>6}' + ''.join(f'{k:>7}' for k in kinds) + f'{"error":>8}']
+    for truth in (None, *HIDDEN):
+        own = [r for r in records if r['truth'] == truth]
+        if own:
+            found = Counter(r['kind'] for r in own)
+            figures = ''.join(f'{found[kind]:7}' for kind in kinds)
+            error = np.median([r['error'] for r in own])
+            lines.append(f'{truth or "nothing":24}{len(own):6}{figures}{error:8.2f}')
+    return '\n'.join(lines)
+
+
+@click.command()
+@click.option('--draws', default=50, show_default=True, help='Parts with nothing hidden.')
+@click.option('--each', default=6, show_default=True, help='Parts with each hidden effect.')
+@click.option('--processes', default=2, show_default=True)
+@click.option('--scheduler', help='Address of a Dask scheduler, instead of processes here.')
+@click.option(
+    '--results', default=ROOT / 'runs' / 'bench-brushes.jsonl', type=click.Path(path_type=Path)
+)
+def main(draws: int, each: int, processes: int, scheduler: str | None, results: Path) -> None:
+    """Count false alarms and effects found on parts that two brushes painted."""
+    hidden = [*[None] * draws, *(truth for truth in HIDDEN for _ in range(each))]
+    jobs = [(880_000 + number, truth) for number, truth in enumerate(hidden)]
+    done = {(r['seed'], r['truth']) for r in kept(results)}
+    left = [job for job in jobs if job not in done]
+    click.echo(table(add(results, run, left, processes, scheduler)))
 
 
 if __name__ == '__main__':

@@ -188,7 +188,7 @@ def main(count: int, length: int, redraws: int, seed: int) -> None:
     for cause in told['pooled']['causes']:
         print(f'shared: {cause["members"]}, {cause["one_part"]:.1f} standard deviations in one '
               f'part, {cause["all_parts"]:.1f} in all')  # fmt: skip
-    cases, _, _ = line_cases(folder)
+    cases, *_ = line_cases(folder)
     table = Finished(output / 'finished').table(case.digest for case in cases)
     parts = repeated(measured_parts(table.to_pydict()), length)
     step_at = 3 * length // 5

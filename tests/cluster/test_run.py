@@ -75,8 +75,8 @@ def test_what_is_finished_is_kept_when_a_cluster_is_lost(
         if share > 0.0:
             processes[lost].kill()
 
-    with workers(address) as client:
-        with pytest.raises(ManyError, match=f'{words}; finished cases are kept'):
-            run(client, computed, job.cases, job.inputs, finished, kill)
+    refused = pytest.raises(ManyError, match=f'{words}; finished cases are kept')
+    with workers(address) as client, refused:
+        run(client, computed, job.cases, job.inputs, finished, kill)
     kept = list(finished.folder.iterdir())
     assert 1 <= len(kept) < CASES

@@ -23,9 +23,12 @@ def test_a_line_of_twelve_parts_with_a_step(tmp_path):
     done = paint('line', folder, '-o', output, '--workers', 1, '--json')
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert (told['parts'], told['measured'], told['computed']) == (11, 10, 12)
-    assert told['errors'][0]['run'] == names[3]
-    assert f'warning: {names[3]}: ' in done.stderr
+    assert (told['parts'], told['measured'], told['computed']) == (12, 10, 12)
+    assert told['errors'] == []
+    (remark,) = told['remarks']
+    assert remark['part'] == names[3]
+    assert remark['remark'].startswith(f'simulated only: {names[3]}.csv: ')
+    assert f'warning: {names[3]}: simulated only: ' in done.stderr
     (change,) = told['changes']
     assert (change['series'], change['kind']) == ('level', 'step')
     assert change['time'] == date(FIRST.timestamp() + 60.0 * MINUTES * STEP_AT)
@@ -33,8 +36,9 @@ def test_a_line_of_twelve_parts_with_a_step(tmp_path):
     points = pq.read_table(output / 'points.parquet').to_pylist()
     assert sum(row['measured_um'] is not None for row in points) == told['points'] == 120
     parts = pq.read_table(output / 'parts.parquet').to_pylist()
-    assert [row['part'] for row in parts] == [name for name in names if name != names[3]]
-    assert parts[2]['readings'] == 0
+    assert [row['part'] for row in parts] == names
+    assert [row['readings'] for row in parts] == [12, 12, 0, 0] + [12] * 8
+    assert parts[1]['time'].timestamp() == FIRST.timestamp() + 60.0 * MINUTES
     assert parts[2]['film_mean_um'] == pytest.approx(parts[1]['film_mean_um'])
     page = (output / 'report.html').read_text(encoding='utf-8')
     assert 'the film level (K1, or the gain of the gauge) fell by' in page.lower().replace(
@@ -43,7 +47,7 @@ def test_a_line_of_twelve_parts_with_a_step(tmp_path):
     # A new day: only the new run is computed.
     (folder / f'{names[3]}.csv').unlink()
     again = json.loads(paint('line', folder, '-o', output, '--workers', 1, '--json').stdout)
-    assert (again['computed'], again['parts'], again['errors']) == (1, 12, [])
+    assert (again['computed'], again['parts'], again['remarks']) == (1, 12, [])
 
 
 @pytest.mark.parametrize(

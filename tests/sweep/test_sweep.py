@@ -103,7 +103,11 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
         ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
         ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
         ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
-        ({'grid': {'own.gain': [0.1]}}, ["nothing called 'own.gain' can vary"]),
+        ({'grid': {'own.gain': [0.1]}}, ["no effect 'own' is in the library or in a model"]),
+        (
+            {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
+            ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
+        ),
         ({'campaign': str(DOOR / 'campaign.yaml')}, ['speed_factor varies', 'campaign']),
         (
             {'campaign': str(DOOR / 'campaign.yaml'), 'grid': {'planar.K2': [0.1]}},
@@ -117,6 +121,24 @@ def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path,
     path.write_text(yaml.safe_dump(TOLD | inputs | changed))
     assert_refused(paint('sweep', path, '-o', tmp_path / 'out'), *words)
     assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.slow
+def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
+    """Names of files and lists of effects are drawn over, too; a bare part is no best case."""
+    told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
+    told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
+    (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    assert done.returncode == 0, done.stderr
+    assert 'warning: case 1: ' in done.stderr
+    assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
+    assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
+    told['cases'] = told['cases'][:1] * 2
+    (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    done.stderr = done.stderr.splitlines()[-1]  # after the notes
+    assert_refused(done, 'none of 2 cases has a result; case 1: ')
 
 
 def test_a_campaigns_own_model_is_varied(tmp_path):

@@ -16,9 +16,8 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import Progress
 from paint_deposition.cli.results_folder import results_in
-from paint_deposition.cli.sweep import SCHEDULER, WORKERS
-
-MOST_WARNINGS = 5
+from paint_deposition.cli.sweep import MOST_WARNINGS, SCHEDULER, WORKERS, say_warnings
+from paint_deposition.errors import ManyError
 
 
 @click.command('line')
@@ -56,20 +55,24 @@ def line_command(
     require_alone(scheduler, count)
     with Progress('line') as tell:
         tell('reading')
-        cases, file, model = line_cases(folder)
+        cases, file, model, strays = line_cases(folder)
         finished, digests = Finished(output / NAME), [case.digest for case in cases]
         done, told = finish(scheduler, count, computed, cases, {}, finished, tell)
         told = told or 'none: every run had been finished'
         say_all('note', [f'workers: {told}'])
         tell('pooling')
         table = finished.table(digests)
-        found = Line(folder, model, shared_files(folder, file), table, done, told)
+        found = Line(folder, model, shared_files(folder, file), table, done, told, strays)
+        if not found.runs:
+            name, error = found.errors[0]
+            raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
         with results_in(output) as results:
             files = [output / file.name for file in write_line(found, results, pictures)]
-    errors = found.errors
-    say_all('warning', (f'{name}: {error}' for name, error in errors[:MOST_WARNINGS]))
-    if len(errors) > MOST_WARNINGS:
-        say_all('warning', [f'{len(errors) - MOST_WARNINGS} more runs could not be used'])
+    say_warnings([*found.errors, *found.remarks], output / 'line.json')
+    if strays:
+        more = f' and {len(strays) - MOST_WARNINGS} more' if len(strays) > MOST_WARNINGS else ''
+        named = ', '.join(strays[:MOST_WARNINGS])
+        say_all('warning', [f'no recording has the name of {named}{more}; left out'])
     if as_json:
         click.echo((output / 'line.json').read_text(encoding='utf-8'), nl=False)
         return

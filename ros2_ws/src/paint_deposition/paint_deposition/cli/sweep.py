@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import click
@@ -33,8 +33,20 @@ WORKERS = click.option(
 MOST_WARNINGS = 5
 
 
-def say_warnings(lines: Sequence[str], file: Path) -> None:
-    """Print some of many warnings on stderr, and where the others are."""
+def say_warnings(told: Iterable[tuple[str, str]], file: Path) -> None:
+    """Print some of many warnings on stderr, each reason once, and where the others are.
+
+    Args:
+        told: name of a case or part, and what is odd about it.
+        file: that has them all.
+    """
+    named: dict[str, list[str]] = {}
+    for name, reason in told:
+        named.setdefault(reason, []).append(name)
+    lines = [
+        f'{first}{f" and {len(others)} more" if others else ""}: {reason}'
+        for reason, (first, *others) in named.items()
+    ]
     say_all('warning', lines[:MOST_WARNINGS])
     if len(lines) > MOST_WARNINGS:
         say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
@@ -84,10 +96,12 @@ def sweep_command(
         tell('writing and drawing')
         found = Sweep.of(job, finished, done, told)
         if len(found.errors) == len(job.cases):
-            raise ManyError(f'no case has a result; {found.warnings[0]}')
+            number, error = found.errors[0]
+            raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
         with results_in(output) as folder:
             files = [output / file.name for file in write_sweep(found, folder, pictures)]
-    say_warnings(found.warnings, output / 'cases.parquet')
+    odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
+    say_warnings(odd, output / 'cases.parquet')
     if as_json:
         click.echo((output / 'sweep.json').read_text(encoding='utf-8'), nl=False)
         return

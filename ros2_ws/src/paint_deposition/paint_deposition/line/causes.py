@@ -13,6 +13,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.line.measured import Measured
 from paint_deposition.line.part import amplitudes
 from paint_deposition.line.pooling import Pool, Sums, evidence, likeliest, pools
+from paint_deposition.report.words import unit_words
 
 # An effect is accepted if it is so probable that something of the catalogue acts.
 SURE = 0.99
@@ -48,10 +49,10 @@ class Cause:
     def sentence(self) -> str:
         """The cause in a line."""
         others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
+        size = f'{self.value:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
         return (
-            f'{self.effect}{others}: {self.parameter} {self.value:.3g} ± {self.sd:.2g} '
-            f'{self.unit}; {self.all_parts:.1f} standard deviations over all parts, '
-            f'{self.one_part:.1f} in one'
+            f'{self.effect}{others}: {self.parameter} {size}; '
+            f'{self.all_parts:.1f} standard deviations over all parts, {self.one_part:.1f} in one'
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.ndimage import median_filter
 
 from paint_deposition.line.series import Series
+from paint_deposition.report.words import unit_words
 
 # A segment has at least so many parts.
 SHORTEST = 3
@@ -62,10 +63,13 @@ class Change:
             others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
             what = f'{self.series}{others}'
         way = 'rose' if self.after > self.before else 'fell'
-        size = f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {self.unit}'
+        size = (
+            f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
+        )
         ends = date(self.earliest_s), date(self.latest_s)
         within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
-        others = f'; {len(self.also)} other charts changed with it' if self.also else ''
+        charts = 'another chart' if len(self.also) == 1 else f'{len(self.also)} other charts'
+        others = f'; {charts} changed with it' if self.also else ''
         if self.kind == 'drift':
             return f'{what} {way} since {date(self.time_s)} by {size} in all{within}{others}'
         return f'{what} {way} by {size} on {date(self.time_s)}{within}{others}'

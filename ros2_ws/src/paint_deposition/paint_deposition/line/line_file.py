@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
@@ -16,7 +17,7 @@ from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
 NAME, CAMPAIGN = 'line.yaml', 'campaign.yaml'
 BAGS = ('.bag', '.mcap')
-TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
+TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
 
 
 class LineFile(MotionSource, extra='forbid'):
@@ -44,11 +45,15 @@ class Run:
         name: of its folder or file.
         path: a recording, or a campaign file.
         readings: a file of gauge readings on the part, or None.
+        problem: why it cannot be used, '' if it can.
+        remark: why its readings are not used, '' if they are.
     """
 
     name: str
     path: Path
     readings: Path | None = None
+    problem: str = ''
+    remark: str = ''
 
     @property
     def is_campaign(self) -> bool:
@@ -74,31 +79,62 @@ def read_line(folder: Path) -> LineFile:
     return file.model_copy(update={'urdf': file.urdf and str(folder / file.urdf)})
 
 
-def runs_in(folder: Path) -> list[Run]:
-    """The runs of a folder, by name.
+def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[str]]:
+    """The runs of a folder, by name, and names of files like readings that belong to none.
 
     A run is a recording (a folder of rosbag2, a .bag or a .mcap) with its readings, if any, beside
     it under the same name; or a folder with a campaign.yaml.
 
+    Args:
+        folder: of the line.
+        shared: files in it that are no readings, such as measuring points.
+
     Raises:
-        ManyError: there is none, or readings that belong to no run.
+        ManyError: there is no run.
     """
-    runs = []
-    for path in sorted(folder.iterdir()):
+    recordings: dict[str, list[Path]] = {}
+    readings: dict[str, list[Path]] = {}
+    for path in sorted(set(folder.iterdir()) - set(shared)):
+        if path.name.startswith('.'):
+            continue
         if path.is_dir() and (path / CAMPAIGN).is_file():
-            runs.append(Run(path.name, path / CAMPAIGN))
-        elif (path / 'metadata.yaml').is_file():
-            runs.append(Run(path.name, path, _beside(folder, path.name)))
-        elif path.suffix in BAGS:
-            runs.append(Run(path.stem, path, _beside(folder, path.stem)))
+            recordings.setdefault(path.name, []).append(path / CAMPAIGN)
+        elif path.is_dir() and _is_bag(path):
+            recordings.setdefault(path.name, []).append(path)
+        elif path.suffix.lower() in BAGS:
+            recordings.setdefault(path.stem, []).append(path)
+        elif path.suffix.lower() in TABLES:
+            readings.setdefault(path.stem, []).append(path)
+    runs = [
+        _run(name, paths, [] if paths[0].name == CAMPAIGN else readings.pop(name, []))
+        for name, paths in recordings.items()
+    ]
     if not runs:
         raise ManyError(
             f'{folder}: holds no run; put recordings there (a rosbag2 folder, .bag or .mcap) and '
             'their readings beside them, under the same name'
         )
-    return runs
+    return runs, [path.name for paths in readings.values() for path in paths]
 
 
-def _beside(folder: Path, name: str) -> Path | None:
-    places = (folder / f'{name}{suffix}' for suffix in TABLES)
-    return next((place for place in places if place.is_file()), None)
+def _is_bag(folder: Path) -> bool:
+    """Whether it holds a bag, one that was cut off and has no metadata included."""
+    return any(
+        ((folder / 'metadata.yaml').is_file(), *folder.glob('*.mcap'), *folder.glob('*.db3'))
+    )
+
+
+def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
+    """The run of a name; what cannot be told apart is not guessed."""
+    if len(recordings) > 1:
+        problem = f'two recordings have its name, {_names(recordings)}; rename one'
+        return Run(name, recordings[0], problem=problem)
+    if len(readings) > 1:
+        remark = f'two files of readings have its name, {_names(readings)}; keep one'
+        return Run(name, recordings[0], remark=remark)
+    return Run(name, recordings[0], readings[0] if readings else None)
+
+
+def _names(paths: list[Path]) -> str:
+    """Of recordings and readings that stand beside each other in the folder of the line."""
+    return ' and '.join(p.parent.name if p.name == CAMPAIGN else p.name for p in paths)

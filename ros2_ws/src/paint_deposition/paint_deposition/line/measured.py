@@ -39,12 +39,13 @@ class Measured:
 
 
 def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
-    """The measured parts among the rows of all runs, oldest first."""
+    """The measured parts of the line's mesh among the rows of all runs, oldest first."""
     if 'measured_um' not in columns:
         return []
     rows_of: dict[str, list[int]] = {}
-    for row, (part, value) in enumerate(zip(columns['part'], columns['measured_um'], strict=True)):
-        if value is not None:
+    told = zip(columns['part'], columns['measured_um'], columns['pooled'], strict=True)
+    for row, (part, value, pooled) in enumerate(told):
+        if value is not None and pooled:
             rows_of.setdefault(part, []).append(row)
 
     def taken(name: str, rows: list[int]) -> np.ndarray:

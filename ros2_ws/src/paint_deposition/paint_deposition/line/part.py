@@ -20,6 +20,7 @@ from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.provenance import sha256
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.fitting.forward import Forward
@@ -44,15 +45,22 @@ def computed(given: Mapping[str, Any]) -> Columns:
     """Rows of a run: one for each point measured, or one if nothing was measured.
 
     Args:
-        given: ``run``, ``file`` (the line's), ``folder`` and ``model``.
+        given: ``run``, ``file`` (the line's), ``folder``, ``model``, and ``mesh``, the digest of
+            the line's mesh.
 
-    A run that cannot be used says why in the column ``error``.
+    A run that cannot be used says why in the column ``error``. A part whose readings cannot be
+    used, or that is of another mesh than the line's, says so in ``remark``.
     """
     run: Run = given['run']
+    rows: list[dict[str, Any]] = []
     try:
-        rows = list(_rows(run, given['file'], Path(given['folder']), given['model']))
+        if run.problem:
+            raise ManyError(run.problem)
+        rows.extend(
+            _rows(run, given['file'], Path(given['folder']), given['model'], given['mesh'])
+        )
     except PaintError as error:
-        rows = [{'part': run.name, 'error': str(error)}]
+        rows.append({'part': run.name, 'error': str(error)})
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}
 
@@ -63,15 +71,23 @@ def amplitudes() -> list[tuple[str, str]]:
 
 
 def _rows(
-    run: Run, file: LineFile, folder: Path, model: DepositionModel
+    run: Run, file: LineFile, folder: Path, model: DepositionModel, mesh: str
 ) -> Iterator[dict[str, Any]]:
     if run.is_campaign:
-        campaign = read_campaign(run.path, part_pose=file.part_pose)
+        odd: list[str] = []
+        campaign = read_campaign(run.path, odd.append, file.part_pose)
         time_s = _date(campaign.head.get('date', ''), run)
         for experiment in campaign.experiments:
             name = run.name if len(campaign.experiments) == 1 else f'{run.name}/{experiment.name}'
+            warning = f'warning: {experiment.name}: '
+            remarks = [line.removeprefix(warning) for line in odd if line.startswith(warning)]
+            pooled = sha256(experiment.files['mesh']) == mesh
+            if not pooled:
+                other = Path(experiment.files['mesh']).name
+                remarks.append(f'not pooled: {other} is another mesh than {file.mesh}')
             painted = _film(experiment.surface, experiment.path, model)
-            about = {'part': name, 'time_s': time_s, **painted}
+            about = {'part': name, 'time_s': time_s, 'remark': '; '.join(remarks),
+                     'pooled': pooled, **painted}  # fmt: skip
             yield from _measured(about, experiment, model)
         return
     surface = _surface(folder, file)
@@ -79,14 +95,23 @@ def _rows(
     seen = look_at(surface, motion, model, max_pose_gap_s=file.max_pose_gap_s)
     stamp_s = 1e-9 * float(motion.stamps_ns[0])
     time_s = stamp_s if stamp_s > EARLIEST_S else _date(run.name, run)
-    about = {'part': run.name, 'time_s': time_s, **_film(seen.surface, seen.path, model)}
-    if run.readings is None:
-        yield about
-        return
-    points = folder / file.points if file.points else None
-    readings = read_readings(run.readings, points, surface=seen.surface)
-    experiment = Experiment.of(run.name, seen.surface, seen.path, readings)
-    yield from _measured(about, experiment, model)
+    painted = _film(seen.surface, seen.path, model)
+    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
+    remarks += seen.geometry.warnings
+    unused = run.remark
+    rows: list[dict[str, Any]] = []
+    if run.readings is not None:
+        points = folder / file.points if file.points else None
+        try:
+            readings = read_readings(run.readings, points, surface=seen.surface)
+            experiment = Experiment.of(run.name, seen.surface, seen.path, readings)
+            rows.extend(_measured({}, experiment, model))
+        except PaintError as error:
+            unused = str(error).removeprefix(f'{folder}/')
+    remarks += [f'simulated only: {unused}'] if unused else []
+    about = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks), 'pooled': True}
+    for row in rows or [{}]:
+        yield about | painted | row
 
 
 def _date(text: str, run: Run) -> float:

@@ -18,9 +18,18 @@ from paint_deposition.line.series import FEWEST, RUN_LENGTH, Series
 from paint_deposition.report.page.layout import axis, base_layout
 from paint_deposition.report.page.report import TEMPLATES as SHARED
 from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK
+from paint_deposition.report.words import unit_words
 
 TEMPLATES = Path(__file__).parent / 'templates'
 HEIGHT = 240
+MARGIN = 0.03
+# Words, colour and kind of what the charts of a series show.
+LEGEND = (
+    ('part', ACCENT, 'dot'), ('centre', INK, 'line'), ("Shewhart's limits", BEFORE, 'dots'),
+    ('change', COMPONENTS[0], 'bold'), ('EWMA', ACCENT, 'line'), ('its limits', ACCENT, 'dots'),
+    ('CUSUM upwards', COMPONENTS[0], 'line'), ('CUSUM downwards', COMPONENTS[1], 'line'),
+    ('their limits', BEFORE, 'dashes'),
+)  # fmt: skip
 
 
 def write_line_report(path: Path, line: Line) -> Path:
@@ -46,7 +55,7 @@ def line_html(line: Line) -> str:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
-    environment.filters['date'] = date
+    environment.filters |= {'date': date, 'unit': unit_words}
     charts = {'films': _films(line)}
     for number, one in enumerate(line.series):
         charts[f'values-{number}'] = _values(line, one)
@@ -59,6 +68,7 @@ def line_html(line: Line) -> str:
         model=model_digest(line.model)[:12],
         fewest=FEWEST,
         run_length=RUN_LENGTH,
+        legend=LEGEND,
         style=(SHARED / 'report.css').read_text(encoding='utf-8'),
         charts=json.dumps(charts, allow_nan=False).replace('<', '\\u003c'),
         plotly=get_plotlyjs(),
@@ -70,12 +80,12 @@ def _values(line: Line, series: Series) -> dict[str, Any]:
     times = _times(line.times_s)
     limit = series.charts.shewhart_limit * series.deviation
     names = [part.name for part in line.parts]
-    data: list[dict[str, Any]] = [
-        {
-            'x': times, 'y': _numbers(series.values), 'text': names, 'mode': 'markers',
-            'marker': {'color': ACCENT, 'size': 5}, 'name': 'part',
-            'hovertemplate': '%{text}: %{y:.3g}<extra></extra>',
-        },
+    part = {
+        'x': times, 'y': _numbers(series.values), 'text': names, 'mode': 'markers',
+        'marker': {'color': ACCENT, 'size': 5}, 'name': 'part',
+        'hovertemplate': '%{text}: %{y:.3g}<extra></extra>',
+    }  # fmt: skip
+    data = [
         *(_level(times, edge, BEFORE, 'dot', 'limit')
           for edge in (series.centre - limit, series.centre + limit)),
         _level(times, np.full(len(times), series.centre), INK, 'solid', 'centre'),
@@ -86,9 +96,8 @@ def _values(line: Line, series: Series) -> dict[str, Any]:
         y = level if change.kind == 'drift' else [change.after] * 2
         data.append({'x': x, 'y': y, 'mode': 'lines', 'name': change.kind,
                      'line': {'color': COMPONENTS[0], 'width': 3}})  # fmt: skip
-    unit = f'{series.name} [{series.unit}]'
-    return {'data': data, 'layout': base_layout(
-        height=HEIGHT, xaxis=axis(), yaxis=axis(unit)
+    return {'data': [*data, part], 'layout': base_layout(
+        height=HEIGHT, xaxis=axis(range=_span(line.times_s)), yaxis=axis(unit_words(series.unit))
     )}  # fmt: skip
 
 
@@ -105,8 +114,13 @@ def _sums(line: Line, series: Series) -> dict[str, Any]:
         _level(times, np.full(count, -drawn.cusum_limit), BEFORE, 'dash', 'limit of the CUSUM'),
     ]
     return {'data': data, 'layout': base_layout(
-        height=HEIGHT, xaxis=axis(), yaxis=axis('standard deviations')
+        height=HEIGHT, xaxis=axis(range=_span(line.times_s)), yaxis=axis('standard deviations')
     )}  # fmt: skip
+
+
+def _span(times_s: np.ndarray) -> list[str]:
+    """Ends of the time axis, a little wider than the parts."""
+    return _times(times_s[[0, -1]] + np.array([-MARGIN, MARGIN]) * np.ptp(times_s))
 
 
 def _films(line: Line) -> dict[str, Any]:

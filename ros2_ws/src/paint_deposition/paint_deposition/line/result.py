@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -33,6 +33,7 @@ class Line:
         folder: of the runs. model: all were set beside. files: shared by all, by what they are.
         table: a row for each part and point, in the order of the runs.
         computed: how many runs were computed now. workers: what computed them, in words.
+        strays: names of files of the folder that belong to no run.
     """
 
     folder: Path
@@ -41,6 +42,7 @@ class Line:
     table: pa.Table
     computed: int
     workers: str
+    strays: Sequence[str] = ()
 
     @cached_property
     def parts(self) -> list[Measured]:
@@ -72,7 +74,7 @@ class Line:
     @cached_property
     def runs(self) -> list[dict[str, Any]]:
         """The first row of each part without its point, oldest first."""
-        names = ['part', 'time_s', *(f'film_{name}' for name in FIGURES)]
+        names = ['part', 'time_s', 'remark', 'pooled', *(f'film_{name}' for name in FIGURES)]
         there = [name for name in names if name in self.table.column_names]
         if 'time_s' not in there:
             return []
@@ -89,6 +91,11 @@ class Line:
             return []
         told = self.table.select(['part', 'error']).to_pylist()
         return [(row['part'], row['error']) for row in told if row['error']]
+
+    @cached_property
+    def remarks(self) -> list[tuple[str, str]]:
+        """Name of each part that has something odd about it, and what, oldest first."""
+        return [(run['part'], run['remark']) for run in self.runs if run.get('remark')]
 
     @property
     def sentence(self) -> str:
@@ -143,6 +150,8 @@ class Line:
             'false_alarms': {'one_in_parts': RUN_LENGTH},
             'changes': [change.to_dict() for change in self.changes],
             'errors': [{'run': name, 'error': error} for name, error in self.errors],
+            'remarks': [{'part': name, 'remark': remark} for name, remark in self.remarks],
+            'without_run': list(self.strays),
             'provenance': origin(self.model, self.files),
         }  # fmt: skip
 

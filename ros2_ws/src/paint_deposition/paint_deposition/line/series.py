@@ -73,11 +73,6 @@ class Series:
         return charts(self.standard, self.run_length)
 
 
-def unit_words(unit: str) -> str:
-    """A parameter's unit for the user."""
-    return unit.replace('um', 'µm')
-
-
 def baseline_of(count: int) -> int:
     """How many first parts tell the centre."""
     return int(np.clip(count // 3, min(FEWEST // 2, count), MOST_BASELINE))
@@ -114,7 +109,7 @@ def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
         info = EFFECTS[effect].parameters()[parameter]
         members = tuple('.'.join(names[k]) for k in group)
         found.append(Series(
-            members[0], unit_words(info['unit']), members,
+            members[0], info['unit'], members,
             info['neutral'] + info['typical'] * amounts[:, group[0]],
             info['typical'] * amounts_sd[:, group[0]], base, spending * len(groups),
         ))  # fmt: skip

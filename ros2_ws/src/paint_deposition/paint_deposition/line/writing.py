@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,8 +21,8 @@ def write_line(line: Line, folder: Path, pictures: str = 'png') -> list[Path]:
     table = line.table
     own = [name for name in DERIVATIVES if name in table.column_names]
     files = [
-        write_parquet(folder / 'points.parquet', table.drop_columns(own)),
-        write_parquet(folder / 'parts.parquet', _parts(line)),
+        write_parquet(folder / 'points.parquet', _with_time(table.drop_columns(own))),
+        write_parquet(folder / 'parts.parquet', _with_time(_parts(line))),
         folder / 'line.json',
     ]
     write_json(files[-1], line.to_dict())
@@ -34,17 +35,27 @@ def _parts(line: Line) -> pa.Table:
     """A row for each part: when, its film as computed, and what its readings say."""
     import pyarrow as pa
 
+    columns = line.table.to_pydict()
+    there = columns.get('measured_um', [])
+    measured = Counter(
+        p for p, value in zip(columns['part'], there, strict=False) if value is not None
+    )
     place = {part.name: row for row, part in enumerate(line.parts)}
     rows: list[dict[str, Any]] = []
     for run in line.runs:
         row = place.get(run['part'])
-        told: dict[str, Any] = {'readings': 0 if row is None else len(line.parts[row])}
+        told: dict[str, Any] = {'readings': measured[run['part']]}
         for series in line.series:
-            told[series.name] = None if row is None else float(series.values[row])
-            told[f'{series.name}_sd'] = None if row is None else float(series.sd[row])
+            name = {'level': 'level_percent'}.get(series.name, series.name)
+            told[name] = None if row is None else float(series.values[row])
+            told[f'{name}_sd'] = None if row is None else float(series.sd[row])
         rows.append(run | told)
-    table = pa.Table.from_pylist(rows)
-    if 'time_s' not in table.column_names:
-        return table
-    times = pa.array([round(1e6 * run['time_s']) for run in rows], pa.timestamp('us', 'UTC'))
-    return table.append_column('time', times)
+    return pa.Table.from_pylist(rows)
+
+
+def _with_time(table: pa.Table) -> pa.Table:
+    """With the column ``time_s``, seconds since 1970, also as date and time."""
+    import pyarrow as pa
+
+    microseconds = [None if s is None else round(1e6 * s) for s in table['time_s'].to_pylist()]
+    return table.append_column('time', pa.array(microseconds, pa.timestamp('us', 'UTC')))

@@ -213,6 +213,11 @@ class Job:
                 f'{remedy}'
             )
         passes = file.passes.model_dump() | {n: values[n] for n in OF_PASSES if n in values}
+        if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
+            raise ManyError(
+                'passes are planned, but neither their speed nor a target is told; give passes: '
+                '{speed_m_per_s: ...}, passes: {target_um: ...}, or a trajectory'
+            )
         return {
             'motion': {name: values[name] for name in OF_MOTION if name in values},
             'passes': passes if planned else {},

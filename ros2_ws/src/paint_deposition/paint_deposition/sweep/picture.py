@@ -24,7 +24,8 @@ def write_sweep_picture(
 
     Args:
         path: PNG, SVG or PDF.
-        varied, results: (n,) of the cases, by name and by label; NaN is left out.
+        varied: (n,) of the cases by name: numbers, NaN is left out, or texts.
+        results: (n,) of the cases by label; NaN is left out.
         title: above all.
     """
     names = list(varied)[:MOST_COLUMNS]
@@ -41,11 +42,14 @@ def write_sweep_picture(
 
 
 def _draw(axes: Axes, values: np.ndarray, result: np.ndarray, in_order: bool) -> None:
-    there = np.isfinite(values) & np.isfinite(result)
+    is_text = values.dtype.kind == 'U'
+    there = np.isfinite(result) & (True if is_text else np.isfinite(values))
+    if not there.any():
+        return
     values, result = values[there], result[there]
     axes.scatter(values, result, s=14, color=ACCENT, alpha=0.55, linewidths=0)
     places = np.unique(values)
-    if in_order and 1 < len(places) <= FEW_VALUES and len(values) > len(places):
+    if in_order and not is_text and 1 < len(places) <= FEW_VALUES and len(values) > len(places):
         medians = [np.median(result[values == place]) for place in places]
         axes.plot(places, medians, color=ACCENT, linewidth=1.4)
     # Rounding alone is no result: the chart does not magnify it.

@@ -21,6 +21,8 @@ from paint_deposition.sweep.picture import write_sweep_picture
 if TYPE_CHECKING:
     import pyarrow as pa
 
+# What a case says that leaves a thing, or everything, as the sweep's file has it.
+UNCHANGED = 'unchanged'
 # What is judged and drawn, of films and of campaigns, each with its label; less is better.
 JUDGED = {'sigma_n': 'unevenness σ_N', 'rmse_um': 'error at the readings [µm]'}
 LEVELS = {'mean_um': 'mean film [µm]', 'level': 'measured over predicted'}
@@ -76,19 +78,12 @@ class Sweep:
         return [(number, error) for number, error in told if error]
 
     @property
-    def warnings(self) -> list[str]:
-        """What is odd about cases or why they have no result, each reason once."""
-        told = list(self.errors)
-        if WARNINGS in self.table.column_names:
-            told += enumerate(self.table[WARNINGS].to_pylist(), start=1)
-        cases: dict[str, list[int]] = {}
-        for number, line in told:
-            if line:
-                cases.setdefault(line, []).append(number)
-        return [
-            f'case {first}{f" and {len(others)} more" if others else ""}: {line}'
-            for line, (first, *others) in cases.items()
-        ]
+    def warnings(self) -> list[tuple[int, str]]:
+        """Number of each case with an odd film, and what is odd about it."""
+        if WARNINGS not in self.table.column_names:
+            return []
+        told = enumerate(self.table[WARNINGS].to_pylist(), start=1)
+        return [(number, line) for number, line in told if line]
 
     @property
     def judged(self) -> str | None:
@@ -121,6 +116,7 @@ class Sweep:
         if self.best is not None:
             told = self.job.values[self.best]
             shown = ', '.join(f'{name} {_short(value)}' for name, value in told.items())
+            shown = shown or UNCHANGED
             yield f'best by {JUDGED[str(self.judged)]}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:
@@ -153,11 +149,11 @@ def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
     drawn = [(name, label) for name, label in (JUDGED | LEVELS).items() if name in names]
-    numbers = {name: sweep.column(name) for name in sweep.varied if _is_number_column(sweep, name)}
-    if drawn and numbers:
+    over = {name: _drawn_over(sweep, name) for name in sweep.varied if name != 'part_pose'}
+    if drawn and over:
         results = {label: sweep.column(name) for name, label in drawn}
         picture = folder / f'sweep.{pictures}'
-        files.append(write_sweep_picture(picture, numbers, results, sweep.sentence))
+        files.append(write_sweep_picture(picture, over, results, sweep.sentence))
     return files
 
 
@@ -192,9 +188,19 @@ def _column(values: Sequence[Any]) -> pa.Array:
     return pa.array(values)
 
 
-def _is_number_column(sweep: Sweep, name: str) -> bool:
-    given = [values[name] for values in sweep.job.values if name in values]
-    return all(isinstance(value, int | float) for value in given)
+def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
+    """(n,) numbers that varied, or texts: what files are called, which effects act."""
+    told = getattr(sweep.job.file, name, None)
+    given = [values.get(name, told) for values in sweep.job.values]
+    if all(isinstance(value, int | float) for value in given if value is not None):
+        return sweep.column(name)
+    return np.array([_words(value) for value in given])
+
+
+def _words(value: list[str] | str | None) -> str:
+    if isinstance(value, list):
+        return '\n'.join(value) or 'none'
+    return value.replace('/', '/\n') if value else UNCHANGED
 
 
 def _spread(values: np.ndarray) -> dict[str, float]:

@@ -109,6 +109,13 @@ def _draws(file: SweepFile) -> list[Values]:
 def _require_known(name: str, known: Sequence[str]) -> None:
     if name not in known:
         near = [other for other in known if other.split('.')[-1] == name]
+        owner, dot, _ = name.partition('.')
+        if dot and not any(other.startswith(f'{owner}.') for other in known):
+            owners = dict.fromkeys(other.partition('.')[0] for other in known if '.' in other)
+            raise ManyError(
+                f'{name} cannot vary: no effect {owner!r} is in the library or in a model of the '
+                f'sweep; {did_you_mean(owner, owners)}'
+            )
         remedy = f'did you mean {near[0]!r}?' if near else did_you_mean(name, known)
         raise ManyError(f'nothing called {name!r} can vary; {remedy}')
 
