@@ -138,7 +138,11 @@ class Principal:
         return (self.columns.T @ deviation / precision) @ self.axes.T
 
     def log_bayes_factors(
-        self, deviations: np.ndarray, sizes: np.ndarray, freedom: float
+        self,
+        deviations: np.ndarray,
+        sizes: np.ndarray,
+        freedom: float,
+        shifts: np.ndarray | None = None,
     ) -> np.ndarray:
         """(S, D) log Bayes factors against the null hypothesis, at S sizes, for D deviations.
 
@@ -146,8 +150,14 @@ class Principal:
             deviations: (P, D) whitened.
             sizes: (S,) standard deviations of the amplitudes before the readings.
             freedom: degrees of freedom of the noise estimate.
+            shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
+        if shifts is not None:
+            added = (self.columns.T @ shifts)[:, :, np.newaxis]
+            scores = (added + scores[:, np.newaxis]).reshape(len(scores), -1)
+            both = np.sum(shifts**2, axis=0)[:, np.newaxis] + 2.0 * shifts.T @ deviations
+            squares = (squares + both).ravel()
         sizes = sizes[:, np.newaxis]
         precision = 1.0 + sizes**2 * self.squares
         explained = (sizes**2 / precision) @ scores**2

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 
 from paint_deposition.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
@@ -113,7 +113,7 @@ class ModelSpace:
     def probabilities(self) -> np.ndarray:
         """Posterior probability of each of ``models``."""
         weights = np.array([m.log_weight for m in self.models])
-        return np.exp(weights - logsumexp(weights))
+        return np.exp(weights - np.logaddexp.reduce(weights))
 
     def inclusion(self, *causes: str) -> float:
         """Posterior probability that at least one of these causes acts."""
@@ -240,24 +240,32 @@ class ModelSpace:
         """(P, DRAWS) whitened deviations behind ``null_evidence``."""
         return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
 
-    def evidence(self, deviations: np.ndarray, chosen: Iterable[int] | None = None) -> np.ndarray:
+    def evidence(
+        self,
+        deviations: np.ndarray,
+        chosen: Iterable[int] | None = None,
+        shifts: np.ndarray | None = None,
+    ) -> np.ndarray:
         """(D,) log evidence that any cause acts, averaged, for whitened deviations (P, D).
 
         Args:
             deviations: of the readings, or simulated.
             chosen: numbers of explanations; default: all.
+            shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         terms = []
         for k in range(len(self.explanations)) if chosen is None else chosen:
             explanation = self.explanations[k]
             odds = self._log_odds[self.causes.index(explanation.cause)]
             share = np.log(explanation.share / len(SIZES))
-            terms.append(logsumexp(self._by_size(k, deviations), axis=0) + share + odds)
-        return logsumexp(terms, axis=0)
+            terms.append(np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + share + odds)
+        return np.logaddexp.reduce(terms)
 
-    def _by_size(self, k: int, deviations: np.ndarray) -> np.ndarray:
+    def _by_size(
+        self, k: int, deviations: np.ndarray, shifts: np.ndarray | None = None
+    ) -> np.ndarray:
         """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
-        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom)
+        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
 
     @cached_property
     def _alone(self) -> list[Model]:
@@ -269,10 +277,12 @@ class ModelSpace:
             factors = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
             values = factors + self._log_share_alone[numbers]
             k, s = np.unravel_index(values.argmax(), values.shape)
-            weight = float(logsumexp(values)) + self._log_odds[number]
+            weight = float(np.logaddexp.reduce(values, axis=None)) + self._log_odds[number]
             any_form = factors + self._log_share[numbers]
             best = factors.flat[any_form.argmax()]
-            self._averaging[cause] = float(logsumexp(any_form)) + self._log_odds[number] - best
+            self._averaging[cause] = (
+                float(np.logaddexp.reduce(any_form, axis=None)) + self._log_odds[number] - best
+            )
             found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
         return found
 

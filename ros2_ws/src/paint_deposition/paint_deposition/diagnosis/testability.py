@@ -90,8 +90,7 @@ def power_along(
     """
     chosen, count = _following(space, direction), draws.shape[1]
     rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
-    moved = draws[:, np.newaxis] + np.multiply.outer(direction, ratios)[:, :, np.newaxis]
-    along = space.evidence(moved.reshape(len(direction), -1), chosen)
+    along = space.evidence(draws, chosen, np.multiply.outer(direction, ratios))
     evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
     return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
 
