@@ -122,10 +122,9 @@ class Principal:
         """(m,) squared lengths of the directions."""
         return np.sum(self.columns**2, axis=0)
 
-    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> float:
-        """By how many standard deviations original amplitudes (n,), or some of them, move all."""
-        along = self.axes[some].T @ amplitudes[some]
-        return math.sqrt(self.squares @ along**2)
+    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> np.ndarray:
+        """(...) standard deviations by which original amplitudes (..., n), or some, move all."""
+        return np.sqrt((amplitudes[..., some] @ self.axes[some]) ** 2 @ self.squares)
 
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.

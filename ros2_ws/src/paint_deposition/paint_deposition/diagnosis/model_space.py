@@ -20,6 +20,7 @@ from paint_deposition.diagnosis.joint_evidence import (
     NEVER,
     Directions,
     log_evidence,
+    log_evidence_alone,
     log_evidence_of_each,
     refine,
 )
@@ -166,18 +167,16 @@ class ModelSpace:
         """The explanation of an effect by its law, its size and log evidence, if it acts alone."""
         first, last = self._first[self.causes.index(cause)], self._last[self.causes.index(cause)]
         laws = [k for k in range(first, last) if self.explanations[k].sensitivity is not None]
-        deviation = self.null.deviation[:, np.newaxis]
-        values = np.array([self._by_size(k, deviation)[:, 0] for k in laws])
+        values = self._factors_alone[laws]
         k, s = np.unravel_index(values.argmax(), values.shape)
         return laws[k], float(SIZES[s]), float(values[k, s])
 
     def _physical_sizes(self, k: int) -> np.ndarray:
         """(S,) whether an explanation, alone at each size, is what its cause can be."""
-        amounts = self.principal[k].amplitudes(self.null.deviation, SIZES)
-        return np.array([self._is_physical(k, a) for a in amounts])
+        return self._is_physical(k, self.principal[k].amplitudes(self.null.deviation, SIZES))
 
-    def _is_physical(self, k: int, amounts: np.ndarray) -> bool:
-        """Whether an explanation with these amplitudes is what its cause can be.
+    def _is_physical(self, k: int, amounts: np.ndarray) -> np.ndarray:
+        """(...) whether an explanation with amplitudes (..., n) is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
@@ -187,7 +186,7 @@ class ModelSpace:
         of_law = len(explanation.sensitivity.names)
         law = own.length(amounts, slice(of_law))
         error = own.length(amounts, slice(of_law, None))
-        return error <= max(NOTICED, LARGEST_ERROR * law)
+        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
     @cached_property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -268,13 +267,17 @@ class ModelSpace:
         return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
 
     @cached_property
+    def _factors_alone(self) -> np.ndarray:
+        """(K, S) log Bayes factors of each explanation alone at every size."""
+        return log_evidence_alone(self._directions, SIZES)
+
+    @cached_property
     def _alone(self) -> list[Model]:
         """One cause each: its evidence averaged, and its best explanation."""
         found = []
-        deviation = self.null.deviation[:, np.newaxis]
         for number, cause in enumerate(self.causes):
             numbers = range(self._first[number], self._last[number])
-            factors = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
+            factors = self._factors_alone[numbers]
             values = factors + self._log_share_alone[numbers]
             k, s = np.unravel_index(values.argmax(), values.shape)
             weight = float(np.logaddexp.reduce(values, axis=None)) + self._log_odds[number]
