@@ -98,7 +98,7 @@ def power_along(
 def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
     """Numbers of the explanations that take up most of a direction."""
     taken = [
-        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + np.sum(own.columns**2, axis=0))))
+        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))
         for own in space.principal
     ]
     return np.argsort(taken)[::-1][:FOLLOWING].tolist()
