@@ -245,3 +245,13 @@ def test_directions_that_nothing_shows_do_not_count(count: int) -> None:
     mean = 0.49 * columns.T @ np.linalg.solve(covariance, data[:, 0])
     np.testing.assert_allclose(amounts, mean, atol=1e-8)
     assert found.length(amounts) == pytest.approx(float(np.linalg.norm(columns @ amounts)))
+
+
+@pytest.mark.parametrize('side', [0.0, 1.0])
+def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
+    draws = simulated(READINGS, 8.0, 4, seed=6)
+    shifts = np.random.default_rng(8).normal(size=(READINGS, 3))
+    moved = (draws[:, np.newaxis] + shifts[:, :, np.newaxis]).reshape(READINGS, -1)
+    principal = Principal.of(columns, np.array([side, 0.0, 0.0]))
+    expected = principal.log_bayes_factors(moved, SIZES, 8.0)
+    np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)

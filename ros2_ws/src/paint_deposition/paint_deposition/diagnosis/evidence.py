@@ -122,10 +122,9 @@ class Principal:
         """(m,) squared lengths of the directions."""
         return np.sum(self.columns**2, axis=0)
 
-    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> float:
-        """By how many standard deviations original amplitudes (n,), or some of them, move all."""
-        along = self.axes[some].T @ amplitudes[some]
-        return math.sqrt(self.squares @ along**2)
+    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> np.ndarray:
+        """(...) standard deviations by which original amplitudes (..., n), or some, move all."""
+        return np.sqrt((amplitudes[..., some] @ self.axes[some]) ** 2 @ self.squares)
 
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.
@@ -138,7 +137,11 @@ class Principal:
         return (self.columns.T @ deviation / precision) @ self.axes.T
 
     def log_bayes_factors(
-        self, deviations: np.ndarray, sizes: np.ndarray, freedom: float
+        self,
+        deviations: np.ndarray,
+        sizes: np.ndarray,
+        freedom: float,
+        shifts: np.ndarray | None = None,
     ) -> np.ndarray:
         """(S, D) log Bayes factors against the null hypothesis, at S sizes, for D deviations.
 
@@ -146,8 +149,14 @@ class Principal:
             deviations: (P, D) whitened.
             sizes: (S,) standard deviations of the amplitudes before the readings.
             freedom: degrees of freedom of the noise estimate.
+            shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         scores, squares = self.columns.T @ deviations, np.sum(deviations**2, axis=0)
+        if shifts is not None:
+            added = (self.columns.T @ shifts)[:, :, np.newaxis]
+            scores = (added + scores[:, np.newaxis]).reshape(len(scores), -1)
+            both = np.sum(shifts**2, axis=0)[:, np.newaxis] + 2.0 * shifts.T @ deviations
+            squares = (squares + both).ravel()
         sizes = sizes[:, np.newaxis]
         precision = 1.0 + sizes**2 * self.squares
         explained = (sizes**2 / precision) @ scores**2

@@ -74,15 +74,15 @@ class Explanation:
     directions: tuple[int, ...] = ()
     description: str = ''
 
-    def goes_right(self, amounts: np.ndarray) -> bool:
-        """Whether the law with these amplitudes (n,) goes in a direction of its cause."""
+    def goes_right(self, amounts: np.ndarray) -> np.ndarray:
+        """(...) whether laws with these amplitudes (..., n) go in a direction of their cause."""
         if self.random is None or not self.directions:
-            return True
-        steps = np.diff(self.random.at_knots @ amounts)
-        up, down = steps[steps > 0.0].sum(), -steps[steps < 0.0].sum()
-        wrong = {1: down, -1: up, 0: min(up, down)}
-        least = min(wrong[direction] for direction in self.directions)
-        return bool(least <= MOST_WRONG_WAY * (up + down)) == (self.cause != UNKNOWN)
+            return np.ones(amounts.shape[:-1], dtype=bool)
+        steps = np.diff(amounts @ self.random.at_knots.T)
+        up, down = np.maximum(steps, 0.0).sum(axis=-1), -np.minimum(steps, 0.0).sum(axis=-1)
+        wrong = {1: down, -1: up, 0: np.minimum(up, down)}
+        least = np.min([wrong[direction] for direction in self.directions], axis=0)
+        return (least <= MOST_WRONG_WAY * (up + down)) == (self.cause != UNKNOWN)
 
     @property
     def learns(self) -> str:

@@ -12,7 +12,7 @@ from itertools import combinations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.special import expit, logsumexp
+from scipy.special import expit
 
 from paint_deposition.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
@@ -20,6 +20,7 @@ from paint_deposition.diagnosis.joint_evidence import (
     NEVER,
     Directions,
     log_evidence,
+    log_evidence_alone,
     log_evidence_of_each,
     refine,
 )
@@ -113,7 +114,7 @@ class ModelSpace:
     def probabilities(self) -> np.ndarray:
         """Posterior probability of each of ``models``."""
         weights = np.array([m.log_weight for m in self.models])
-        return np.exp(weights - logsumexp(weights))
+        return np.exp(weights - np.logaddexp.reduce(weights))
 
     def inclusion(self, *causes: str) -> float:
         """Posterior probability that at least one of these causes acts."""
@@ -166,18 +167,16 @@ class ModelSpace:
         """The explanation of an effect by its law, its size and log evidence, if it acts alone."""
         first, last = self._first[self.causes.index(cause)], self._last[self.causes.index(cause)]
         laws = [k for k in range(first, last) if self.explanations[k].sensitivity is not None]
-        deviation = self.null.deviation[:, np.newaxis]
-        values = np.array([self._by_size(k, deviation)[:, 0] for k in laws])
+        values = self._factors_alone[laws]
         k, s = np.unravel_index(values.argmax(), values.shape)
         return laws[k], float(SIZES[s]), float(values[k, s])
 
     def _physical_sizes(self, k: int) -> np.ndarray:
         """(S,) whether an explanation, alone at each size, is what its cause can be."""
-        amounts = self.principal[k].amplitudes(self.null.deviation, SIZES)
-        return np.array([self._is_physical(k, a) for a in amounts])
+        return self._is_physical(k, self.principal[k].amplitudes(self.null.deviation, SIZES))
 
-    def _is_physical(self, k: int, amounts: np.ndarray) -> bool:
-        """Whether an explanation with these amplitudes is what its cause can be.
+    def _is_physical(self, k: int, amounts: np.ndarray) -> np.ndarray:
+        """(...) whether an explanation with amplitudes (..., n) is what its cause can be.
 
         The error of a law stays small beside the law, and a free law goes in its direction.
         """
@@ -187,7 +186,7 @@ class ModelSpace:
         of_law = len(explanation.sensitivity.names)
         law = own.length(amounts, slice(of_law))
         error = own.length(amounts, slice(of_law, None))
-        return error <= max(NOTICED, LARGEST_ERROR * law)
+        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
     @cached_property
     def accepted(self) -> list[tuple[str, int, float]]:
@@ -240,39 +239,53 @@ class ModelSpace:
         """(P, DRAWS) whitened deviations behind ``null_evidence``."""
         return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
 
-    def evidence(self, deviations: np.ndarray, chosen: Iterable[int] | None = None) -> np.ndarray:
+    def evidence(
+        self,
+        deviations: np.ndarray,
+        chosen: Iterable[int] | None = None,
+        shifts: np.ndarray | None = None,
+    ) -> np.ndarray:
         """(D,) log evidence that any cause acts, averaged, for whitened deviations (P, D).
 
         Args:
             deviations: of the readings, or simulated.
             chosen: numbers of explanations; default: all.
+            shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         terms = []
         for k in range(len(self.explanations)) if chosen is None else chosen:
             explanation = self.explanations[k]
             odds = self._log_odds[self.causes.index(explanation.cause)]
             share = np.log(explanation.share / len(SIZES))
-            terms.append(logsumexp(self._by_size(k, deviations), axis=0) + share + odds)
-        return logsumexp(terms, axis=0)
+            terms.append(np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + share + odds)
+        return np.logaddexp.reduce(terms)
 
-    def _by_size(self, k: int, deviations: np.ndarray) -> np.ndarray:
+    def _by_size(
+        self, k: int, deviations: np.ndarray, shifts: np.ndarray | None = None
+    ) -> np.ndarray:
         """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
-        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom)
+        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
+
+    @cached_property
+    def _factors_alone(self) -> np.ndarray:
+        """(K, S) log Bayes factors of each explanation alone at every size."""
+        return log_evidence_alone(self._directions, SIZES)
 
     @cached_property
     def _alone(self) -> list[Model]:
         """One cause each: its evidence averaged, and its best explanation."""
         found = []
-        deviation = self.null.deviation[:, np.newaxis]
         for number, cause in enumerate(self.causes):
             numbers = range(self._first[number], self._last[number])
-            factors = np.array([self._by_size(k, deviation)[:, 0] for k in numbers])
+            factors = self._factors_alone[numbers]
             values = factors + self._log_share_alone[numbers]
             k, s = np.unravel_index(values.argmax(), values.shape)
-            weight = float(logsumexp(values)) + self._log_odds[number]
+            weight = float(np.logaddexp.reduce(values, axis=None)) + self._log_odds[number]
             any_form = factors + self._log_share[numbers]
             best = factors.flat[any_form.argmax()]
-            self._averaging[cause] = float(logsumexp(any_form)) + self._log_odds[number] - best
+            self._averaging[cause] = (
+                float(np.logaddexp.reduce(any_form, axis=None)) + self._log_odds[number] - best
+            )
             found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
         return found
 

@@ -90,8 +90,7 @@ def power_along(
     """
     chosen, count = _following(space, direction), draws.shape[1]
     rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
-    moved = draws[:, np.newaxis] + np.multiply.outer(direction, ratios)[:, :, np.newaxis]
-    along = space.evidence(moved.reshape(len(direction), -1), chosen)
+    along = space.evidence(draws, chosen, np.multiply.outer(direction, ratios))
     evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
     return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
 
@@ -99,7 +98,7 @@ def power_along(
 def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
     """Numbers of the explanations that take up most of a direction."""
     taken = [
-        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + np.sum(own.columns**2, axis=0))))
+        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))
         for own in space.principal
     ]
     return np.argsort(taken)[::-1][:FOLLOWING].tolist()

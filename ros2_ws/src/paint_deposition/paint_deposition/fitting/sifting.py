@@ -12,7 +12,7 @@ from paint_deposition.fitting.least_squares import Fit
 from paint_deposition.fitting.one_thread import on_one_thread
 from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.fitting.slips import FEWEST, Slip, slips
-from paint_deposition.fitting.smooth_misfit import Misfit, Scatter
+from paint_deposition.fitting.smooth_misfit import Misfit
 from paint_deposition.fitting.study import TEXTURE_SHARE, Study, Texture
 from paint_deposition.readings.campaign import Campaign
 
@@ -45,11 +45,13 @@ def sifted(
     fit = _fitted(study, start, starts, seed, known)
     if len(study) < FEWEST or not fit.predicted_um.any():
         return study, fit
-    found = _slips(study, fit)
+    misfit = _misfit(study, fit)
+    found = _slips(study, fit, misfit)
     if found:
         study = study.without(found)
         fit = _fitted(study, start, starts, seed, known)
-    texture = _texture(study, fit)
+        misfit = _misfit(study, fit)
+    texture = _texture(study, misfit)
     if texture != study.texture:
         study = study.textured(texture)
         fit = _fitted(study, fit.model, 1, seed, known)
@@ -67,9 +69,9 @@ def _fitted(
     return study.fit(parameters, starts, seed, study.nuisance)
 
 
-def _slips(study: Study, fit: Fit) -> dict[int, Slip]:
+def _slips(study: Study, fit: Fit, misfit: Misfit) -> dict[int, Slip]:
     readings, means = study.campaign.readings, study.campaign.means
-    found = slips(_misfit(study, fit), means.repeats == 1)
+    found = slips(misfit, means.repeats == 1)
     return {
         row: Slip(
             str(readings.point[means.first[row]]),
@@ -81,7 +83,7 @@ def _slips(study: Study, fit: Fit) -> dict[int, Slip]:
     }
 
 
-def _texture(study: Study, fit: Fit) -> Texture:
+def _texture(study: Study, misfit: Misfit) -> Texture:
     """Estimated where the gauge's noise is known.
 
     Only a texture finer than usual is believed: a coarser one looks like anything that is missing
@@ -89,7 +91,7 @@ def _texture(study: Study, fit: Fit) -> Texture:
     """
     if study.noise.source == 'assumed':
         return study.texture
-    share = Scatter.of(_misfit(study, fit)).texture_share
+    share = misfit.scatter.texture_share
     return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from paint_deposition.fitting.smooth_misfit import Misfit, Scatter
+from paint_deposition.fitting.smooth_misfit import Misfit
 
 # Prior probability that a reading is a slip, and the posterior one from which it counts as one.
 SLIP, SURE = 0.01, 0.9
@@ -76,10 +76,9 @@ def slips(misfit: Misfit, single: np.ndarray) -> dict[int, tuple[float, float]]:
     found: dict[int, tuple[float, float]] = {}
     if count < FEWEST:
         return {}
-    film = np.mean(misfit.predicted_um)
+    film, left = np.mean(misfit.predicted_um), misfit
     while True:
-        left = misfit.select(kept)
-        scatter = Scatter.of(left)
+        scatter = left.scatter
         # Nothing is known of a slip but that it is a number of the size of the film.
         wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
         log_odds = np.log(SLIP / (1.0 - SLIP)) + wild - scatter.log_density
@@ -91,6 +90,7 @@ def slips(misfit: Misfit, single: np.ndarray) -> dict[int, tuple[float, float]]:
             return {}
         found[int(kept[worst])] = scatter.predicted(worst)
         kept = np.delete(kept, worst)
+        left = misfit.select(kept)
 
 
 def _miswritten(value: float) -> list[float]:

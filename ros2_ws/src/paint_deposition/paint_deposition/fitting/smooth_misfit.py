@@ -9,10 +9,11 @@ closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cholesky, solve_triangular
 from scipy.special import logsumexp
 
 from paint_deposition.fitting.smooth_fields import field_over_values, fields_over_parts
@@ -51,6 +52,11 @@ class Misfit:
     experiment_of: np.ndarray
     positions_m: np.ndarray
     covariates: tuple[Covariate, ...]
+
+    @cached_property
+    def scatter(self) -> 'Scatter':
+        """What all models say of the readings."""
+        return Scatter.of(self)
 
     def select(self, rows: np.ndarray) -> 'Misfit':
         """Some of the readings."""
@@ -138,11 +144,11 @@ def _left_out(
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
     over = directions / variance[:, np.newaxis]
-    factor = cho_factor(np.eye(directions.shape[1]) + directions.T @ over, lower=True)
-    solved = cho_solve(factor, over.T)
-    weighted = residual / variance - over @ (solved @ residual)
-    diagonal = 1.0 / variance - np.einsum('pn,np->p', over, solved)
-    log_det = np.log(variance).sum() + 2.0 * np.log(np.diag(factor[0])).sum()
+    factor = cholesky(np.eye(directions.shape[1]) + directions.T @ over, lower=True)
+    solved = solve_triangular(factor, over.T, lower=True)
+    weighted = residual / variance - solved.T @ (solved @ residual)
+    diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+    log_det = np.log(variance).sum() + 2.0 * np.log(np.diag(factor)).sum()
     likelihood = -0.5 * (residual @ weighted + log_det)
     return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
 

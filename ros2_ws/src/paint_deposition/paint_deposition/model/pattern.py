@@ -1,11 +1,15 @@
 """The planar deposition model, eq. (1) of Conner, Atkar, Rizzi and Choset (IROS 2002)."""
 
 import math
+from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
+
+# A fit asks for a few patterns again and again, for each part and each effect that it varies.
+PEAKS_KEPT = 64
 
 
 class PlanarPattern(BaseModel):
@@ -75,11 +79,7 @@ class PlanarPattern(BaseModel):
     @property
     def peak_flux_um_per_s(self) -> float:
         """The strongest film growth of eq. (1) [um/s], good to 1e-4."""
-        # Along this direction f is largest, but has no value at the very centre; the ring's top
-        # lies between the centre and r.
-        towards = self.phi_rad + 0.5 * math.pi
-        rho = np.linspace(0.0, self.r_m, 129) + 1e-6
-        return float(self.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
+        return _peak_flux_um_per_s(self)
 
     def radius_of_flux_m(self, fraction: float) -> float:
         """Radius beyond which the flux stays below ``fraction`` of its peak [m]."""
@@ -111,6 +111,15 @@ class PlanarPattern(BaseModel):
         g1 = 2.0 * math.pi * (ring + mirrored) / self.gamma_m2
         g2 = 1.0 - np.exp(-(radius**2) / (2.0 * self.sigma2_m**2))
         return (1.0 - self.K2) * g1 + self.K2 * g2
+
+
+@lru_cache(PEAKS_KEPT)
+def _peak_flux_um_per_s(planar: PlanarPattern) -> float:
+    # Along this direction f is largest, but has no value at the very centre; the ring's top lies
+    # between the centre and r.
+    towards = planar.phi_rad + 0.5 * math.pi
+    rho = np.linspace(0.0, planar.r_m, 129) + 1e-6
+    return float(planar.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards)).max())
 
 
 def _deviations(ratio: float) -> float:
