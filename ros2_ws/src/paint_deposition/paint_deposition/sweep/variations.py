@@ -34,7 +34,7 @@ Values = dict[str, Any]
 def effects_of(models: Iterable[DepositionModel]) -> dict[str, type[Effect]]:
     """Effects by id: those of the library, and users' own that the models have."""
     own = {e.id: type(e) for model in models for e in model.effects if e.file is not None}
-    return EFFECTS | own
+    return {**EFFECTS, **own}
 
 
 def known_names(models: Sequence[DepositionModel] = ()) -> list[str]:
