@@ -35,7 +35,8 @@ class DrawingProcess:
     Loading matplotlib takes as long as painting a door: begin before there is anything to draw.
 
     Args:
-        module: of ``report.pictures``, what it shall have loaded.
+        module: of ``report.pictures``, what it shall have loaded, and warmed up if it has a
+            ``warm_up``.
     """
 
     def __init__(self, module: str) -> None:
@@ -98,7 +99,9 @@ def _draw(picture: str, drawn: tuple[Any, ...]) -> Any:
 def _answer(module: str) -> None:
     """Draw what is asked for on stdin, until it is closed; results go to stdout, nothing else."""
     questions, answers, sys.stdout = sys.stdin.buffer, sys.stdout.buffer, sys.stderr
-    resolve_name(f'{PICTURES}.{module}')
+    loaded = resolve_name(f'{PICTURES}.{module}')
+    if hasattr(loaded, 'warm_up'):
+        loaded.warm_up()
     with suppress(EOFError):
         while True:
             picture, drawn = pickle.load(questions)
