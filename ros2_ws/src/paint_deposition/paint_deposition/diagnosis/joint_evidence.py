@@ -102,16 +102,6 @@ def log_evidence(directions, chosen, sizes):
 
 
 @njit(cache=True, nogil=True)
-def log_evidence_alone(directions, sizes):
-    """(K, S) log Bayes factors of each explanation alone, at S sizes."""
-    count = len(directions.start) - 1
-    found = np.empty((count, len(sizes)))
-    for k in range(count):
-        found[k] = log_evidence(directions, np.array([k]), sizes.reshape(-1, 1))
-    return found
-
-
-@njit(cache=True, nogil=True)
 def log_evidence_of_each(directions, chosen, sizes):
     """(M,) log Bayes factors of M sets of chosen explanations (M, c), of sizes (M, c)."""
     found = np.empty(len(chosen))

@@ -19,8 +19,6 @@ from paint_deposition.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanat
 from paint_deposition.diagnosis.joint_evidence import (
     NEVER,
     Directions,
-    log_evidence,
-    log_evidence_alone,
     log_evidence_of_each,
     refine,
 )
@@ -269,7 +267,10 @@ class ModelSpace:
     @cached_property
     def _factors_alone(self) -> np.ndarray:
         """(K, S) log Bayes factors of each explanation alone at every size."""
-        return log_evidence_alone(self._directions, SIZES)
+        shape = len(self.explanations), len(SIZES)
+        chosen = np.repeat(np.arange(shape[0]), shape[1])[:, np.newaxis]
+        sizes = np.tile(SIZES, shape[0])[:, np.newaxis]
+        return log_evidence_of_each(self._directions, chosen, sizes).reshape(shape)
 
     @cached_property
     def _alone(self) -> list[Model]:
@@ -333,7 +334,8 @@ class ModelSpace:
         return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
 
     def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
-        return float(log_evidence(self._directions, np.asarray(chosen), np.atleast_2d(sizes))[0])
+        together = np.atleast_2d(chosen), np.atleast_2d(sizes)
+        return float(log_evidence_of_each(self._directions, *together)[0])
 
 
 def _joined(first: Model, second: Model) -> Model:

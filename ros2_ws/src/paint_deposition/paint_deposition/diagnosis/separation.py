@@ -8,9 +8,10 @@ deviations of the readings, is the separation (T-optimality: Atkinson and Fedoro
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, cholesky, solve_triangular
+from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from paint_deposition.diagnosis.explanations import LAW_ERROR
@@ -45,12 +46,12 @@ class Predicted:
     high: np.ndarray
     precision: float = ALMOST_FREE
 
-    @property
+    @cached_property
     def change(self) -> np.ndarray:
         """(P,) change of the readings with the suggested amplitudes."""
         return self.law @ self.amounts
 
-    @property
+    @cached_property
     def error(self) -> np.ndarray:
         """(P, n) directions of the error of the law with the suggested amplitudes."""
         return LAW_ERROR * self.change[:, np.newaxis] * self.along
@@ -62,9 +63,9 @@ class Predicted:
         precision[np.diag_indices(len(precision))] += np.where(
             np.arange(len(precision)) < k, 1.0, self.precision
         )
-        lower = cholesky(precision, lower=True)
-        target = solve_triangular(lower, design.T @ readings, lower=True)
-        amounts = solve_triangular(lower.T, target)[k:]
+        lower = cholesky(precision, lower=True, check_finite=False)
+        target = solve_triangular(lower, design.T @ readings, lower=True, check_finite=False)
+        amounts = solve_triangular(lower.T, target, check_finite=False)[k:]
         if (amounts < self.low).any() or (amounts > self.high).any():
             # What is free comes first in the factor, so the last rows hold the amounts alone.
             bounds = (self.low, self.high)
@@ -95,7 +96,7 @@ class Imitation:
     Attributes:
         amounts: (m,) amplitudes of the imitator; inside: (m,) which are at no bound.
         stiffness: by how much the errors of the two laws were made smaller to stay errors.
-        mean, covariance: (k,) and (k, k) of all that is free.
+        mean: (k,) of all that is free. lower: (k, k) Cholesky factor of its precision.
         separation: standard deviations that are left.
     """
 
@@ -103,7 +104,7 @@ class Imitation:
     inside: np.ndarray
     stiffness: np.ndarray
     mean: np.ndarray
-    covariance: np.ndarray
+    lower: np.ndarray
     separation: float
 
     def gains(self, free: np.ndarray, shown: Predicted, imitator: Predicted) -> np.ndarray:
@@ -116,7 +117,8 @@ class Imitation:
         imitator = replace(imitator, amounts=self.amounts)
         blocks, change = _linear(free, shown, imitator, self.inside, self.stiffness)
         directions = np.hstack(blocks)
-        variance = 1.0 + np.einsum('ck,kl,cl->c', directions, self.covariance, directions)
+        spread = solve_triangular(self.lower, directions.T, lower=True)
+        variance = 1.0 + np.sum(spread**2, axis=0)
         return (change - directions @ self.mean) ** 2 / variance
 
 
@@ -138,8 +140,8 @@ def imitate(free: np.ndarray, shown: Predicted, imitator: Predicted) -> Imitatio
         precision = directions.T @ directions
         loose = np.arange(len(precision)) >= ends[2]
         precision[np.diag_indices(len(precision))] += np.where(loose, imitator.precision, 1.0)
-        factor = cho_factor(precision)
-        mean = cho_solve(factor, directions.T @ change)
+        lower = cholesky(precision, lower=True, check_finite=False)
+        mean = cho_solve((lower, True), directions.T @ change, check_finite=False)
         parts = np.split(mean, ends[:-1])
         laws = np.array([np.linalg.norm(shown.change), np.linalg.norm(imitator.change)])
         errors = np.array([np.linalg.norm(blocks[k] @ parts[k]) for k in (1, 2)])
@@ -151,8 +153,7 @@ def imitate(free: np.ndarray, shown: Predicted, imitator: Predicted) -> Imitatio
     of_imitator = np.sqrt(imitator.precision) * parts[3]
     drawn = [parts[0], parts[1] / stiffness[0], parts[2] / stiffness[1], of_imitator]
     square = float(left @ left) + sum(float(part @ part) for part in drawn)
-    covariance = cho_solve(factor, np.eye(len(precision)))
-    return Imitation(imitator.amounts, inside, stiffness, mean, covariance, float(np.sqrt(square)))
+    return Imitation(imitator.amounts, inside, stiffness, mean, lower, float(np.sqrt(square)))
 
 
 def _linear(

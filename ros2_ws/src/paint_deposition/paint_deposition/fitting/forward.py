@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator, Steps, shown_um
+from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, shown_um
 from paint_deposition.film.layout import term_weights
 from paint_deposition.kernel.blocks import LANES
 from paint_deposition.model.pattern import PlanarPattern
@@ -39,7 +39,9 @@ class Forward:
         self.campaign, self.effects = campaign, effects
         self._in_kernel = {effect.id: effect for effect in effects if _defines(effect, LAWS)}
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
-        threads = min(numba.get_num_threads(), len(self._parts))
+        # Where the integral is short, threads wait for each other longer than for it.
+        rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)
+        threads = min(numba.get_num_threads(), len(self._parts)) if rays > FEW_RAYS else 1
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def at(self, campaign: Campaign) -> 'Forward':

@@ -12,6 +12,8 @@ from paint_deposition.report.profile_charts import ProfileChart
 from paint_deposition.report.style import BEFORE, INK, MUTED, charts_a_row
 
 TEXT_PT = 8.0
+# As many letters of a title fit over a chart; one that is longer is written smaller.
+TITLE_LETTERS = 48
 # A profile's charts, and the room around all of them and between [in].
 CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
 LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
@@ -52,7 +54,9 @@ def write_comparison_picture(path: str | Path, charts: Sequence[ProfileChart]) -
 
 def draw_profile(axes: Axes, chart: ProfileChart) -> None:
     """Draw readings with the gauge's noise, and the models' film."""
-    quiet(axes, f'{chart.axis} [mm]', 'film [µm]', chart.title, TEXT_PT)
+    quiet(axes, f'{chart.axis} [mm]', 'film [µm]', size=TEXT_PT)
+    title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(chart.title))
+    axes.set_title(chart.title, loc='left', fontsize=title_pt, color=INK, y=1.0)
     at_mm, line_mm = MM * chart.position_m, MM * chart.line_m
     axes.errorbar(
         at_mm, chart.measured_um, chart.bars_um, fmt='o', ms=3, color=INK, elinewidth=0.8,
