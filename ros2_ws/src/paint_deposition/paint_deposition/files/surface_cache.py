@@ -25,7 +25,7 @@ from paint_deposition.part.surface import Surface
 # Where parts are kept; set but empty: nowhere.
 FOLDER_VARIABLE = 'PAINT_CACHE_DIR'
 MOST_BYTES = 2_000_000_000
-# Smaller parts are prepared as fast as they are found.
+# Smaller parts are prepared in milliseconds.
 LEAST_VERTICES = 1_000
 LIBRARIES = ('numpy', 'scipy', 'trimesh', 'numba', 'cascadio')
 ARRAYS = ('vertices_m', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem')
