@@ -99,6 +99,7 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
 ):
     node = comparison(model_file=_true_model(tmp_path))
     source = robot(node)
+    wait_until(lambda: viewer.heard['comparison/stats'], what='the bare part')
     errors = []
     for start in range(0, len(MOTION), 200):
         rows = slice(start, start + 200)
