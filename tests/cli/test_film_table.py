@@ -9,6 +9,7 @@ import pytest
 
 from booth import LOOKING_ALONG_Y
 from cli.command import assert_refused, paint
+from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.recordings.bags import write_pose_bag
 from scenes import straight_pass
@@ -68,6 +69,23 @@ def test_the_table_is_read_back_as_readings(simulate, painted, tmp_path):
     assert f'film.parquet: {len(film)} readings, Parquet; ' in done.stderr
     predicted = np.genfromtxt(tmp_path / 'predicted.csv', delimiter=',', names=True)
     assert np.abs(predicted['predicted_um'] - film).max() < 1e-3
+
+
+def test_a_table_that_claims_too_much_is_refused_before_it_is_read(tmp_path):
+    zeros = pa.array(np.zeros(5_000_001))
+    path = tmp_path / 'large.parquet'
+    pq.write_table(pa.table({'x_m': zeros, 'thickness_um': zeros}), path)
+    assert path.stat().st_size < 100_000
+    with pytest.raises(ReadingsError, match='tells of 10000002 values, more than 10000000'):
+        read_readings(path)
+
+
+def test_texts_that_are_none_are_refused(tmp_path):
+    path = tmp_path / 'labels.parquet'
+    pq.write_table(pa.table({'point': ['door'], 'thickness_um': [20.0]}), path, compression='none')
+    path.write_bytes(path.read_bytes().replace(b'door', b'\xff\xfe\xfd\xfc'))
+    with pytest.raises(ReadingsError, match='cannot be read as Parquet'):
+        read_readings(path)
 
 
 def test_a_damaged_table_is_refused(simulate, painted, tmp_path):

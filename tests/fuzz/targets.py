@@ -11,6 +11,7 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
+import pyarrow as pa
 import pytest
 import trimesh
 from mcap.writer import CompressionType, Writer
@@ -25,6 +26,7 @@ from paint_deposition.files.measuring_points import MeasuringPoints
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.planned_model import planned_model
 from paint_deposition.files.pose_tables.points import read_points
 from paint_deposition.files.rapid.writer import gauge_module_text
@@ -210,6 +212,17 @@ def _sheet() -> tuple[bytes, bytes]:
         return book, package.read('xl/sheet1.xml')
 
 
+def _parquet() -> bytes:
+    columns = {
+        'x_m': [0.1, 0.2],
+        'y_m': [0.0, 0.0],
+        'z_m': [0.2, 0.2],
+        'thickness_um': [24.5, 9.0],
+    }
+    table = pa.table(columns | {'point': ['P1', 'P2']})
+    return _written(lambda path: write_parquet(path, table), 'readings.parquet')
+
+
 def _open_book() -> bytes:
     rows = (('x_m', 'y_m', 'z_m', 'thickness_um'), (0.1, 0.0, 0.2, 24.5), (0.2, 0.0, 0.2, 'n/a'))
     return open_document(''.join(open_row(*row, empty=16_380) for row in rows))
@@ -249,6 +262,7 @@ def targets() -> dict[str, Target]:
         'measuring_points': _table(_measuring_points, points),
         'points': _table(read_points, points),
         'poses': _table(read_recording, *POSES),
+        'parquet': Target('.parquet', read_readings, lambda: [_parquet()]),
         'workbook': Target('.xlsx', read_readings, lambda: [_sheet()[0]]),
         'worksheet': Target(
             '.xlsx', read_readings, lambda: [_sheet()[1]],

@@ -4,7 +4,6 @@ import numpy as np
 
 from paint_deposition.line.measured import Measured
 from paint_deposition.line.part import amplitudes
-from paint_deposition.model.coordinates import PATTERN
 
 HOUR_S = 3600.0
 FIRST_S = 1.793e9
@@ -12,20 +11,21 @@ SIGMA_UM = 0.7
 
 
 def parts(
-    count: int, seed: int, *, level=0.01, points=12, drift=0.0, misfit=0.0, steps=()
+    count: int, seed: int, *, level=0.01, points=12, drift=0.0, misfit=0.0, steps=(), pattern=7
 ) -> list[Measured]:
     """``count`` parts an hour apart, measured at the same points.
 
     level: standard deviation of the parts. drift: (count,) or one amplitude of the first effect,
     in typical sizes. misfit: of each point, a share. steps: (row, share) changes of the level.
+    pattern: how many coordinates it has, more than 7 with several brushes.
     """
     rng = np.random.default_rng([4, seed])
     film = 25.0 + 3.0 * np.sin(np.arange(points))
-    by_pattern = film[:, np.newaxis] * rng.normal(size=(points, len(PATTERN)))
+    by_pattern = film[:, np.newaxis] * rng.normal(size=(points, pattern))
     by_pattern[:, 0] = film  # K1
     by_effect = rng.normal(size=(points, len(amplitudes())))
     places = np.column_stack([0.2 * np.arange(points), np.zeros(points), np.zeros(points)])
-    shared = by_pattern @ (0.03 * rng.normal(size=len(PATTERN)))
+    shared = by_pattern @ (0.03 * rng.normal(size=pattern))
     shared = shared + misfit * film * rng.normal(size=points)
     amount = np.broadcast_to(drift, count)
     found = []

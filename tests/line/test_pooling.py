@@ -4,6 +4,8 @@ import numpy as np
 import pytest
 
 from line.synthetic import FIRST_S, HOUR_S, parts
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.fitting.pattern_vector import PatternVector
 from paint_deposition.line.causes import pooled
 from paint_deposition.line.change_points import changes_of
 from paint_deposition.line.part import amplitudes
@@ -23,6 +25,17 @@ def test_an_effect_too_small_for_one_part_shows_in_many():
     (cause,) = pooled(made).causes
     assert (cause.effect, cause.parameter) == FIRST
     assert cause.one_part < 3.0 < 10.0 < cause.all_parts
+
+
+def test_the_patterns_of_two_brushes_are_shared_by_all_parts():
+    """What the second brush changes is taken for no effect; an effect is found beside it."""
+    brushes = PatternVector((1, 2))
+    assert all(pooled(parts(60, k, pattern=len(brushes)), brushes).causes == () for k in range(3))
+    made = parts(150, seed=1, drift=0.5, points=36, pattern=len(brushes))
+    (cause,) = pooled(made, brushes).causes
+    assert (cause.effect, cause.parameter) == FIRST
+    assert cause.value == pytest.approx(0.5 * EFFECTS[FIRST[0]].parameters()[FIRST[1]]['typical'],
+                                        abs=4.0 * cause.sd)  # fmt: skip
 
 
 def test_nothing_is_pooled_where_there_is_nothing():

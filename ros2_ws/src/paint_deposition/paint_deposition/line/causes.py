@@ -10,9 +10,10 @@ import numpy as np
 from scipy.special import logsumexp
 
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.fitting.pattern_vector import PatternVector
 from paint_deposition.line.measured import Measured
 from paint_deposition.line.part import amplitudes
-from paint_deposition.line.pooling import Pool, Sums, evidence, likeliest, pools
+from paint_deposition.line.pooling import ONE_BRUSH, Pool, Sums, evidence, likeliest, pools
 from paint_deposition.report.words import unit_words
 
 # An effect is accepted if it is so probable that something of the catalogue acts.
@@ -83,9 +84,9 @@ class Pooled:
         return part.by_pattern @ mean[:pattern] + misfit + effects
 
 
-def pooled(parts: Sequence[Measured]) -> Pooled:
-    """Find the effects that the parts share."""
-    sums = Sums.of(parts)
+def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Pooled:
+    """Find the effects that the parts share; ``pattern`` is that of the model, of all brushes."""
+    sums = Sums.of(parts, pattern)
     found, log_share = pools(sums)
     names = amplitudes()
     chosen: tuple[int, ...] = ()
@@ -104,12 +105,13 @@ def pooled(parts: Sequence[Measured]) -> Pooled:
         members = tuple(dict.fromkeys(names[k][0] for k in near))
         chosen = (*chosen, near[0])
         pool = likeliest(found, log_share, chosen)
-        causes.append(_cause(parts, pool, chosen, probability, members))
+        causes.append(_cause(parts, pattern, pool, chosen, probability, members))
     return Pooled(tuple(causes), likeliest(found, log_share, chosen), chosen)
 
 
 def _cause(
     parts: Sequence[Measured],
+    pattern: PatternVector,
     pool: Pool,
     chosen: tuple[int, ...],
     probability: float,
@@ -122,7 +124,7 @@ def _cause(
     step = max(len(parts) // 25, 1)
     alone = []
     for part in parts[::step]:
-        one = Pool(Sums.of([part]), pool.scales).solved(chosen[-1:])[1][-1, -1]
+        one = Pool(Sums.of([part], pattern), pool.scales).solved(chosen[-1:])[1][-1, -1]
         # Without the prior of the amplitude, which is standard normal.
         alone.append(abs(value) * np.sqrt(max(1.0 / one - 1.0, 0.0)))
     return Cause(

@@ -21,7 +21,7 @@ class Measured:
         residual_um, sigma_um, predicted_um: (P,) measured minus predicted; standard deviation;
             predicted [um].
         positions_m: (P, 3).
-        by_pattern: (P, 7) derivatives by the pattern's coordinates [um].
+        by_pattern: (P, k) derivatives by the coordinates of the pattern, of all brushes [um].
         by_effect: (P, A) by each amplitude of the catalogue in its typical size [um].
     """
 

@@ -20,11 +20,11 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.special import logsumexp
 
+from paint_deposition.fitting.pattern_vector import PatternVector
 from paint_deposition.line.measured import Measured, places
-from paint_deposition.model.coordinates import PATTERN
 
 LEVELS = np.geomspace(1e-3, 0.2, 24).tolist()
 NOISES = np.geomspace(0.5, 3.0, 19).tolist()
@@ -32,11 +32,12 @@ NOISES = np.geomspace(0.5, 3.0, 19).tolist()
 MISFITS = tuple(product((0.005, 0.01, 0.02, 0.05, 0.1), (0.02, 0.1, 0.25)))
 # Half of the belief before the readings is that there is no misfit.
 NO_MISFIT = 0.5
+ONE_BRUSH = PatternVector()
 
 
 @dataclass(frozen=True)
 class Sums:
-    """The readings of all parts, summed up; K = 7 + F + A columns: pattern, places, effects.
+    """The readings of all parts, summed up; K = k + F + A columns: pattern, places, effects.
 
     Attributes:
         gram: (K, K) columns over the noise, squared. score: (K,) columns with the residuals.
@@ -44,6 +45,8 @@ class Sums:
         level_gram: (n, K) of each part, its film with the columns; level_score: (n,) with the
             residuals; level_square: (n,) the film's square.
         count: of the readings. place_m: (F, 3) places [m].
+        between_jobs: (k, k) covariance of the pattern's coordinates, of all brushes, before the
+            readings.
     """
 
     gram: np.ndarray
@@ -54,9 +57,10 @@ class Sums:
     level_square: np.ndarray
     count: int
     place_m: np.ndarray
+    between_jobs: np.ndarray
 
     @staticmethod
-    def of(parts: Sequence[Measured]) -> Sums:
+    def of(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Sums:
         """Sum up; at least one part."""
         place_m, place_of = places(parts)
         first, gram = 0, np.zeros(())
@@ -78,17 +82,17 @@ class Sums:
         return Sums(
             gram, np.sum(rows['score'], axis=0), float(np.sum(rows['square'])),
             np.array(rows['gram']), np.array(rows['level']), np.array(rows['own']),
-            first, place_m,
+            first, place_m, pattern.between_jobs,
         )  # fmt: skip
 
     @property
     def shared(self) -> slice:
         """Columns of the pattern and the places."""
-        return slice(0, len(PATTERN) + len(self.place_m))
+        return slice(0, len(self.between_jobs) + len(self.place_m))
 
     def column(self, amplitude: int) -> int:
         """Of an amplitude of the catalogue."""
-        return len(PATTERN) + len(self.place_m) + amplitude
+        return self.shared.stop + amplitude
 
 
 @dataclass(frozen=True)
@@ -127,11 +131,7 @@ class Pool:
     @cached_property
     def _prior(self) -> np.ndarray:
         """Precision of pattern and places."""
-        count = len(PATTERN) + len(self.sums.place_m)
-        precision = np.zeros((count, count))
-        precision[: len(PATTERN), : len(PATTERN)] = np.diag([c.between_jobs**-2 for c in PATTERN])
-        precision[len(PATTERN) :, len(PATTERN) :] = np.linalg.inv(self._field)
-        return precision
+        return block_diag(np.linalg.inv(self.sums.between_jobs), np.linalg.inv(self._field))
 
     @cached_property
     def _field(self) -> np.ndarray:
@@ -169,8 +169,8 @@ class Pool:
 
     @cached_property
     def _log_det_prior(self) -> float:
-        pattern = -2.0 * float(np.sum(np.log([c.between_jobs for c in PATTERN])))
-        return pattern - float(np.linalg.slogdet(self._field)[1])
+        blocks = (self.sums.between_jobs, self._field)
+        return -sum(float(np.linalg.slogdet(block)[1]) for block in blocks)
 
 
 def pools(sums: Sums) -> tuple[list[Pool], np.ndarray]:

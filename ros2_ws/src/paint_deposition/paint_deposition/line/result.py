@@ -12,6 +12,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.provenance import origin
+from paint_deposition.fitting.parameters import FreeParameters
 from paint_deposition.line.causes import Pooled, pooled
 from paint_deposition.line.change_points import Change, changes_of, date
 from paint_deposition.line.measured import Measured, measured_parts
@@ -52,7 +53,9 @@ class Line:
     @cached_property
     def pooled(self) -> Pooled | None:
         """What they share; None with fewer than two."""
-        return pooled(self.parts) if len(self.parts) > 1 else None
+        if len(self.parts) < 2:
+            return None
+        return pooled(self.parts, FreeParameters.of(self.model).pattern)
 
     @cached_property
     def series(self) -> list[Series]:

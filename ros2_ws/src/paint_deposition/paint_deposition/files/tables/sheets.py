@@ -9,7 +9,7 @@ from pathlib import Path
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.parquet import MAGIC, require_libraries
-from paint_deposition.files.tables.far_cells import refuse_far_cells
+from paint_deposition.files.tables.far_cells import MOST_CELLS, refuse_far_cells
 from paint_deposition.files.text import decoded
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
@@ -114,14 +114,21 @@ def _sheet_of_parquet(path: Path, content: bytes) -> Sheet:
     import pyarrow.parquet as pq
 
     try:
-        table = pq.read_table(BytesIO(content))
-    except (pa.ArrowException, OSError) as error:
+        file = pq.ParquetFile(BytesIO(content))
+        # A few bytes may claim any number of rows.
+        cells = file.metadata.num_rows * file.metadata.num_columns
+        if cells > MOST_CELLS:
+            raise ReadingsError(
+                f'{path}: tells of {cells} values, more than {MOST_CELLS}; give fewer readings'
+            )
+        table = file.read()
+        columns = [
+            ['' if value is None or value != value else _cell(value) for value in column]
+            for column in (column.to_pylist() for column in table.columns)
+        ]
+    except (pa.ArrowException, ValueError, OSError) as error:  # of texts that are none, too
         reason = ' '.join(str(error).split())
         raise ReadingsError(f'{path}: cannot be read as Parquet ({reason})') from None
-    columns = [
-        ['' if value is None or value != value else _cell(value) for value in column.to_pylist()]
-        for column in table.columns
-    ]
     rows = [list(table.column_names), *map(list, zip(*columns, strict=True))]
     return Sheet.of(enumerate(rows, 1), 'Parquet')
 
