@@ -1,5 +1,7 @@
 """Lines of sight: which points a gun sees, and how much of the sky a point sees (Embree)."""
 
+from collections.abc import Callable
+from functools import cached_property
 from threading import Lock
 
 import numpy as np
@@ -26,15 +28,18 @@ class Occluder:
     """The part as an obstacle to rays.
 
     Args:
-        tree: of its faces.
+        tree: gives the one of its faces; asked for it with the first ray.
     """
 
-    def __init__(self, tree: FaceTree) -> None:
+    def __init__(self, tree: Callable[[], FaceTree]) -> None:
         self._tree = tree
-        # Embree works in single precision: keep coordinates small.
-        self._origin_m = box_centre_m(tree.vertices_m)
         self._building = Lock()
         self._built: tuple[EmbreeScene, TriangleMesh] | None = None
+
+    @cached_property
+    def _origin_m(self) -> np.ndarray:
+        """Embree works in single precision: coordinates are kept small."""
+        return box_centre_m(self._tree().vertices_m)
 
     @property
     def _scene(self) -> EmbreeScene:
@@ -42,9 +47,9 @@ class Occluder:
         with self._building:
             if self._built is None:
                 scene = EmbreeScene(robust=True)
-                corners = (self._tree.vertices_m - self._origin_m).astype(np.float32)
+                corners = (self._tree().vertices_m - self._origin_m).astype(np.float32)
                 # The scene does not keep the mesh alive by itself.
-                faces = self._tree.faces.astype(np.int32)
+                faces = self._tree().faces.astype(np.int32)
                 self._built = scene, TriangleMesh(scene, corners, faces)
             return self._built[0]
 
@@ -73,7 +78,7 @@ class Occluder:
 
         See ``horizon.horizon_sines``.
         """
-        return horizon_sines(self._tree, points_m, normals)
+        return horizon_sines(self._tree(), points_m, normals)
 
     def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.
