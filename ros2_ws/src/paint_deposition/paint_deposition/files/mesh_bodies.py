@@ -36,7 +36,7 @@ class Bodies:
     """What of a mesh file was asked for.
 
     Attributes:
-        vertices: (V, 3) in the file's own unit. faces: (F, 3).
+        vertices: (V, 3) in the file's own unit, and precision. faces: (F, 3).
         unit_m: metres to the unit, 1 where the file tells none.
         notes: what was understood of unit and bodies, for the user.
     """
@@ -86,14 +86,17 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
 
 
 def _binary_stl(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
-    """Vertices and faces of a complete binary STL: trimesh takes five times the file's memory."""
+    """Vertices, as in the file, and faces of a complete binary STL.
+
+    trimesh takes five times the memory of the file.
+    """
     with path.open('rb') as file:
         head = file.read(STL_HEAD)
     count = int.from_bytes(head[80:], 'little')
     if not count or path.stat().st_size != STL_HEAD + STL_TRIANGLE.itemsize * count:
         return None
     corners = np.fromfile(path, STL_TRIANGLE, offset=STL_HEAD)['corners']
-    return corners.reshape(-1, 3).astype(np.float64), np.arange(3 * count).reshape(-1, 3)
+    return corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)
 
 
 def _scene(path: Path, kind: str) -> Scene:

@@ -109,7 +109,7 @@ def _prepared(
     vertices, faces = read.vertices, read.faces
     del read
     if unit_m * scale != 1.0:
-        vertices = vertices * (unit_m * scale)
+        vertices = vertices.astype(np.float64) * (unit_m * scale)
     _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
     faces = _without_degenerate(path, vertices, faces, notes)

@@ -98,12 +98,15 @@ def _mean_normal(vertices, faces, corners, out):
 
 
 @njit(cache=True, nogil=True)
-def _gather(faces, first, corner, v, seen, near):
+def _gather(faces, first, corner, v, seen, passed, near):
     """Put the vertices up to two edges from v, itself among them, into ``near``; tell how many."""
     count = 0
     for c in corner[first[v] : first[v + 1]]:
         for side in range(3):
             u = faces[c // 3, side]
+            if passed[u] == v + 1:
+                continue
+            passed[u] = v + 1
             for d in corner[first[u] : first[u + 1]]:
                 for other in range(3):
                     w = faces[d // 3, other]
@@ -144,8 +147,12 @@ def _equations(vertices, v, normal, near, system):
         terms[5] = n0 * o0 + n1 * o1 + n2 * o2
         weight = math.exp(-NEARNESS * (o0 * o0 + o1 * o1 + o2 * o2))
         for i in range(TERMS):
-            for j in range(TERMS + 1):
-                system[i, j] += weight * terms[i] * terms[j]
+            share = weight * terms[i]
+            for j in range(i, TERMS + 1):
+                system[i, j] += share * terms[j]
+    for i in range(TERMS):
+        for j in range(i):
+            system[i, j] = system[j, i]
     return first, second
 
 
@@ -187,14 +194,14 @@ def _solved(system, work):
 def _fill(vertices, faces, first, corner, fitted, start, stop, normals):
     """Set the normals of vertices from start to stop."""
     seen = np.zeros(len(vertices) if fitted else 0, dtype=np.int32)
-    near = np.empty(len(seen), dtype=np.int32)
+    passed, near = np.zeros_like(seen), np.empty_like(seen)
     system, work = np.empty((TERMS, TERMS + 1)), np.empty((TERMS, 2 * TERMS + 1))
     for v in range(start, stop):
         normal = normals[v]
         _mean_normal(vertices, faces, corner[first[v] : first[v + 1]], normal)
         if not fitted:
             continue
-        count = _gather(faces, first, corner, v, seen, near)
+        count = _gather(faces, first, corner, v, seen, passed, near)
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)
         cosine = 1.0 / math.sqrt(1.0 + along * along + across * across)
