@@ -80,6 +80,7 @@ def patch(surface: Surface, kept: np.ndarray) -> tuple[Surface, np.ndarray]:
         normals=surface.normals[rows],
         vertex_areas_m2=np.bincount(inverse, thirds, minlength=len(rows)),
         in_hem=None if surface.in_hem is None else surface.in_hem[rows],
+        neighbours=None,
     )
     return found, rows
 
