@@ -98,24 +98,28 @@ def direction_option(name: str, text: str) -> Callable:
 def _vector(
     ctx: click.Context, param: click.Parameter, given: tuple[float, float, float] | None
 ) -> np.ndarray | None:
+    if given is None:
+        return None
     import numpy as np
 
-    if given is not None and not any(given):
+    if not any(given):
         raise click.BadParameter('0 0 0 is none; give a direction, 0 0 -1 say', ctx, param)
-    return None if given is None else np.array(given)
+    return np.array(given)
 
 
 def _pose(
     ctx: click.Context, param: click.Parameter, given: tuple[float, ...] | None
 ) -> list[float] | None:
+    if given is None:
+        return None
     from paint_deposition.motion.part_frame import is_pose
 
-    if given is not None and not is_pose(given):
+    if not is_pose(given):
         norm = math.hypot(*given[3:])
         raise click.BadParameter(
             f'the quaternion qx qy qz qw has the norm {norm:.4g}, not 1', ctx, param
         )
-    return None if given is None else list(given)
+    return list(given)
 
 
 def _listed(
@@ -211,12 +215,12 @@ def motion_options(command: Callable) -> Callable:
 
     @wraps(command)
     def with_motion(**given: Any) -> Any:
-        from paint_deposition.files.motion_source import MotionSource
-
-        names = MotionSource.model_fields.keys() & given.keys()
         return command(motion={name: given.pop(name) for name in names}, **given)
 
-    return reduce(lambda taken, option: option(taken), reversed(MOTION), with_motion)
+    others = len(getattr(command, '__click_params__', ()))
+    taken = reduce(lambda taken, option: option(taken), reversed(MOTION), with_motion)
+    names = [option.name for option in taken.__click_params__[others:]]
+    return taken
 
 
 def max_edge_length_option(default_m: float) -> Callable:
