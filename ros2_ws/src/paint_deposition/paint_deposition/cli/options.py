@@ -217,10 +217,11 @@ def motion_options(command: Callable) -> Callable:
     def with_motion(**given: Any) -> Any:
         return command(motion={name: given.pop(name) for name in names}, **given)
 
-    others = len(getattr(command, '__click_params__', ()))
-    taken = reduce(lambda taken, option: option(taken), reversed(MOTION), with_motion)
-    names = [option.name for option in taken.__click_params__[others:]]
-    return taken
+    def with_options(function: Callable) -> Callable:
+        return reduce(lambda taken, option: option(taken), reversed(MOTION), function)
+
+    names = [option.name for option in click.command('motion')(with_options(lambda: None)).params]
+    return with_options(with_motion)
 
 
 def max_edge_length_option(default_m: float) -> Callable:
