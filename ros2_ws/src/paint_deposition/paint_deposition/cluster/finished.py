@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paint_deposition.cluster.packing import packed
+from paint_deposition.cluster.packing import told_by_value
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.parquet import write_parquet
 
@@ -26,7 +26,7 @@ def digest_of(*told: Any) -> str:
 
 def content_digest(value: Any) -> str:
     """The same for an input as it is in memory, such as a surface or a motion."""
-    return hashlib.sha256(packed(value)).hexdigest()[:32]
+    return hashlib.sha256(told_by_value(value)).hexdigest()[:32]
 
 
 @dataclass(frozen=True)
