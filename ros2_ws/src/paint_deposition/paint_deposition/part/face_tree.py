@@ -127,3 +127,35 @@ def _nodes(vertices, faces, leaves):
             at[THICKNESS] = max(at[THICKNESS], abs(_along_normal(at, nodes[child])) + reach)
         at[THICKNESS] = min(at[THICKNESS], at[RADIUS])
     return nodes
+
+
+@njit(cache=True, nogil=True)
+def box_distance(p, node):
+    """How far a point (x, y, z) is from a node's box [m]."""
+    x = max(0.0, abs(p[0] - node[0]) - node[BOX])
+    y = max(0.0, abs(p[1] - node[1]) - node[BOX + 1])
+    z = max(0.0, abs(p[2] - node[2]) - node[BOX + 2])
+    return math.sqrt(x * x + y * y + z * z)
+
+
+@njit(cache=True, nogil=True)
+def leaf_faces(nodes, faces, node):
+    """First face of a leaf, and the one behind its last."""
+    leaves = (len(nodes) + 1) // 2
+    leaf = node - (leaves - 1)
+    return len(faces) * leaf // leaves, len(faces) * (leaf + 1) // leaves
+
+
+@njit(cache=True, nogil=True)
+def wait(waiting, keys, left, node, first, second):
+    """Let a node's children wait, by their keys; the one with the lesser is looked at first.
+
+    Returns:
+        How many wait now.
+    """
+    one, other = 2 * node + 1, 2 * node + 2
+    if first < second:
+        one, other, first, second = other, one, second, first
+    waiting[left], keys[left] = one, first
+    waiting[left + 1], keys[left + 1] = other, second
+    return left + 2

@@ -50,7 +50,24 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
         The surface itself if it faces the gun; turned and with a note, since it would stay bare,
         if most poses that look at it look at its back; else with another outward side.
     """
-    seen, axes = _met(surface, positions_m, z_axes)
+    return _settled(surface, *_met(surface, positions_m, z_axes))
+
+
+def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
+    """The same for several guns: the first of them whose axis meets the part decides.
+
+    Args:
+        motions: (positions_m, z_axes) of each gun, as for ``facing``.
+    """
+    for positions_m, z_axes in motions:
+        seen, axes = _met(surface, positions_m, z_axes)
+        if len(axes):
+            return _settled(surface, seen, axes)
+    return surface
+
+
+def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
+    """The part with the side outward that these poses look at."""
     if seen.back > seen.front:
         note = (
             f'{seen.back} of {seen.back + seen.front} poses look at the back of the mesh: its '
@@ -71,18 +88,6 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
     known = replace(surface, gun_side=gun_side)
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
-
-
-def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
-    """The same for several guns: the first of them whose axis meets the part decides.
-
-    Args:
-        motions: (positions_m, z_axes) of each gun, as for ``facing``.
-    """
-    for positions_m, z_axes in motions:
-        if len(_met(surface, positions_m, z_axes)[1]):
-            return toward_the_gun(surface, positions_m, z_axes)
-    return surface
 
 
 def _met(

@@ -8,7 +8,14 @@ import numpy as np
 from numba import get_num_threads, njit
 
 from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree, support
+from paint_deposition.part.face_tree import (
+    DEPTH,
+    FaceTree,
+    box_distance,
+    leaf_faces,
+    support,
+    wait,
+)
 
 # Lower horizons are not told apart [sine]: hardly any paint comes from there.
 LEAST_SINE = 0.05
@@ -100,41 +107,34 @@ def _bound(p, n, node):
     height = n[0] * x + n[1] * y + n[2] * z + support(node, n[0], n[1], n[2])
     if height <= 0.0:
         return 0.0
-    x = max(0.0, abs(x) - node[BOX])
-    y = max(0.0, abs(y) - node[BOX + 1])
-    z = max(0.0, abs(z) - node[BOX + 2])
-    nearest = math.sqrt(x * x + y * y + z * z)
+    nearest = box_distance(p, node)
     return height / nearest if nearest > 0.0 else np.inf
 
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
 def _fill(points, normals, vertices, faces, nodes, start, stop, found):
-    leaves = (len(nodes) + 1) // 2
-    waiting, bounds = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
+    inner = len(nodes) // 2
+    # Keys are bounds with the other sign: the highest is looked at first.
+    waiting, keys = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     highest_face = 0
     for i in range(start, stop):
         p = (points[i, 0], points[i, 1], points[i, 2])
         n = (normals[i, 0], normals[i, 1], normals[i, 2])
         # Neighbours mostly share the face that is highest.
         highest = max(LEAST_SINE - SLACK_SINE, _face_sine(p, n, vertices, faces[highest_face]))
-        waiting[0], bounds[0], left = 0, np.inf, 1
+        waiting[0], keys[0], left = 0, -np.inf, 1
         while left and highest < HIGH_SINE:
             left -= 1
-            if not bounds[left] > highest + SLACK_SINE:
+            if not -keys[left] > highest + SLACK_SINE:
                 continue
             node = waiting[left]
-            leaf = node - (leaves - 1)
-            if leaf < 0:
-                one, other = 2 * node + 1, 2 * node + 2
-                first, second = _bound(p, n, nodes[one]), _bound(p, n, nodes[other])
-                if first > second:
-                    one, other, first, second = other, one, second, first
-                waiting[left], bounds[left] = one, first
-                waiting[left + 1], bounds[left + 1] = other, second
-                left += 2
+            if node < inner:
+                first = -_bound(p, n, nodes[2 * node + 1])
+                second = -_bound(p, n, nodes[2 * node + 2])
+                left = wait(waiting, keys, left, node, first, second)
                 continue
-            for f in range(len(faces) * leaf // leaves, len(faces) * (leaf + 1) // leaves):
+            for f in range(*leaf_faces(nodes, faces, node)):
                 sine = _face_sine(p, n, vertices, faces[f])
                 if sine > highest:
                     highest, highest_face = sine, f

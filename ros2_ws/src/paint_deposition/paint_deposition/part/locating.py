@@ -5,7 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree
+from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.part.face_tree import DEPTH, FaceTree, box_distance, leaf_faces, wait
 
 # How much further away than the nearest surface the side that a normal points out of may be.
 THICKNESS_M = 0.06
@@ -115,15 +116,6 @@ def _corner(values, v):
 
 
 @njit(cache=True, nogil=True)
-def _away(p, node):
-    """How far a point is from a box [m]."""
-    x = max(0.0, abs(p[0] - node[0]) - node[BOX])
-    y = max(0.0, abs(p[1] - node[1]) - node[BOX + 1])
-    z = max(0.0, abs(p[2] - node[2]) - node[BOX + 2])
-    return np.sqrt(x * x + y * y + z * z)
-
-
-@njit(cache=True, nogil=True)
 def _agreement(normals, face, wanted):
     """Mean of the normals of a triangle's corners along a vector."""
     total = 0.0
@@ -133,12 +125,13 @@ def _agreement(normals, face, wanted):
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _find(points, wanted, least, vertices, normals, faces, nodes, found, places):
     """Set the row in ``faces`` and the place (N, 3) closest to each point.
 
     Surface that agrees less than ``least`` with what is wanted counts as THICKNESS_M further away.
     """
-    leaves = (len(nodes) + 1) // 2
+    inner = len(nodes) // 2
     waiting, away = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     for i in range(len(points)):
         p, nearest = _corner(points, i), np.inf
@@ -148,18 +141,12 @@ def _find(points, wanted, least, vertices, normals, faces, nodes, found, places)
             if not away[left] < nearest:
                 continue
             node = waiting[left]
-            leaf = node - (leaves - 1)
-            if leaf < 0:
-                one, other = 2 * node + 1, 2 * node + 2
-                first, second = _away(p, nodes[one]), _away(p, nodes[other])
-                # The nearer one is looked at first.
-                if first < second:
-                    one, other, first, second = other, one, second, first
-                waiting[left], away[left] = one, first
-                waiting[left + 1], away[left + 1] = other, second
-                left += 2
+            if node < inner:
+                first = box_distance(p, nodes[2 * node + 1])
+                second = box_distance(p, nodes[2 * node + 2])
+                left = wait(waiting, away, left, node, first, second)
                 continue
-            for f in range(len(faces) * leaf // leaves, len(faces) * (leaf + 1) // leaves):
+            for f in range(*leaf_faces(nodes, faces, node)):
                 a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
                 x, y, z = closest_place(
                     _corner(vertices, a), _corner(vertices, b), _corner(vertices, c), p

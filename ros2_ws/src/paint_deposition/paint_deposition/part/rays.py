@@ -3,7 +3,8 @@
 import numpy as np
 from numba import njit
 
-from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree
+from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.part.face_tree import BOX, DEPTH, FaceTree, leaf_faces, wait
 
 # A ray through a common edge meets one of both triangles, whatever was rounded.
 ON_THE_EDGE = -1e-9
@@ -63,8 +64,9 @@ def _crossing(start, way, vertices, face):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
+@named_for_its_code
 def _meet(starts, ways, vertices, faces, order, nodes, met):
-    leaves = (len(nodes) + 1) // 2
+    inner = len(nodes) // 2
     waiting, entries = np.empty(DEPTH, dtype=np.int64), np.empty(DEPTH)
     for i in range(len(starts)):
         start = (starts[i, 0], starts[i, 1], starts[i, 2])
@@ -76,18 +78,12 @@ def _meet(starts, ways, vertices, faces, order, nodes, met):
             if not entries[left] < nearest:
                 continue
             node = waiting[left]
-            leaf = node - (leaves - 1)
-            if leaf < 0:
-                one, other = 2 * node + 1, 2 * node + 2
-                first, second = _entry(start, way, nodes[one]), _entry(start, way, nodes[other])
-                # The nearer one is looked at first.
-                if first < second:
-                    one, other, first, second = other, one, second, first
-                waiting[left], entries[left] = one, first
-                waiting[left + 1], entries[left + 1] = other, second
-                left += 2
+            if node < inner:
+                first = _entry(start, way, nodes[2 * node + 1])
+                second = _entry(start, way, nodes[2 * node + 2])
+                left = wait(waiting, entries, left, node, first, second)
                 continue
-            for f in range(len(faces) * leaf // leaves, len(faces) * (leaf + 1) // leaves):
+            for f in range(*leaf_faces(nodes, faces, node)):
                 along = _crossing(start, way, vertices, faces[f])
                 if along < nearest:
                     nearest, met[i] = along, order[f]
