@@ -17,7 +17,7 @@ from tests.virtual_paint_shop.respray import sprayed_again
 from tests.virtual_paint_shop.shop import generate
 from tests.virtual_paint_shop.truths import choose
 
-from paint_deposition.diagnosis.verdict import percent
+from paint_deposition.inference.diagnosis.verdict import percent
 
 SEED, HIDDEN, SCALE = 930700, 'faraday_shielding', 2.0
 PARCELS = 4_000_000

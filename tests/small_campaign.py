@@ -4,7 +4,7 @@ from functools import cache
 from pathlib import Path
 
 from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.readings.campaign import Campaign
+from paint_deposition.inference.readings.campaign import Campaign
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import generate
 

@@ -17,7 +17,7 @@ from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.fitting.forward import Forward
+from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.model.brush import Brush
 from paint_deposition.model.pattern import PlanarPattern
 from scenes import straight_pass

@@ -18,7 +18,7 @@ from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path import SprayPath

@@ -10,7 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
-from paint_deposition.files.posterior import Posterior
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.coordinates import PATTERN
 
 MODEL = DepositionModel(effects=(CornerSlowdown(gain=0.5, length_m=0.2),))

@@ -18,7 +18,7 @@ from paint_deposition.planning.face_order import FacePasses, in_order, motion_ov
 from paint_deposition.planning.part_plan import plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.plan_request import PlanRequest
-from paint_deposition.results.plan import write_plan
+from paint_deposition.report.writers.plan import write_plan
 from surfaces import solid
 
 NARROW = DepositionModel(

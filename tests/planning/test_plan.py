@@ -15,7 +15,7 @@ from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.plan_request import PlanRequest
-from paint_deposition.results.plan import write_plan
+from paint_deposition.report.writers.plan import write_plan
 from planning.test_surface_map import sheet
 
 NARROW = DepositionModel(

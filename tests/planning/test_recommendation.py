@@ -7,7 +7,7 @@ import time
 import numpy as np
 import pytest
 
-from fitting.panels import column, passes
+from inference.fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError

@@ -1,7 +1,7 @@
 """What the report calls a user's own effect: it reads as well as one of the library."""
 
 from booth import SAMPLES
-from paint_deposition.diagnosis.verdict import EffectClass
+from paint_deposition.inference.diagnosis.verdict import EffectClass
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.place import PartGrid

@@ -13,9 +13,9 @@ from paint_deposition.api.geometry import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.posterior import Posterior
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.fitting.draws import drawn
+from paint_deposition.inference.fitting.draws import drawn
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
@@ -32,7 +32,7 @@ from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.pass_films import spread
 from paint_deposition.planning.plan import simulated
 from paint_deposition.planning.surface_map import painted_side, pass_axes
-from paint_deposition.results.passes import BAG, PROGRAM, Passes, write_passes
+from paint_deposition.report.writers.passes import BAG, PROGRAM, Passes, write_passes
 
 Progress = Callable[[str, float], None]
 # The film counts where the programme lays more than this share of its greatest film.

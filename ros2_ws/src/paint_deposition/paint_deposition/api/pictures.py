@@ -8,10 +8,10 @@ from typing import Any
 from matplotlib.axes import Axes
 
 from paint_deposition.api.simulation import Film
-from paint_deposition.comparison.comparison import Comparison
-from paint_deposition.diagnosis.reading_choice import ChosenReadings
-from paint_deposition.diagnosis.verdict import Diagnosis
-from paint_deposition.fitting.calibration import Calibration
+from paint_deposition.inference.comparison.comparison import Comparison
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation

@@ -22,8 +22,8 @@ from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.readings.campaign import Experiment
-from paint_deposition.readings.readings import Readings
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.readings import Readings
 
 Progress = Callable[[str, float], None]
 

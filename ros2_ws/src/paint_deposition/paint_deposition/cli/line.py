@@ -44,13 +44,13 @@ def line_command(
     from paint_deposition.files.parquet import MANY, require_libraries
 
     require_libraries('paint line', MANY)
-    from paint_deposition.cluster.finished import NAME, Finished
-    from paint_deposition.cluster.run import finish
-    from paint_deposition.cluster.workers import require_alone
-    from paint_deposition.line.job import line_cases, shared_files
-    from paint_deposition.line.part import computed
-    from paint_deposition.line.result import Line
-    from paint_deposition.line.writing import write_line
+    from paint_deposition.batch.cluster.finished import NAME, Finished
+    from paint_deposition.batch.cluster.run import finish
+    from paint_deposition.batch.cluster.workers import require_alone
+    from paint_deposition.batch.line.job import line_cases, shared_files
+    from paint_deposition.batch.line.part import computed
+    from paint_deposition.batch.line.result import Line
+    from paint_deposition.batch.line.writing import write_line
 
     require_alone(scheduler, count)
     with Progress('line') as tell:

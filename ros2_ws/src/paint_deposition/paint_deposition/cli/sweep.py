@@ -76,13 +76,13 @@ def sweep_command(
     from paint_deposition.files.parquet import MANY, require_libraries
 
     require_libraries('paint sweep', MANY)
-    from paint_deposition.cluster.finished import NAME, Finished
-    from paint_deposition.cluster.run import finish
-    from paint_deposition.cluster.workers import require_alone
-    from paint_deposition.sweep.case import computed
-    from paint_deposition.sweep.job import Job
-    from paint_deposition.sweep.result import Sweep, write_sweep
-    from paint_deposition.sweep.sweep_file import read_sweep
+    from paint_deposition.batch.cluster.finished import NAME, Finished
+    from paint_deposition.batch.cluster.run import finish
+    from paint_deposition.batch.cluster.workers import require_alone
+    from paint_deposition.batch.sweep.case import computed
+    from paint_deposition.batch.sweep.job import Job
+    from paint_deposition.batch.sweep.result import Sweep, write_sweep
+    from paint_deposition.batch.sweep.sweep_file import read_sweep
 
     require_alone(scheduler, count)
     with Progress('sweep') as tell:

@@ -22,7 +22,7 @@ from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_p
 from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
-from paint_deposition.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Readings are matched to the surface; a finer mesh only helps where the surface is strongly
 # curved.

@@ -10,7 +10,7 @@ from paint_deposition.api.simulation import Film
 from paint_deposition.api.writers.provenance import with_provenance
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.report.drawing import HERE, DrawingProcess, Here
-from paint_deposition.results.film import write_film, write_film_table
+from paint_deposition.report.writers.film import write_film, write_film_table
 
 PNG = 'png'
 

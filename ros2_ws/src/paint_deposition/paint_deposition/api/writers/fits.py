@@ -7,20 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.writers.provenance import provenance
-from paint_deposition.comparison.comparison import Comparison, SideBySide
-from paint_deposition.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
-from paint_deposition.fitting.calibration import Calibration
-from paint_deposition.fitting.study import Study
+from paint_deposition.inference.fitting.calibration import Calibration
+from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.drawing import HERE, DrawingProcess, Here
 from paint_deposition.report.page.report import write_report
-from paint_deposition.results.calibration import write_calibration
-from paint_deposition.results.fitted_model import write_fitted
-from paint_deposition.results.residual_mesh import file_name, write_residual_meshes
-from paint_deposition.results.residuals import write_residuals
+from paint_deposition.report.writers.calibration import write_calibration
+from paint_deposition.report.writers.fitted_model import write_fitted
+from paint_deposition.report.writers.residual_mesh import file_name, write_residual_meshes
+from paint_deposition.report.writers.residuals import write_residuals
 
 PNG = 'png'
 PROFILES = 'profiles:write_comparison_picture'

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.writers.provenance import input_files, provenance, with_provenance
-from paint_deposition.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
 from paint_deposition.film.spray_geometry import spray_geometry
@@ -19,10 +19,10 @@ from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.trade_off import Point
 from paint_deposition.report.drawing import HERE, DrawingProcess, Here
-from paint_deposition.results.improvement import write_improvement
-from paint_deposition.results.measuring import write_chosen_readings
-from paint_deposition.results.plan import write_plan
-from paint_deposition.results.trade_off import write_trade_off_table
+from paint_deposition.report.writers.improvement import write_improvement
+from paint_deposition.report.writers.measuring import write_chosen_readings
+from paint_deposition.report.writers.plan import write_plan
+from paint_deposition.report.writers.trade_off import write_trade_off_table
 
 PNG = 'png'
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).

@@ -12,7 +12,7 @@ from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.film_messages import shares
 from paint_deposition.part.surface import Surface
-from paint_deposition.results.film import write_film
+from paint_deposition.report.writers.film import write_film
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator

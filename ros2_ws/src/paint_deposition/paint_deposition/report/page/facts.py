@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from paint_deposition.diagnosis.verdict import Diagnosis, Step
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
 from paint_deposition.report.words import (

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import fdtrc
 
-from paint_deposition.diagnosis.model_space import SURE
-from paint_deposition.diagnosis.procedure import ALPHA
-from paint_deposition.diagnosis.verdict import Diagnosis, percent
+from paint_deposition.inference.diagnosis.model_space import SURE
+from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.facts import (
     accepted_rows,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.comparison.profiles import Profile
+from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     axis,

@@ -8,8 +8,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.fitting.estimates import estimates
-from paint_deposition.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.words import (
     SYMBOLS,

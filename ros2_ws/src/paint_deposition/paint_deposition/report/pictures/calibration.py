@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.fitting.calibration import Calibration, PanelFit
+from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
 

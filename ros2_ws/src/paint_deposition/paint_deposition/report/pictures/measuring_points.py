@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patheffects import Normal, Stroke
 
-from paint_deposition.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture

@@ -1,0 +1,1 @@
+"""Many cases and many parts: workers, sweeps, lines."""

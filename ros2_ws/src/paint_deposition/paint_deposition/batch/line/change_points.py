@@ -1,0 +1,189 @@
+"""When a series changed: steps and beginning drifts, each with its date."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import median_filter
+
+from paint_deposition.batch.line.series import Series
+from paint_deposition.report.words import unit_words
+
+# A segment has at least so many parts.
+SHORTEST = 3
+# One part is no further from its neighbours: a single bad part is no change [standard deviations].
+MOST_OF_ONE = 4.0
+NEIGHBOURS = 5
+# A change may have been wherever the squared error is larger by no more (95 %, two parameters).
+LIKELY = 5.99
+SECONDS_A_DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of a series.
+
+    Attributes:
+        series, unit, members: of what. kind: 'step' or 'drift'.
+        part: row of the first part after it. time_s: of that part; earliest_s, latest_s: within
+            which it lies with 95 %.
+        before, after: means (of a drift: at its beginning and at the end). sd: of their
+            difference. per_day: of a drift, else None.
+        strength: the difference in standard deviations of it.
+        also: weaker series that changed with it; their amplitudes share its mark on the film.
+    """
+
+    series: str
+    unit: str
+    members: tuple[str, ...]
+    kind: str
+    part: int
+    time_s: float
+    earliest_s: float
+    latest_s: float
+    before: float
+    after: float
+    sd: float
+    per_day: float | None
+    strength: float
+    also: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The change in a line."""
+        if self.series == 'level':
+            what = 'the film level (K1, or the gain of the gauge)'
+        elif self.series == 'misfit':
+            what = 'the misfit of the film'
+        else:
+            others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
+            what = f'{self.series}{others}'
+        way = 'rose' if self.after > self.before else 'fell'
+        size = (
+            f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
+        )
+        ends = date(self.earliest_s), date(self.latest_s)
+        within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
+        charts = 'another chart' if len(self.also) == 1 else f'{len(self.also)} other charts'
+        others = f'; {charts} changed with it' if self.also else ''
+        if self.kind == 'drift':
+            return f'{what} {way} since {date(self.time_s)} by {size} in all{within}{others}'
+        return f'{what} {way} by {size} on {date(self.time_s)}{within}{others}'
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures by name, with dates."""
+        named = {key: getattr(self, key) for key in self.__dataclass_fields__}
+        dates = {name: date(named.pop(f'{name}_s')) for name in ('time', 'earliest', 'latest')}
+        lists = {'members': list(self.members), 'also': list(self.also)}
+        return named | dates | lists | {'sentence': self.sentence}
+
+
+def date(time_s: float) -> str:
+    """'2026-11-12 07:30', UTC."""
+    return datetime.fromtimestamp(time_s, timezone.utc).strftime('%Y-%m-%d %H:%M')
+
+
+def changes_of(series: Sequence[Series], times_s: np.ndarray) -> list[Change]:
+    """All changes, oldest first; those that come with a stronger one are named by it.
+
+    A change has to lower the squared error by twice the logarithm of the parts, which pays for
+    looking at all places (BIC), and of the series, which pays for looking at all of them.
+    """
+    penalty = 2.0 * np.log(len(times_s)) + 2.0 * np.log(len(series))
+    found = [change for one in series for change in _of_series(one, times_s, penalty)]
+    return sorted(_led(found), key=lambda change: change.time_s)
+
+
+def _led(found: Sequence[Change]) -> list[Change]:
+    """Changes at the same time as one, the strongest leading: effects share marks on the film.
+
+    The misfit leads only where nothing else changed, for it has no name.
+    """
+    leaders: list[Change] = []
+    for change in sorted(found, key=lambda one: (one.series == 'misfit', -one.strength)):
+        for row, leader in enumerate(leaders):
+            ends = leader.latest_s if leader.kind == 'step' else np.inf
+            if change.latest_s >= leader.earliest_s and change.earliest_s <= ends:
+                also = tuple(dict.fromkeys((*leader.also, change.series)))
+                leaders[row] = replace(leader, also=also)
+                break
+        else:
+            leaders.append(change)
+    return leaders
+
+
+def _of_series(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
+    from ruptures import KernelCPD
+
+    values = _tamed(series.standard)
+    if len(values) < 2 * SHORTEST:
+        return []
+    ends = KernelCPD(kernel='linear', min_size=SHORTEST).fit(values).predict(pen=penalty)
+    starts = [0, *ends[:-1]]
+    steps_cost = sum(_scatter(values[a:b]) for a, b in zip(starts, ends, strict=True))
+    steps_cost += penalty * (len(ends) - 1)
+    errors = _drift_errors(values, times_s)
+    if errors.min() + penalty < min(steps_cost, _scatter(values)):
+        return [_as_drift(series, times_s, errors)]
+    return [
+        _as_step(series, values, times_s, starts[k - 1], starts[k], ends[k])
+        for k in range(1, len(starts))
+    ]
+
+
+def _scatter(values: np.ndarray) -> float:
+    return float(np.sum((values - values.mean()) ** 2))
+
+
+def _tamed(values: np.ndarray) -> np.ndarray:
+    """The values with single ones kept near their neighbours."""
+    middle = median_filter(values, NEIGHBOURS, mode='nearest')
+    return np.clip(values, middle - MOST_OF_ONE, middle + MOST_OF_ONE)
+
+
+def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """(n - SHORTEST,) least squared error of a line that leaves the level at each part."""
+    began = times_s[: len(times_s) - SHORTEST]
+    since = np.maximum(times_s[:, np.newaxis] - began, 0.0)
+    since -= since.mean(axis=0)
+    left = values - values.mean()
+    return left @ left - (left @ since) ** 2 / np.sum(since**2, axis=0)
+
+
+def _as_drift(series: Series, times_s: np.ndarray, errors: np.ndarray) -> Change:
+    row = int(np.argmin(errors))
+    weight = 1.0 / series.deviation
+    since = np.maximum(times_s - times_s[row], 0.0) / SECONDS_A_DAY
+    scaled = np.column_stack([np.ones(len(since)), since]) * weight[:, np.newaxis]
+    (level, slope), *_ = np.linalg.lstsq(scaled, series.values * weight, rcond=None)
+    sd = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
+    days = float(since[-1])
+    likely = np.flatnonzero(errors <= errors.min() + LIKELY)
+    return Change(
+        series.name, series.unit, series.members, 'drift', row, float(times_s[row]),
+        float(times_s[likely[0]]), float(times_s[likely[-1]]), float(level),
+        float(level + slope * days), sd * days, float(slope), float(abs(slope) / sd),
+    )  # fmt: skip
+
+
+def _as_step(
+    series: Series, values: np.ndarray, times_s: np.ndarray, first: int, row: int, end: int
+) -> Change:
+    weight = series.deviation**-2.0
+    before, after = (
+        float(np.average(series.values[a:b], weights=weight[a:b]))
+        for a, b in ((first, row), (row, end))
+    )
+    sd = float(np.sqrt(1.0 / weight[first:row].sum() + 1.0 / weight[row:end].sum()))
+    splits = np.arange(first + 1, end)
+    errors = np.array([_scatter(values[first:k]) + _scatter(values[k:end]) for k in splits])
+    likely = splits[errors <= errors.min() + LIKELY]
+    return Change(
+        series.name, series.unit, series.members, 'step', row, float(times_s[row]),
+        float(times_s[likely[0]]), float(times_s[likely[-1]]), before, after, sd, None,
+        abs(after - before) / sd,
+    )  # fmt: skip

@@ -1,0 +1,202 @@
+"""One run of a line, as a worker computes it: its film, and what its readings say."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Mapping
+from datetime import datetime, timezone
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.api.geometry import look_at
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError, PaintError
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.provenance import sha256
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.statistics import film_statistics
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.least_squares import derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.batch.line.line_file import LineFile, Run
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+
+# Amplitudes are stepped by this share of their typical size.
+STEP = 0.25
+# Stamps before this are no dates: clocks of simulations and controllers begin at 0.
+EARLIEST_S = 946684800.0
+DATE = re.compile(r'(\d{4})-?(\d{2})-?(\d{2})(?:[T_-]?(\d{2})[-:h]?(\d{2})(?:[-:m]?(\d{2}))?)?')
+FIGURES = ('mean_um', 'std_dev_um', 'coverage', 'painted_volume_cm3', 'emitted_volume_cm3')
+Columns = dict[str, list[Any]]
+
+
+def computed(given: Mapping[str, Any]) -> Columns:
+    """Rows of a run: one for each point measured, or one if nothing was measured.
+
+    Args:
+        given: ``run``, ``file`` (the line's), ``folder``, ``model``, and ``mesh``, the digest of
+            the line's mesh.
+
+    A run that cannot be used says why in the column ``error``. A part whose readings cannot be
+    used, or that is of another mesh than the line's, says so in ``remark``.
+    """
+    run: Run = given['run']
+    rows: list[dict[str, Any]] = []
+    try:
+        if run.problem:
+            raise ManyError(run.problem)
+        rows.extend(
+            _rows(run, given['file'], Path(given['folder']), given['model'], given['mesh'])
+        )
+    except PaintError as error:
+        rows.append({'part': run.name, 'error': str(error)})
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: [row.get(name) for row in rows] for name in names}
+
+
+def amplitudes() -> list[tuple[str, str]]:
+    """(effect, parameter) of every amplitude of the catalogue, in its order."""
+    return [(e.id, name) for e in EFFECTS.values() for name in e.amplitudes()]
+
+
+def _rows(
+    run: Run, file: LineFile, folder: Path, model: DepositionModel, mesh: str
+) -> Iterator[dict[str, Any]]:
+    if run.is_campaign:
+        odd: list[str] = []
+        campaign = read_campaign(run.path, odd.append, file.part_pose)
+        time_s = _date(campaign.head.get('date', ''), run)
+        for experiment in campaign.experiments:
+            name = run.name if len(campaign.experiments) == 1 else f'{run.name}/{experiment.name}'
+            warning = f'warning: {experiment.name}: '
+            remarks = [line.removeprefix(warning) for line in odd if line.startswith(warning)]
+            pooled = sha256(experiment.files['mesh']) == mesh
+            if not pooled:
+                other = Path(experiment.files['mesh']).name
+                remarks.append(f'not pooled: {other} is another mesh than {file.mesh}')
+            painted = _film(experiment.surface, experiment.path, model)
+            about = {'part': name, 'time_s': time_s, 'remark': '; '.join(remarks),
+                     'pooled': pooled, **painted}  # fmt: skip
+            yield from _measured(about, experiment, model)
+        return
+    surface = _surface(folder, file)
+    motion = read_motion(run.path, file)
+    seen = look_at(surface, motion, model, max_pose_gap_s=file.max_pose_gap_s)
+    stamp_s = 1e-9 * float(motion.stamps_ns[0])
+    time_s = stamp_s if stamp_s > EARLIEST_S else _date(run.name, run)
+    painted = _film(seen.surface, seen.path, model)
+    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
+    remarks += seen.geometry.warnings
+    unused = run.remark
+    rows: list[dict[str, Any]] = []
+    if run.readings is not None:
+        points = folder / file.points if file.points else None
+        try:
+            readings = read_readings(run.readings, points, surface=seen.surface)
+            experiment = Experiment.of(run.name, seen.surface, seen.path, readings)
+            rows.extend(_measured({}, experiment, model))
+        except PaintError as error:
+            unused = str(error).removeprefix(f'{folder}/')
+    remarks += [f'simulated only: {unused}'] if unused else []
+    about = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks), 'pooled': True}
+    for row in rows or [{}]:
+        yield about | painted | row
+
+
+def _date(text: str, run: Run) -> float:
+    """Seconds since 1970 of the first date in a text."""
+    found = DATE.search(text)
+    try:
+        if found:
+            year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
+            told = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+            return told.timestamp()
+    except ValueError:
+        pass
+    raise ManyError(
+        f'{run.path}: it is not known when it was painted; put the date into its name, '
+        '2026-11-12_0730 say (a campaign: the key date), or record with the time of day'
+    )
+
+
+@lru_cache(maxsize=4)
+def _read_surface(
+    path: Path, scale: float, edge_m: float, down: tuple[float, ...] | None, body: str | None
+) -> Surface:
+    return read_mesh(path, scale, edge_m, None if down is None else np.array(down), body)
+
+
+def _surface(folder: Path, file: LineFile) -> Surface:
+    down = None if file.down is None else tuple(file.down)
+    return _read_surface(
+        folder / file.mesh, file.mesh_scale, file.max_edge_length_m, down, file.body
+    )
+
+
+def _film(surface: Surface, path: SprayPath, model: DepositionModel) -> dict[str, float | None]:
+    painted = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    painted.add(path)
+    figures = film_statistics(
+        painted.film_um, surface.vertex_areas_m2, painted.emitted_cm3
+    ).to_dict()
+    return {f'film_{name}': figures[name] for name in FIGURES}
+
+
+def _measured(
+    about: dict[str, Any], experiment: Experiment, model: DepositionModel
+) -> Iterator[dict[str, Any]]:
+    """A row for each point, with the derivatives that pooling needs."""
+    study = Study.of(Campaign((experiment,)), tuple(effect() for effect in EFFECTS.values()))
+    parameters = FreeParameters.of(model)
+    by_pattern = derivatives(
+        study.forward, parameters, parameters.encode(model), np.ones(len(study))
+    )
+    predicted_um = study.forward.predict_um(model)
+    by_effect = _marks_um(study.forward, model, predicted_um)
+    campaign = study.campaign
+    for row in range(len(study)):
+        first = campaign.means.first[row]
+        x, y, z = campaign.positions_m[row].tolist()
+        yield about | {
+            'point': str(campaign.experiments[0].readings.point[first]),
+            'x_m': x, 'y_m': y, 'z_m': z,
+            'repeats': int(campaign.means.repeats[row]),
+            'measured_um': float(study.measured_um[row]),
+            'sigma_um': float(study.sigma_um[row]),
+            'predicted_um': float(predicted_um[row]),
+            'by_pattern': by_pattern[row].tolist(),
+            'by_effect': by_effect[row].tolist(),
+        }  # fmt: skip
+
+
+def _marks_um(forward: Forward, model: DepositionModel, predicted_um: np.ndarray) -> np.ndarray:
+    """(P, A) change of the readings by each amplitude of the catalogue, in its typical size."""
+    columns = []
+    for effect_id, name in amplitudes():
+        effect: Effect = model.effect(effect_id) or EFFECTS[effect_id]()
+        info = type(effect).parameters()[name]
+        here = getattr(effect, name)
+        step = STEP * info['typical']
+        ends = [
+            value for value in (here - step, here + step) if info['low'] <= value <= info['high']
+        ]
+        moved = [
+            forward.predict_um(model.with_effect(effect.model_copy(update={name: value})))
+            for value in ends
+        ]
+        if len(ends) == 2:
+            columns.append((moved[1] - moved[0]) / (2.0 * STEP))
+        else:
+            columns.append((moved[0] - predicted_um) / (STEP if ends[0] > here else -STEP))
+    return np.column_stack(columns)

@@ -1,0 +1,178 @@
+"""What a line of parts says: a row for each part and point, what is shared, what changed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.provenance import origin
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.batch.line.causes import Pooled, pooled
+from paint_deposition.batch.line.change_points import Change, changes_of, date
+from paint_deposition.batch.line.measured import Measured, measured_parts
+from paint_deposition.batch.line.part import FIGURES
+from paint_deposition.batch.line.series import FEWEST, RUN_LENGTH, Series, series_of
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# For pooling only.
+DERIVATIVES = ('by_pattern', 'by_effect')
+
+
+@dataclass(frozen=True)
+class Line:
+    """The parts of a line.
+
+    Attributes:
+        folder: of the runs. model: all were set beside. files: shared by all, by what they are.
+        table: a row for each part and point, in the order of the runs.
+        computed: how many runs were computed now. workers: what computed them, in words.
+        strays: names of files of the folder that belong to no run.
+    """
+
+    folder: Path
+    model: DepositionModel
+    files: Mapping[str, Path]
+    table: pa.Table
+    computed: int
+    workers: str
+    strays: Sequence[str] = ()
+
+    @cached_property
+    def parts(self) -> list[Measured]:
+        """Those that were measured, oldest first."""
+        return measured_parts(self.table.to_pydict())
+
+    @cached_property
+    def pooled(self) -> Pooled | None:
+        """What they share; None with fewer than two."""
+        if len(self.parts) < 2:
+            return None
+        return pooled(self.parts, FreeParameters.of(self.model).pattern)
+
+    @cached_property
+    def series(self) -> list[Series]:
+        """Level, misfit and amplitudes; none with too few parts."""
+        if self.pooled is None or len(self.parts) < FEWEST:
+            return []
+        return series_of(self.parts, self.pooled)
+
+    @cached_property
+    def times_s(self) -> np.ndarray:
+        """(n,) of the measured parts."""
+        return np.array([part.time_s for part in self.parts])
+
+    @cached_property
+    def changes(self) -> list[Change]:
+        """Oldest first."""
+        return changes_of(self.series, self.times_s) if self.series else []
+
+    @cached_property
+    def runs(self) -> list[dict[str, Any]]:
+        """The first row of each part without its point, oldest first."""
+        names = ['part', 'time_s', 'remark', 'pooled', *(f'film_{name}' for name in FIGURES)]
+        there = [name for name in names if name in self.table.column_names]
+        if 'time_s' not in there:
+            return []
+        rows = {row['part']: row for row in self.table.select(there).to_pylist()[::-1]}
+        return sorted(
+            (row for row in rows.values() if row['time_s'] is not None),
+            key=lambda row: row['time_s'],
+        )
+
+    @property
+    def errors(self) -> list[tuple[str, str]]:
+        """Name of each run that cannot be used, and why."""
+        if 'error' not in self.table.column_names:
+            return []
+        told = self.table.select(['part', 'error']).to_pylist()
+        return [(row['part'], row['error']) for row in told if row['error']]
+
+    @cached_property
+    def remarks(self) -> list[tuple[str, str]]:
+        """Name of each part that has something odd about it, and what, oldest first."""
+        return [(run['part'], run['remark']) for run in self.runs if run.get('remark')]
+
+    @property
+    def sentence(self) -> str:
+        """The line in a line."""
+        count, readings = len(self.parts), sum(map(len, self.parts))
+        text = f'{len(self.runs)} parts'
+        if self.runs:
+            text += f' from {date(self.runs[0]["time_s"])} to {date(self.runs[-1]["time_s"])}'
+        text += f', {count} of them measured at {readings} points'
+        return f'{text}; {len(self.errors)} runs could not be used' if self.errors else text
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """What to say of it."""
+        yield self.sentence
+        if self.pooled is None:
+            yield 'nothing is pooled: fewer than two parts were measured'
+            return
+        scales = self.pooled.pool.scales
+        yield (
+            f'the level differs from part to part by {100 * scales.level:.1f} %, the gauge '
+            f'scatters {scales.noise:.2f} times as stated'
+        )
+        yield from (f'shared by all parts: {cause.sentence}' for cause in self.pooled.causes)
+        if not self.pooled.causes:
+            yield 'no effect that all parts share is proven'
+        yield from (f'changed: {change.sentence}' for change in self.changes)
+        if not self.series:
+            yield f'no charts: fewer than {FEWEST} parts were measured'
+        elif not self.changes:
+            yield 'nothing changed'
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``line.json``."""
+        found = self.pooled
+        scales = found and found.pool.scales
+        return {
+            'parts': len(self.runs),
+            'measured': len(self.parts),
+            'points': sum(map(len, self.parts)),
+            'computed': self.computed,
+            'workers': self.workers,
+            'first': date(self.runs[0]['time_s']) if self.runs else None,
+            'last': date(self.runs[-1]['time_s']) if self.runs else None,
+            'pooled': scales and {
+                'level_sd_percent': 100.0 * scales.level,
+                'noise_factor': scales.noise,
+                'misfit_share': scales.misfit[0] if scales.misfit else 0.0,
+                'causes': [cause.to_dict() for cause in found.causes] if found else [],
+            },
+            'charts': [self._chart(one) for one in self.series],
+            'false_alarms': {'one_in_parts': RUN_LENGTH},
+            'changes': [change.to_dict() for change in self.changes],
+            'errors': [{'run': name, 'error': error} for name, error in self.errors],
+            'remarks': [{'part': name, 'remark': remark} for name, remark in self.remarks],
+            'without_run': list(self.strays),
+            'provenance': origin(self.model, self.files),
+        }  # fmt: skip
+
+    def _chart(self, series: Series) -> dict[str, Any]:
+        drawn = series.charts
+        return {
+            'series': series.name,
+            'unit': series.unit,
+            'members': list(series.members),
+            'centre': series.centre,
+            'baseline_parts': series.baseline,
+            'limits': {
+                'shewhart': drawn.shewhart_limit,
+                'ewma': float(drawn.ewma_limit[-1]),
+                'cusum': drawn.cusum_limit,
+            },
+            'alarms': {
+                chart: [self.parts[row].name for row in rows]
+                for chart, rows in drawn.alarms.items()
+            },
+        }

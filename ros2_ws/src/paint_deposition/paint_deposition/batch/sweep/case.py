@@ -1,0 +1,88 @@
+"""One case of a sweep, as a worker computes it: by the functions that the commands go through."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from typing import Any
+
+from paint_deposition.api.inference import compare
+from paint_deposition.api.planning import plan
+from paint_deposition.api.simulation import simulate
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.batch.sweep.varied_motion import varied_motion
+
+# Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
+FILM, PREDICTED = 'film_um', 'predicted_um'
+WARNINGS = 'warnings'
+Columns = dict[str, list[Any]]
+
+
+def computed(given: Mapping[str, Any], *inputs: Any) -> Columns:
+    """The figures of a case, one row.
+
+    Args:
+        given: ``model``; and ``motion``, ``passes``, ``target_um``, ``tolerance_um``,
+            ``keep_films`` of a film.
+        inputs: a campaign; or a surface, a motion (None: passes are planned) and readings (None:
+            nothing is predicted).
+
+    A case that has no film says why in the column ``error``.
+    """
+    try:
+        if isinstance(inputs[0], Campaign):
+            figures = _compared(given['model'], inputs[0])
+        else:
+            figures = _painted(given, *inputs)
+    except PaintError as error:
+        figures = {'error': str(error)}
+    return {name: [value] for name, value in figures.items()}
+
+
+def _painted(
+    given: Mapping[str, Any],
+    surface: Surface,
+    trajectory: Trajectory | None,
+    readings: Readings | None,
+) -> dict[str, Any]:
+    model: DepositionModel = given['model']
+    figures: dict[str, Any] = {}
+    if trajectory is None:
+        planned = plan(surface, model, **given['passes'])
+        trajectory = planned.trajectory
+        figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
+    film = simulate(
+        surface, varied_motion(trajectory, **given['motion']), model, readings=readings,
+        target_um=given['target_um'], tolerance_um=given['tolerance_um'],
+    )  # fmt: skip
+    statistics = film.statistics
+    figures |= {
+        **statistics.to_dict(),
+        'sigma_n': statistics.std_dev_um / statistics.mean_um if statistics.mean_um else None,
+        'spraying_time_s': film.path.spraying_time_s,
+        'film_sha256': hashlib.sha256(film.film_um.tobytes()).hexdigest(),
+        WARNINGS: '; '.join(film.warnings),
+    }
+    if film.predicted_um is not None:
+        figures[PREDICTED] = film.predicted_um.tolist()
+    if given['keep_films']:
+        figures[FILM] = film.film_um.tolist()
+    return figures
+
+
+def _compared(model: DepositionModel | None, campaign: Campaign) -> dict[str, Any]:
+    found = compare(campaign, model)
+    points = found.points
+    return {
+        'readings': len(found.readings),
+        'rmse_um': points.rmse_um,
+        'mean_residual_um': float(points.residual_um.mean()),
+        'level': float(points.measured_um.sum() / points.predicted_um.sum()),
+        'noise_um': found.study.noise.typical_um,
+        'regions_of_misfit': len(found.regions),
+    }

@@ -1,0 +1,235 @@
+"""A sweep as work: its cases with all that they share, read once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from paint_deposition.batch.cluster.code import code_digest
+from paint_deposition.batch.cluster.finished import content_digest, digest_of
+from paint_deposition.batch.cluster.run import Case
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError
+from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.batch.sweep.variations import (
+    DRAW,
+    OF_MOTION,
+    OF_PASSES,
+    Values,
+    effects_of,
+    named_models,
+    variations,
+    varied_model,
+)
+
+Tell = Callable[[str], None]
+NOTHING = 'nothing'
+
+
+@dataclass
+class Job:
+    """The cases of a sweep and their inputs.
+
+    Attributes:
+        file: the sweep. folder: that its paths are relative to.
+        values: of each case, what varies. cases: in the same order.
+        inputs: what they share, by name.
+        files: read for it, by what they are.
+        notes: for the user, a line each.
+        effects: by id, those of the library and users' own of the models.
+    """
+
+    file: SweepFile
+    folder: Path
+    values: list[Values] = field(default_factory=list)
+    cases: list[Case] = field(default_factory=list)
+    inputs: dict[str, Any] = field(default_factory=lambda: {NOTHING: None})
+    files: dict[str, Path] = field(default_factory=dict)
+    notes: dict[str, None] = field(default_factory=dict)
+    effects: dict[str, type[Effect]] = field(default_factory=dict)
+    _read: dict[Any, Any] = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def of(file: SweepFile, folder: Path, tell: Tell = lambda line: None) -> Job:
+        """Read everything that a sweep names, each file once.
+
+        Raises:
+            PaintError: a file that cannot be used, or values that do not go together.
+        """
+        job = Job(file, folder)
+        models = job._named_models()
+        job.effects = effects_of(models)
+        job.values = variations(file, models)
+        for number, values in enumerate(job.values):
+            if number % 100 == 0:
+                tell(f'preparing case {number + 1} of {len(job.values)}')
+            job.cases.append(job._case(values))
+        return job
+
+    def _case(self, values: Values) -> Case:
+        campaign = self._named('campaign', values)
+        if campaign:
+            self._refuse_beside_a_campaign(values)
+        model = self._model(values)
+        if campaign:
+            inputs: tuple[str, ...] = (self._campaign(values),)
+            options: dict[str, Any] = {}
+        else:
+            inputs = self._of_a_film(values)
+            options = self._options(values, planned=inputs[1] == NOTHING)
+        own = [effect.file_content.decode() for effect in model.effects] if model else []
+        digest = digest_of(code_digest(), model and model_digest(model), own, options, inputs)
+        return Case(digest, {'model': model, **options}, inputs)
+
+    def _named(self, key: str, values: Values) -> Path | None:
+        name = values.get(key, getattr(self.file, key))
+        return self.folder / name if name else None
+
+    def _once(self, key: Any, read: Callable[[], Any]) -> Any:
+        if key not in self._read:
+            self._read[key] = read()
+        return self._read[key]
+
+    def _kept(self, key: Any, what: str, path: Path, read: Callable[[], Any]) -> str:
+        """The name of an input that is read once from a file."""
+
+        def take() -> str:
+            value = read()
+            name = f'{what}-{content_digest(value)}'
+            self.inputs[name] = value
+            self.files[f'{what} {path.name}'] = path
+            return name
+
+        return self._once((what, path, key), take)
+
+    def _named_models(self) -> list[DepositionModel]:
+        """All models that the sweep names, those of campaigns included."""
+        paths = [self.folder / name for name in named_models(self.file, 'model')]
+        for name in named_models(self.file, 'campaign'):
+            own = model_of_campaign(self.folder / name)
+            paths += [Path(own)] if own else []
+        return [self._model_file(path).model for path in paths]
+
+    def _model_file(self, path: Path) -> ModelFile:
+        self.files[f'model {path.name}'] = path
+        return self._once(('model', path), lambda: read_model_file(path))
+
+    def _model(self, values: Values) -> DepositionModel | None:
+        """The model of a case; None: a campaign's own, or one fitted to it."""
+        path = self._named('model', values)
+        campaign = self._named('campaign', values)
+        changes = 'effects' in values or any('.' in name for name in values) or DRAW in values
+        if path is None and campaign:
+            if not changes:
+                return None
+            own = self._once(('start', campaign), partial(model_of_campaign, campaign))
+            path = Path(own) if own else None
+        if path is None and (campaign or DRAW in values):
+            what = f'{campaign} names no model' if campaign else 'no model is given'
+            raise ManyError(f'{what}, and the parameters of one vary; give model')
+        if path is None:
+            return varied_model(DepositionModel(), values, self.effects)
+        file = self._model_file(path)
+        model = file.model
+        if DRAW in values:
+            model = self._draws(path, file)[values[DRAW]]
+        return varied_model(model, values, self.effects)
+
+    def _draws(self, path: Path, file: ModelFile) -> list[DepositionModel]:
+        sample, posterior = self.file.sample, file.posterior
+        assert sample is not None
+        if posterior is None:
+            raise ManyError(
+                f'{path}: has no posterior to draw from; take a model that calibrate, diagnose '
+                'or refit wrote'
+            )
+        return self._once(
+            ('draws', path), lambda: drawn(file.model, posterior, sample.count, sample.seed)
+        )
+
+    def _campaign(self, values: Values) -> str:
+        path = self._named('campaign', values)
+        assert path is not None
+        pose = values.get('part_pose', self.file.part_pose)
+        read = partial(read_campaign, path, self._say, pose)
+        return self._kept(str(pose), 'campaign', path, read)
+
+    def _say(self, line: str) -> None:
+        if not line.startswith('reading '):
+            self.notes[line] = None
+
+    def _of_a_film(self, values: Values) -> tuple[str, str, str]:
+        mesh, motion = self._named('mesh', values), self._named('trajectory', values)
+        if mesh is None:
+            raise ManyError('no mesh is given; give mesh, or campaign')
+        file = self.file
+        surface = self._kept(
+            None, 'mesh', mesh,
+            lambda: read_mesh(mesh, file.mesh_scale, file.max_edge_length_m, None, file.body),
+        )  # fmt: skip
+        recorded = NOTHING if motion is None else self._motion(motion, values)
+        places = NOTHING
+        if file.readings:
+            path = self.folder / file.readings
+            places = self._kept(
+                surface, 'readings', path,
+                lambda: read_readings(path, None, surface=self.inputs[surface]),
+            )  # fmt: skip
+        for note in self.inputs[surface].notes:
+            self.notes[note] = None
+        return surface, recorded, places
+
+    def _motion(self, path: Path, values: Values) -> str:
+        told = self.file.model_dump(include=set(MotionSource.model_fields))
+        told |= {'urdf': told['urdf'] and str(self.folder / told['urdf'])}
+        if 'part_pose' in values:
+            told['part_pose'] = values['part_pose']
+        source = MotionSource.model_validate(told)
+        name = self._kept(str(told), 'trajectory', path, lambda: read_motion(path, source))
+        for note in (*self.inputs[name].notes, *self.inputs[name].warnings):
+            self.notes[note] = None
+        return name
+
+    def _options(self, values: Values, planned: bool) -> dict[str, Any]:
+        file = self.file
+        wrong = [name for name in (OF_MOTION if planned else OF_PASSES) if name in values]
+        if wrong:
+            remedy = 'give a trajectory' if planned else 'leave trajectory out, or vary '
+            remedy += '' if planned else ', '.join(OF_MOTION)
+            raise ManyError(
+                f'{wrong[0]} varies {"a recorded motion" if planned else "planned passes"}; '
+                f'{remedy}'
+            )
+        passes = file.passes.model_dump() | {n: values[n] for n in OF_PASSES if n in values}
+        if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
+            raise ManyError(
+                'passes are planned, but neither their speed nor a target is told; give passes: '
+                '{speed_m_per_s: ...}, passes: {target_um: ...}, or a trajectory'
+            )
+        return {
+            'motion': {name: values[name] for name in OF_MOTION if name in values},
+            'passes': passes if planned else {},
+            'target_um': file.target_um,
+            'tolerance_um': file.tolerance_um,
+            'keep_films': file.keep_films,
+        }
+
+    @staticmethod
+    def _refuse_beside_a_campaign(values: Values) -> None:
+        for name in ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES):
+            if name in values:
+                raise ManyError(
+                    f'{name} varies, but a campaign tells its own parts and motions; leave one out'
+                )

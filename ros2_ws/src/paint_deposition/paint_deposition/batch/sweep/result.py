@@ -1,0 +1,212 @@
+"""What a sweep found: a row for each case, and its files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from paint_deposition.batch.cluster.finished import Finished
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
+from paint_deposition.files.provenance import origin
+from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
+from paint_deposition.batch.sweep.job import Job
+from paint_deposition.batch.sweep.picture import write_sweep_picture
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+# What a case says that leaves a thing, or everything, as the sweep's file has it.
+UNCHANGED = 'unchanged'
+# What is judged and drawn, of films and of campaigns, each with its label; less is better.
+JUDGED = {'sigma_n': 'unevenness σ_N', 'rmse_um': 'error at the readings [µm]'}
+LEVELS = {'mean_um': 'mean film [µm]', 'level': 'measured over predicted'}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The finished cases of a sweep.
+
+    Attributes:
+        job: what was swept.
+        table: a row for each case in the order of the job: what varied, then its figures.
+        computed: how many cases this run computed; the others had been finished before.
+        workers: what computed them, in words.
+    """
+
+    job: Job
+    table: pa.Table
+    computed: int
+    workers: str
+
+    @staticmethod
+    def of(job: Job, finished: Finished, computed: int, workers: str) -> Sweep:
+        """Collect the results of a job that is finished."""
+        import pyarrow as pa
+
+        figures = finished.table(case.digest for case in job.cases)
+        columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
+        for name in dict.fromkeys(name for values in job.values for name in values):
+            columns[name] = _column([values.get(name) for values in job.values])
+        columns |= {name: figures[name] for name in figures.column_names}
+        if 'error' not in columns:
+            columns['error'] = pa.nulls(len(job.cases), pa.string())
+        return Sweep(job, pa.table(columns), computed, workers)
+
+    def __repr__(self) -> str:
+        return f'Sweep({self.sentence})'
+
+    def column(self, name: str) -> np.ndarray:
+        """(n,) numbers of the cases; NaN where a case has none."""
+        values = self.table[name].to_pylist()
+        return np.array([np.nan if value is None else value for value in values], dtype=float)
+
+    @property
+    def varied(self) -> tuple[str, ...]:
+        """Names of what varied."""
+        return tuple(dict.fromkeys(name for values in self.job.values for name in values))
+
+    @property
+    def errors(self) -> list[tuple[int, str]]:
+        """Number of each case without a result, and why."""
+        told = enumerate(self.table['error'].to_pylist(), start=1)
+        return [(number, error) for number, error in told if error]
+
+    @property
+    def warnings(self) -> list[tuple[int, str]]:
+        """Number of each case with an odd film, and what is odd about it."""
+        if WARNINGS not in self.table.column_names:
+            return []
+        told = enumerate(self.table[WARNINGS].to_pylist(), start=1)
+        return [(number, line) for number, line in told if line]
+
+    @property
+    def judged(self) -> str | None:
+        """The figure by which cases are judged, None if no case has a result."""
+        return next((name for name in JUDGED if name in self.table.column_names), None)
+
+    @property
+    def best(self) -> int | None:
+        """Row of the most even film, or of the least error."""
+        if self.judged is None or not np.isfinite(self.column(self.judged)).any():
+            return None
+        return int(np.nanargmin(self.column(self.judged)))
+
+    @property
+    def sentence(self) -> str:
+        """The sweep in a line."""
+        count, failed = len(self.job.cases), len(self.errors)
+        text = f'{count} cases, {self.computed} computed now, {count - self.computed} before'
+        return f'{text}, {failed} without a result' if failed else text
+
+    @property
+    def lines(self) -> Iterator[str]:
+        """What to say of it."""
+        yield self.sentence
+        for name, label in (JUDGED | LEVELS).items():
+            if name in self.table.column_names:
+                values = self.column(name)
+                low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95))
+                yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
+        if self.best is not None:
+            told = self.job.values[self.best]
+            shown = ', '.join(f'{name} {_short(value)}' for name, value in told.items())
+            shown = shown or UNCHANGED
+            yield f'best by {JUDGED[str(self.judged)]}: case {self.best + 1}, {shown}'
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``sweep.json``."""
+        names = [name for name in (*JUDGED, *LEVELS) if name in self.table.column_names]
+        best = self.best
+        return {
+            'cases': len(self.job.cases),
+            'computed': self.computed,
+            'workers': self.workers,
+            'varied': list(self.varied),
+            'figures': {name: _spread(self.column(name)) for name in names},
+            'judged_by': self.judged,
+            'best': None if best is None else {'case': best + 1, 'values': self.job.values[best]},
+            'errors': [{'case': number, 'error': error} for number, error in self.errors],
+            'notes': list(self.job.notes),
+            'provenance': origin(files=self.job.files),
+        }
+
+
+def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
+    """Write tables, figures and the picture; returns the paths."""
+    names = sweep.table.column_names
+    lists = [name for name in (FILM, PREDICTED) if name in names]
+    files = [write_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
+    if FILM in names:
+        files.append(write_parquet(folder / 'films.parquet', sweep.table.select(['case', FILM])))
+    if PREDICTED in names:
+        files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
+    files.append(folder / 'sweep.json')
+    write_json(files[-1], sweep.to_dict())
+    drawn = [(name, label) for name, label in (JUDGED | LEVELS).items() if name in names]
+    over = {name: _drawn_over(sweep, name) for name in sweep.varied if name != 'part_pose'}
+    if drawn and over:
+        results = {label: sweep.column(name) for name, label in drawn}
+        picture = folder / f'sweep.{pictures}'
+        files.append(write_sweep_picture(picture, over, results, sweep.sentence))
+    return files
+
+
+def _points(sweep: Sweep) -> pa.Table:
+    """A row for each case and reading, with where it lies."""
+    import pyarrow as pa
+
+    found: dict[str, list[Any]] = {
+        name: [] for name in ('case', 'point', 'x_m', 'y_m', 'z_m', PREDICTED)
+    }
+    for case, predicted in enumerate(sweep.table[PREDICTED].to_pylist()):
+        if predicted is None:
+            continue
+        readings = sweep.job.inputs[sweep.job.cases[case].inputs[2]]
+        rows = len(predicted)
+        found['case'] += [case + 1] * rows
+        found['point'] += readings.point.tolist()
+        for axis, column in zip('xyz', readings.positions_m.T, strict=True):
+            found[f'{axis}_m'] += column.tolist()
+        found[PREDICTED] += predicted
+    return pa.table(found)
+
+
+def _column(values: Sequence[Any]) -> pa.Array:
+    """Numbers and texts as they are, lists as JSON."""
+    import pyarrow as pa
+
+    if any(isinstance(value, list) for value in values):
+        return pa.array([None if value is None else json.dumps(value) for value in values])
+    if any(isinstance(value, float) for value in values):
+        return pa.array([None if value is None else float(value) for value in values])
+    return pa.array(values)
+
+
+def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
+    """(n,) numbers that varied, or texts: what files are called, which effects act."""
+    told = getattr(sweep.job.file, name, None)
+    given = [values.get(name, told) for values in sweep.job.values]
+    if all(isinstance(value, int | float) for value in given if value is not None):
+        return sweep.column(name)
+    return np.array([_words(value) for value in given])
+
+
+def _words(value: list[str] | str | None) -> str:
+    if isinstance(value, list):
+        return '\n'.join(value) or 'none'
+    return value.replace('/', '/\n') if value else UNCHANGED
+
+
+def _spread(values: np.ndarray) -> dict[str, float]:
+    low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95)).tolist()
+    return {'median': middle, 'low_5': low, 'high_95': high}
+
+
+def _short(value: Any) -> str:
+    return f'{value:.6g}' if isinstance(value, float) else str(value)

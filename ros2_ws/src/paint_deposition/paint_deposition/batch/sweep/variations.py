@@ -1,0 +1,210 @@
+"""What a sweep varies: every combination of its grid, its cases and its draws."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+from pydantic import BaseModel
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError, did_you_mean
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
+from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.batch.sweep.sweep_file import MOST_CASES, SweepFile
+
+INPUTS = ('mesh', 'trajectory', 'campaign', 'model')
+# Of passes that are planned, and of a recording as it was.
+OF_PASSES = ('index_m', 'standoff_m', 'speed_m_per_s')
+OF_MOTION = ('speed_factor', 'standoff_change_m', 'flow_factor')
+SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
+# Of the pattern of one brush of several: 'brush_2.K1_cm3_per_s'.
+BRUSH = 'brush_'
+# Which draw from the posterior a case has.
+DRAW = 'draw'
+
+Values = dict[str, Any]
+
+
+def effects_of(models: Iterable[DepositionModel]) -> dict[str, type[Effect]]:
+    """Effects by id: those of the library, and users' own that the models have."""
+    own = {e.id: type(e) for model in models for e in model.effects if e.file is not None}
+    return {**EFFECTS, **own}
+
+
+def known_names(models: Sequence[DepositionModel] = ()) -> list[str]:
+    """Everything that may vary of these models."""
+    of_model = [f'{section}.{n}' for section, cls in SECTIONS.items() for n in cls.model_fields]
+    numbers = dict.fromkeys(brush.number for model in models for brush in model.brushes)
+    of_brushes = [f'{BRUSH}{k}.{n}' for k in numbers for n in PlanarPattern.model_fields]
+    of_effects = [f'{e.id}.{n}' for e in effects_of(models).values() for n in e.parameters()]
+    others = (*INPUTS, 'part_pose', 'effects', *OF_PASSES, *OF_MOTION)
+    return [*others, *of_model, *of_brushes, *of_effects]
+
+
+def named_models(file: SweepFile, key: str) -> list[str]:
+    """Files that a sweep names under ``key``, a model or a campaign: each once."""
+    varied = (*file.grid.get(key, ()), *(case[key] for case in file.cases if key in case))
+    return [n for n in dict.fromkeys((getattr(file, key), *varied)) if isinstance(n, str)]
+
+
+def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[Values]:
+    """The values of each case, in the order grid, cases, draws, the last one running fastest.
+
+    Args:
+        file: the sweep.
+        models: that it names; the parameters of their effects may vary.
+
+    Raises:
+        ManyError: an unknown name, a name in two blocks, or too many cases.
+    """
+    names = [list(file.grid), sorted({n for case in file.cases for n in case}), _drawn_names(file)]
+    seen: set[str] = set()
+    known = known_names(models)
+    for name in (name for block in names for name in block):
+        _require_known(name, known)
+        if name in seen:
+            raise ManyError(f'{name} varies twice, in two of grid, cases, sample; keep one')
+        seen.add(name)
+    draws = file.sample.count if file.sample else 1
+    count = int(np.prod([len(v) for v in file.grid.values()])) * max(len(file.cases), 1) * draws
+    if count > MOST_CASES:
+        raise ManyError(f'{count} cases are more than {MOST_CASES}; vary less at once')
+    blocks = product(_combined(file.grid), file.cases or [{}], _draws(file))
+    found = [{**grid, **case, **draw} for grid, case, draw in blocks]
+    for values in found:
+        _require_sense(values)
+    return found
+
+
+def _combined(grid: Mapping[str, list[Any]]) -> Iterator[Values]:
+    for values in product(*grid.values()):
+        yield dict(zip(grid, values, strict=True))
+
+
+def _drawn_names(file: SweepFile) -> list[str]:
+    return list(file.sample.vary) if file.sample else []
+
+
+def _draws(file: SweepFile) -> list[Values]:
+    if file.sample is None:
+        return [{}]
+    rng = np.random.default_rng(file.sample.seed)
+    columns = {}
+    for name, spread in file.sample.vary.items():
+        low, high = spread.normal or spread.uniform
+        draw = rng.normal if spread.normal else rng.uniform
+        columns[name] = draw(low, high, file.sample.count).tolist()
+    if file.sample.posterior:
+        columns[DRAW] = list(range(file.sample.count))
+    return [{name: column[k] for name, column in columns.items()}
+            for k in range(file.sample.count)]  # fmt: skip
+
+
+def _require_known(name: str, known: Sequence[str]) -> None:
+    if name not in known:
+        near = [other for other in known if other.split('.')[-1] == name]
+        owner, dot, _ = name.partition('.')
+        if dot and not any(other.startswith(f'{owner}.') for other in known):
+            owners = dict.fromkeys(other.partition('.')[0] for other in known if '.' in other)
+            raise ManyError(
+                f'{name} cannot vary: no effect {owner!r} is in the library or in a model of the '
+                f'sweep; {did_you_mean(owner, owners)}'
+            )
+        remedy = f'did you mean {near[0]!r}?' if near else did_you_mean(name, known)
+        raise ManyError(f'nothing called {name!r} can vary; {remedy}')
+
+
+def _require_sense(values: Values) -> None:
+    """Refuse values of another kind than their name has."""
+    for name, value in values.items():
+        if name in INPUTS:
+            _require(isinstance(value, str), name, value, 'the name of a file')
+        elif name == 'part_pose':
+            numbers = isinstance(value, list) and all(map(_is_number, value))
+            _require(numbers and is_pose(value), name, value, POSE_WORDS)
+        elif name == 'effects':
+            texts = isinstance(value, list) and all(isinstance(one, str) for one in value)
+            _require(texts, name, value, 'a list of effects of the model, [] for none')
+        else:
+            _require(_is_number(value), name, value, 'a number')
+            if name in (*OF_PASSES, 'speed_factor', 'flow_factor'):
+                _require(value > 0.0, name, value, 'a number above 0')
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
+
+
+def _require(holds: object, name: str, value: Any, expected: str) -> None:
+    if not holds:
+        raise ManyError(f'{name} is {value!r}; expected {expected}')
+
+
+def varied_model(
+    model: DepositionModel, values: Values, effects: Mapping[str, type[Effect]] = EFFECTS
+) -> DepositionModel:
+    """The model with the values of a case; an effect that it lacks is added.
+
+    Args:
+        model: as in its file.
+        values: of the case.
+        effects: that may be added, by id.
+
+    Raises:
+        ManyError: a value that the parameter cannot have, or an effect that the model has not.
+    """
+    if 'effects' in values:
+        model = _with_effects(model, values['effects'])
+    for name, value in values.items():
+        owner, dot, field = name.partition('.')
+        if not dot:
+            continue
+        if owner == 'planar' and model.brushes:
+            numbers = [f'{BRUSH}{brush.number}' for brush in model.brushes]
+            raise ManyError(
+                f'{name} varies, but the model has a pattern for each brush; vary '
+                f'{" or ".join(f"{number}.{field}" for number in numbers)}'
+            )
+        if owner in SECTIONS:
+            section = _changed(getattr(model, owner), field, value, name)
+            model = model.model_copy(update={owner: section})
+        elif owner.startswith(BRUSH):
+            model = _with_brush(model, int(owner.removeprefix(BRUSH)), field, value, name)
+        else:
+            effect = model.effect(owner) or effects[owner]()
+            model = model.with_effect(_changed(effect, field, value, name))
+    return model
+
+
+def _with_brush(
+    model: DepositionModel, number: int, field: str, value: float, name: str
+) -> DepositionModel:
+    model.with_brush(number)  # which says so where there is none of that number
+    patterns = [
+        _changed(brush.planar, field, value, name) if brush.number == number else brush.planar
+        for brush in model.brushes
+    ]
+    return model.with_patterns(patterns)
+
+
+def _with_effects(model: DepositionModel, wanted: Iterable[str]) -> DepositionModel:
+    there = [effect.id for effect in model.effects]
+    for effect_id in wanted:
+        if effect_id not in there:
+            raise ManyError(f'the model has no effect {effect_id!r}; it has: {there or "none"}')
+    kept = tuple(effect for effect in model.effects if effect.id in wanted)
+    return model.model_copy(update={'effects': kept})
+
+
+def _changed(section: Any, field: str, value: float, name: str) -> Any:
+    """A copy with one value, checked as a model file's is."""
+    from paint_deposition.files.refusals import checked
+
+    values = section.model_dump() | {field: float(value)}
+    return checked(type(section), name.partition('.')[0], values, ManyError)

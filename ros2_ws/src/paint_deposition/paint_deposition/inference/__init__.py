@@ -1,0 +1,1 @@
+"""What readings say of the model: readings, fit, comparison, diagnosis."""

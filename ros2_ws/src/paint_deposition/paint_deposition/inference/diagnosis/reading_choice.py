@@ -1,0 +1,269 @@
+"""Where to put the gauge on a painted part, so that missing effects are found soonest."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged
+from paint_deposition.inference.diagnosis.testability import power_along
+from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ReadingsError
+from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.face_places import from_edges_m
+from paint_deposition.part.gauge_places import FOOT_M, can_stand, grid_places, spread_places
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
+
+DEFAULT_POINTS, DEFAULT_REPEATS = 60, 8
+# With fewer points than this the pattern's parameters alone take up all that is read.
+LEAST_POINTS, MOST_POINTS = 12, 400
+# Places from which the points are chosen.
+CANDIDATES = 700
+# Least distance between points, as a share of the side of the square that each stands for.
+APART = 0.5
+# Less than this share of the mean film is hardly painted.
+PAINTED = 0.2
+# Draws of the noise with which the power is simulated.
+DRAWS = 400
+# A point speaks for an effect if it carries this many times its even share of what is seen of it,
+# for as many effects at the most.
+SPEAKS, MOST_NAMED = 1.5, 3
+
+
+@dataclass(frozen=True)
+class ChosenReadings:
+    """Points for the gauge on a part, in the order of a walk over it.
+
+    Attributes:
+        surface: the part. path: of the gun. model: what it sprayed, as far as known.
+        film_um: (V,) film expected at the vertices of the surface [um].
+        vertices: (P,) where the points are.
+        expected_um: (P,) what the gauge should show there [um].
+        sigma_um: (P,) standard deviation of one reading, with the film's texture [um].
+        repeats: how many points are to be read twice.
+        speaks_for: (P,) effects of which each point shows most.
+        power: by effect, probability that the diagnosis detects it at its typical size; the
+            same for as many points on a grid in ``grid_power``.
+        foot_m, apart_m: distance kept from edges, and between points [m].
+    """
+
+    surface: Surface
+    path: SprayPath
+    model: DepositionModel
+    film_um: np.ndarray
+    vertices: np.ndarray
+    expected_um: np.ndarray
+    sigma_um: np.ndarray
+    repeats: int
+    speaks_for: tuple[tuple[str, ...], ...]
+    power: dict[str, float]
+    grid_power: dict[str, float]
+    foot_m: float
+    apart_m: float
+
+    def __len__(self) -> int:
+        return len(self.vertices)
+
+    def __repr__(self) -> str:
+        return f'ChosenReadings({self.sentence})'
+
+    @property
+    def names(self) -> list[str]:
+        """(P,) labels of the points."""
+        digits = max(2, len(str(len(self))))
+        return [f'P{k:0{digits}d}' for k in range(1, len(self) + 1)]
+
+    @property
+    def positions_m(self) -> np.ndarray:
+        """(P, 3) in the mesh frame [m]."""
+        return self.surface.vertices_m[self.vertices]
+
+    @property
+    def normals(self) -> np.ndarray:
+        """(P, 3) outward unit normals."""
+        return self.surface.normals[self.vertices]
+
+    @property
+    def from_edges_m(self) -> np.ndarray:
+        """(P, 2) distance from the left edge and height over the lower edge [m]."""
+        return from_edges_m(self.surface, self.positions_m)
+
+    @property
+    def read_twice(self) -> np.ndarray:
+        """Rows of the points that are to be read again at the end, spread over the walk."""
+        return np.linspace(0, len(self) - 1, self.repeats).round().astype(int)
+
+    @property
+    def sentence(self) -> str:
+        """What the points are worth, in a sentence."""
+        mean, grid = (float(np.mean([*p.values()])) for p in (self.power, self.grid_power))
+        return (
+            f'{len(self)} points: an effect of typical size is detected with a probability of '
+            f'{100 * mean:.0f} % on average, on a grid of {len(self)} with {100 * grid:.0f} %'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures, as in ``measure.json``."""
+        rows = zip(
+            self.names, self.positions_m.tolist(), self.normals.tolist(),
+            self.from_edges_m.tolist(), self.expected_um.tolist(), self.sigma_um.tolist(),
+            self.speaks_for, strict=True,
+        )  # fmt: skip
+        return {
+            'points': [
+                {
+                    'point': name, **dict(zip(('x_m', 'y_m', 'z_m'), position, strict=True)),
+                    'normal': normal, 'from_left_m': face[0], 'height_m': face[1],
+                    'expected_um': film, 'sigma_um': sigma, 'speaks_for': list(effects),
+                }
+                for name, position, normal, face, film, sigma, effects in rows
+            ],
+            'read_twice': [self.names[k] for k in self.read_twice],
+            'power': [
+                {'effect': name, 'chosen': power, 'grid': self.grid_power[name]}
+                for name, power in self.power.items()
+            ],
+            'mean_power': {
+                'chosen': float(np.mean([*self.power.values()])),
+                'grid': float(np.mean([*self.grid_power.values()])),
+            },
+            'foot_m': self.foot_m,
+            'apart_m': self.apart_m,
+        }  # fmt: skip
+
+
+@on_one_thread
+def choose(
+    part: UnmeasuredPart,
+    count: int,
+    repeats: int = DEFAULT_REPEATS,
+    foot_m: float = FOOT_M,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+) -> ChosenReadings:
+    """Choose points for the gauge.
+
+    Args:
+        part: what was painted how.
+        count: of points. repeats: of these to be read twice, for the noise of the gauge.
+        foot_m: of the gauge, from its middle to its rim; the distance kept from edges [m].
+        seed: of the places tried and of the noise simulated.
+        progress: called with a line for each step.
+
+    Raises:
+        ReadingsError: the part has no room for so many points.
+    """
+    _refuse_odd(count, repeats)
+    progress('the film')
+    surface = part.surface
+    film_um = part.film_um
+    if film_um.max() < NO_PAINT_UM:
+        raise ReadingsError('no paint lands on the part; check the trajectory and --part-pose')
+    usable = usable_places(surface, film_um, foot_m)
+    places = spread_places(surface, usable, max(CANDIDATES, 4 * count), seed)
+    if len(places) < count:
+        raise _no_room(len(places), count, foot_m)
+    apart_m = APART * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
+    progress('what the effects change')
+    marks = marks_at(part, places)
+    progress('choosing points')
+    rows = exchanged(marks, surface.vertices_m[places], count, apart_m)
+    if len(rows) < count:
+        raise _no_room(len(rows), count, foot_m)
+    face = from_edges_m(surface, surface.vertices_m[places[rows]])
+    rows = rows[_walk(face, 2.0 * apart_m)]
+    speaks_for = _speaks_for(marks, rows)
+    progress('how surely effects would be found')
+    freedom = float(repeats) if repeats >= ENOUGH_REPEATS else ASSUMED_FREEDOM
+    study = part.study(places[rows])
+    grid = grid_places(surface, usable, count)
+    found, on_grid = (power_of(part, at, freedom, seed) for at in (places[rows], grid))
+    return ChosenReadings(
+        surface, part.path, part.model, film_um, places[rows], study.measured_um,
+        study.sigma_um, repeats,
+        speaks_for, found, on_grid, foot_m, apart_m,
+    )  # fmt: skip
+
+
+def _no_room(found: int, count: int, foot_m: float) -> ReadingsError:
+    return ReadingsError(
+        f'there is room for {found} of {count} points, {foot_m * 1e3:g} mm off edges and on '
+        'painted surface that is not strongly curved; ask for fewer, or give a smaller --foot-m'
+    )
+
+
+def usable_places(surface: Surface, film_um: np.ndarray, foot_m: float = FOOT_M) -> np.ndarray:
+    """(V,) bool, vertices that are painted and where the gauge can stand."""
+    # The mean over the paint, not over the part: a bare side does not count.
+    volume = surface.vertex_areas_m2 * film_um
+    return can_stand(surface, foot_m) & (film_um > PAINTED * (volume @ film_um) / volume.sum())
+
+
+def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> Marks:
+    """What readings at these vertices (C,) would show."""
+    study = part.study(vertices)
+    fit = part.fit(study)
+    laws = part.sensitivities(study, fit)
+    return Marks(
+        fit.jacobian @ fit.parameters.prior.factor,
+        np.hstack([law.columns for law in laws]),
+        np.array([law.id for law in laws for _ in law.names]),
+    )
+
+
+def power_of(
+    part: UnmeasuredPart, vertices: np.ndarray, freedom: float, seed: int = 0
+) -> dict[str, float]:
+    """By effect, probability that the test of the diagnosis finds it at its typical size.
+
+    The mean over its amplitudes and shapes.
+
+    Args:
+        part: what was painted how. vertices: (P,) where it is read.
+        freedom: degrees of freedom of the noise estimate.
+        seed: of the noise simulated.
+    """
+    space = part.space(part.study(vertices), freedom)
+    null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]
+    found: dict[str, list[float]] = {}
+    for law in (e.sensitivity for e in space.explanations if e.sensitivity is not None):
+        for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
+            strength = float(np.linalg.norm(column))
+            direction = (-column if side < 0.0 else column) / max(strength, 1e-12)
+            chance = power_along(space, direction, np.array([strength]), null, draws)[0]
+            found.setdefault(law.id, []).append(float(chance))
+    return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}
+
+
+def _refuse_odd(count: int, repeats: int) -> None:
+    if not LEAST_POINTS <= count <= MOST_POINTS:
+        raise ReadingsError(f'{count} points; ask for {LEAST_POINTS} to {MOST_POINTS}')
+    if not 0 <= repeats <= count:
+        raise ReadingsError(f'{repeats} of {count} points to be read twice; ask for 0 to {count}')
+
+
+def _walk(face_m: np.ndarray, row_m: float) -> np.ndarray:
+    """(P,) order of points (P, 2) on the face: rows from the top, to and fro."""
+    down = face_m[:, 1].max() - face_m[:, 1]
+    row = (down / max(row_m, 1e-9)).astype(int)
+    return np.lexsort((np.where(row % 2 == 0, face_m[:, 0], -face_m[:, 0]), row))
+
+
+def _speaks_for(marks: Marks, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:
+    """(P,) effects of which each point shows most."""
+    design = marks.around(rows)
+    # What the points together do not show, none of them speaks for.
+    shares = design.shares(rows) * (design.noncentralities > 1.0)
+    names = np.array(sorted(set(marks.effects)))
+    by_effect = np.column_stack([shares[:, marks.effects == n].mean(axis=1) for n in names])
+    even = by_effect.mean(axis=0)
+    over = by_effect / np.where(even > 0.0, even, np.inf)
+    return tuple(
+        tuple(str(names[k]) for k in np.argsort(-point)[:MOST_NAMED] if point[k] > SPEAKS)
+        for point in over
+    )

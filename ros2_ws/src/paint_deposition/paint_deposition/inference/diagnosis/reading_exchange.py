@@ -1,0 +1,162 @@
+"""Which of many places to measure: exchange of places for a design that finds effects.
+
+Readings are linear in the pattern's parameters and in the amplitudes of the effects. What an
+effect changes at the chosen places beyond what the pattern can imitate is its noncentrality (D_s-
+optimality), and what another effect beside the pattern cannot imitate of it is their separation
+(T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). A design is worth the probability that
+an effect is detected and told from its nearest rival, averaged over the effects and over the sizes
+in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
+added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 1972).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr, ndtri
+
+from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.inference.diagnosis.testability import LEVEL
+
+MOST_ROUNDS = 4
+# A smaller gain in worth is not worth an exchange.
+LEAST_GAIN = 1e-5
+# Step by which the power is differentiated, as a share.
+STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class Marks:
+    """What readings at C places would show, over their noise.
+
+    Attributes:
+        free: (C, k) change with each parameter of the model, in standard deviations of its prior.
+        columns: (C, m) change with each amplitude of the effects at its typical size.
+        effects: (m,) id of the effect of each column.
+    """
+
+    free: np.ndarray
+    columns: np.ndarray
+    effects: np.ndarray
+
+    @property
+    def weights(self) -> np.ndarray:
+        """(m,) share of each column in the mean over effects."""
+        names, owner, count = np.unique(self.effects, return_inverse=True, return_counts=True)
+        return 1.0 / (len(names) * count[owner])
+
+    def around(self, chosen: np.ndarray) -> 'Design':
+        """The design with the places of these rows (n,)."""
+        free, columns = self.free[chosen], self.columns[chosen]
+        covariance = np.linalg.inv(np.eye(free.shape[1]) + free.T @ free)
+        slopes = covariance @ (free.T @ columns)
+        information = columns.T @ columns - (columns.T @ free) @ slopes
+        return Design(self, covariance, slopes, information)
+
+
+@dataclass(frozen=True)
+class Design:
+    """Some of the places, the model refitted to their readings.
+
+    Attributes:
+        marks: of all places.
+        covariance: (k, k) of the model's parameters.
+        slopes: (k, m) by which the parameters imitate each column.
+        information: (m, m) products of what they cannot imitate.
+    """
+
+    marks: Marks
+    covariance: np.ndarray
+    slopes: np.ndarray
+    information: np.ndarray
+
+    @property
+    def noncentralities(self) -> np.ndarray:
+        """(m,) squared signal-to-noise ratio of each column."""
+        return np.maximum(np.diag(self.information), 0.0)
+
+    def nearest(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """(m,) nearest rival of each column, by how much it imitates, and the square left."""
+        strength = self.noncentralities
+        precision = strength + SIZES[-1] ** -2.0
+        left = strength[:, np.newaxis] - self.information**2 / precision
+        effects = self.marks.effects
+        left[effects[:, np.newaxis] == effects] = np.inf
+        rival = left.argmin(axis=1)
+        rows = np.arange(len(rival))
+        amount = self.information[rows, rival] / precision[rival]
+        return rival, amount, np.clip(left[rows, rival], 0.0, strength)
+
+    @property
+    def worth(self) -> float:
+        """Probability that an effect is detected, and told from its nearest rival; their mean."""
+        weights, tests = self.marks.weights, len(set(self.marks.effects))
+        detected = weights @ power(self.noncentralities, tests)
+        return float(0.5 * (detected + weights @ power(self.nearest()[2], tests)))
+
+    def gains(self) -> np.ndarray:
+        """(C,) by about how much one more reading at each place would raise the worth."""
+        marks, tests = self.marks, len(set(self.marks.effects))
+        left = marks.columns - marks.free @ self.slopes
+        variance = 1.0 + np.einsum('ck,kl,cl->c', marks.free, self.covariance, marks.free)
+        rival, amount, apart = self.nearest()
+        detected = left**2 @ (marks.weights * slope(self.noncentralities, tests))
+        told = (left - amount * left[:, rival]) ** 2 @ (marks.weights * slope(apart, tests))
+        return 0.5 * (detected + told) / variance
+
+    def shares(self, chosen: np.ndarray) -> np.ndarray:
+        """(n, m) share of each column's noncentrality that would be lost without each place."""
+        marks = self.marks
+        free = marks.free[chosen]
+        left = marks.columns[chosen] - free @ self.slopes
+        kept = 1.0 - np.einsum('ck,kl,cl->c', free, self.covariance, free)
+        return left**2 / kept[:, np.newaxis] / np.maximum(self.noncentralities, 1e-12)
+
+
+def power(noncentrality: np.ndarray, tests: int) -> np.ndarray:
+    """(m,) probability of detection, averaged over the sizes in which effects occur.
+
+    Args:
+        noncentrality: (m,) of effects of typical size.
+        tests: how many effects share the level of the test.
+    """
+    limit = -ndtri(0.5 * LEVEL / tests)
+    ratio = SIZES * np.sqrt(noncentrality)[:, np.newaxis]
+    return np.mean(ndtr(ratio - limit) + ndtr(-ratio - limit), axis=1)
+
+
+def slope(noncentrality: np.ndarray, tests: int) -> np.ndarray:
+    """(m,) derivative of ``power`` by the noncentrality."""
+    step = STEP * (STEP + noncentrality)
+    return (power(noncentrality + step, tests) - power(noncentrality, tests)) / step
+
+
+def exchanged(marks: Marks, positions_m: np.ndarray, count: int, apart_m: float) -> np.ndarray:
+    """(n,) rows of the best places found, at least ``apart_m`` from each other [m].
+
+    Args:
+        marks: of C places. positions_m: (C, 3) [m].
+        count: how many are wanted; fewer are found only where no more fit.
+    """
+    distance = np.linalg.norm(positions_m[:, np.newaxis] - positions_m, axis=2)
+    near = distance < apart_m
+
+    def best_beside(chosen: list[int]) -> tuple[int, Design]:
+        design = marks.around(np.array(chosen, dtype=int))
+        free = ~near[chosen].any(axis=0)
+        return int(np.argmax(np.where(free, design.gains(), -1.0))) if free.any() else -1, design
+
+    chosen: list[int] = []
+    while len(chosen) < count and (best := best_beside(chosen)[0]) >= 0:
+        chosen.append(best)
+    worth = marks.around(np.array(chosen)).worth
+    for _ in range(MOST_ROUNDS):
+        before = worth
+        for row in chosen:
+            others = [one for one in chosen if one != row]
+            best = best_beside(others)[0]
+            trial = marks.around(np.array([*others, best])).worth
+            if trial > worth + LEAST_GAIN:
+                chosen, worth = [*others, best], trial
+        if worth <= before:
+            break
+    return np.array(chosen, dtype=int)

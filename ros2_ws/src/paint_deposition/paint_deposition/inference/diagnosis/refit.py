@@ -1,0 +1,156 @@
+"""Add an effect or a learned law that the user chose and fit the model with it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
+
+import numpy as np
+from scipy.special import expit, logsumexp
+
+from paint_deposition.inference.diagnosis.cross_validation import left_out
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.explanations import (
+    FREE_ADDITION_UM,
+    FREE_FACTOR,
+    FREE_LENGTHS,
+    LENGTHS,
+    UNKNOWN,
+    WIGGLY,
+    Explanation,
+    of_random,
+)
+from paint_deposition.inference.diagnosis.learning import by_size
+from paint_deposition.inference.diagnosis.model_space import SIZES, SURE
+from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.diagnosis.smooth_laws import bases_over
+from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.errors import ModelError
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.residuals import root_mean_square
+
+
+@on_one_thread
+def refit(
+    campaign: Campaign,
+    start: DepositionModel,
+    added: type[Effect] | None,
+    library: Mapping[str, type[Effect]] = MappingProxyType({}),
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+    known: Posterior | None = None,
+) -> Diagnosis:
+    """Fit the model without and with an effect, and compare the evidence of the two.
+
+    Args:
+        campaign: the readings.
+        start: the model so far; its effects are refitted too.
+        added: the effect or learned law, or None to fit what is there.
+        library: effects to test for beside it, by id.
+        seed: of starts and simulated deviations.
+        progress: called with a line for each step of the work.
+        known: what an earlier job told of the start's parameters: the prior.
+
+    Raises:
+        ModelError: the model has the effect already, or its law cannot be learned here.
+    """
+    law = added if added is not None and issubclass(added, LearnedLaw) else None
+    if added and start.effect(added.id):
+        raise ModelError(
+            f'{added.id} is in the model already; to fit it anew, add none, or take it out'
+        )
+    candidates = dict(library) | ({added.id: added} if added and not law else {})
+    run = Run(campaign, start, candidates, seed, progress, known)
+    if run.trouble:
+        return run.diagnosis(np.nan, 'fit_broken', run.trouble)
+    space = run.linearise()
+    p_value = space.p_value(seed)
+    missing = p_value < ALPHA
+    if added is None:
+        reason = 'The model was fitted as it is'
+        if not missing:
+            return run.diagnosis(p_value, 'none_missing', f'{reason}.')
+        unknown = locate_unexplained(run.study, run.fit, False, seed)
+        reason += '; something is missing, which diagnose can tell.'
+        return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
+    if law is not None:
+        progress(f'learning {law.id}')
+        return _with_learned(run, law, p_value)
+    progress(f'fitting with {added.id}')
+    fits = [run.fitted_with([shape]) for shape in run.candidates[added.id]]
+    before, probability = run.history[-1], space.against_nothing(added.id)
+    run.record(added.id, min(fits, key=lambda fit: fit.objective))
+    run.accepted.append(run.described((added.id,), probability, before))
+    reason = (
+        f'{added.id} was added as asked; it is missing with a probability of '
+        f'{percent(probability)} against the model as it was.'
+    )
+    if probability > SURE:
+        return run.diagnosis(p_value, 'effect_missing', reason)
+    return run.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
+
+
+def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
+    """The model with a law over the covariate, whatever its evidence."""
+    options, null = _options(run, law), run.plain
+    weights = _log_bayes_factors(run, null, options)
+    probability = float(expit(logsumexp(weights) - np.log(weights.size)))
+    before = run.history[-1]
+    fit = run.learned([_best(options, weights)])
+    run.record(law.id, fit, _holdout_um(run, null, options))
+    run.accepted.append(run.described((law.id,), probability, before))
+    reason = (
+        f'A learned law over {law.over} was added as asked; the film depends on it with a '
+        f'probability of {percent(probability)} against the model as it was.'
+    )
+    if p_value >= ALPHA:
+        return run.diagnosis(p_value, 'none_missing', reason)
+    unknown = locate_unexplained(run.study, run.history[0].fit, False, run.seed)
+    return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
+
+
+def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
+    """Laws over the covariate of every kind and length of correlation."""
+    found = [
+        of_random(UNKNOWN, run.study, basis.random(unit, length), 1.0)
+        for kind in law.kinds
+        for basis in bases_over(run.study, run.fit.model, law, kind)
+        for length in LENGTHS.get(law.covariate, (WIGGLY, *FREE_LENGTHS))
+        for unit in (FREE_FACTOR if kind == 'factor' else FREE_ADDITION_UM,)
+    ]
+    if not found:
+        raise ModelError(
+            f'{law.id}: {law.covariate} is the same at all readings; choose a covariate that '
+            'differs between them'
+        )
+    return found
+
+
+def _log_bayes_factors(run: Run, null: NullModel, options: Sequence[Explanation]) -> np.ndarray:
+    """(n, S) log Bayes factor of each law at each size against the null hypothesis."""
+    freedom = run.study.noise.degrees_of_freedom
+    return np.array([by_size(null, explanation, freedom) for explanation in options])
+
+
+def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanation, float]:
+    """The law and the size of the greatest weight (n, S)."""
+    number, size = np.unravel_index(weights.argmax(), weights.shape)
+    return options[int(number)], float(SIZES[size])
+
+
+def _holdout_um(run: Run, null: NullModel, options: Sequence[Explanation]) -> float:
+    """Error on points left out [um], the law's kind, length and size chosen without them."""
+    folds = run.study.folds()
+    deviation = np.empty(len(folds))
+    for fold in np.unique(folds):
+        out = folds == fold
+        kept = [explanation.select(~out) for explanation in options]
+        weights = _log_bayes_factors(run, null.select(~out), kept)
+        explanation, size = _best(options, weights)
+        deviation[out] = left_out(null, [size * explanation.columns], out)
+    return root_mean_square(deviation * run.study.sigma_um)

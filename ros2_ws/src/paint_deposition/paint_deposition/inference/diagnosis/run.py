@@ -1,0 +1,285 @@
+"""One run of the inference: a model fitted to a campaign, and what is added to it.
+
+What is added is the caller's choice: ``diagnose`` adds what is most probable, ``refit`` what the
+user asks for.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import fdtr
+
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.explanations import Explanation, explanations, law_errors
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
+from paint_deposition.inference.diagnosis.testability import Testability, testability
+from paint_deposition.inference.diagnosis.verdict import (
+    Diagnosis,
+    EffectClass,
+    Interval,
+    Step,
+    Unknown,
+    Verdict,
+)
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.posterior import usable
+from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign
+
+STARTS = 10
+# Times that laws of any form and the model's parameters are fitted to each other at most, and the
+# change of the misfit from which on they suit each other.
+LEARNING_STEPS, SETTLED = 8, 0.5
+# A point that gets less than this share of the mean film was hardly reached by the path.
+REACHED = 0.02
+MOST_UNREACHED = 0.1
+# Standard deviations above the prediction from which the gauge found paint.
+PAINTED = 3.0
+# Probability of residuals this small: below it the noise is overstated, or the readings were
+# made up.
+TOO_GOOD = 1e-4
+
+
+class Run:
+    """A fitted model, what has been added to it, and what may still be added.
+
+    Attributes:
+        study: the readings.
+        start: the model that the run started from.
+        fit: of the newest model.
+        history: every model so far, the one started from first.
+        accepted: the effects and learned laws added so far, with what is confounded with each.
+        candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
+        trouble: why the fit cannot be right, '' if it can.
+    """
+
+    def __init__(
+        self,
+        campaign: Campaign,
+        start: DepositionModel,
+        library: Mapping[str, type[Effect]],
+        seed: int,
+        progress: Callable[[str], None],
+        known: Posterior | None = None,
+    ) -> None:
+        self.candidates = {
+            key: neutral_shapes(effect)
+            for key, effect in library.items()
+            if start.effect(key) is None
+        }
+        neutral = (shapes[0] for shapes in self.candidates.values())
+        self.seed = seed
+        progress('fitting the model')
+        self.start = start
+        self.known, self.remarks = usable(known, campaign)
+        effects = (*start.effects, *neutral)
+        self.study, self.fit = sifted(campaign, start, effects, STARTS, seed, self.known)
+        self.history = [Step.of(self.study, '', self.fit)]
+        self.accepted: list[EffectClass] = []
+        self.testable: Testability | None = None
+        self.trouble = trouble_with(self.study, self.fit)
+
+    def _free(self, start: DepositionModel) -> FreeParameters:
+        """All parameters of a model, with what is known of them."""
+        return FreeParameters.of(start, *start.effects, known=self.known)
+
+    @property
+    def added(self) -> frozenset[str]:
+        """Ids of the candidates that the newest model has."""
+        return frozenset(effect.id for effect in self.taken)
+
+    def linearise(self, fit: Fit | None = None) -> ModelSpace:
+        """The space of what may be missing beside a model, whose effects' laws may be off.
+
+        Args:
+            fit: of the model; default the newest.
+        """
+        fit = fit or self.fit
+        kept = frozenset(effect.id for effect in self.candidates_in(fit))
+        free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
+        null = NullModel.around(fit, free)
+        found = explanations(self.study, fit, self.candidates)
+        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+        if self.testable is None:
+            self.testable = testability(space, self.seed)
+        return space
+
+    @property
+    def plain(self) -> NullModel:
+        """The newest model as it is, with nothing missing."""
+        return NullModel.around(self.fit, self.study.nuisance)
+
+    @property
+    def taken(self) -> list[Effect]:
+        """The candidates that the newest model has."""
+        return self.candidates_in(self.fit)
+
+    def candidates_in(self, fit: Fit) -> list[Effect]:
+        """The candidates that the model of a fit has."""
+        return [e for e in fit.model.effects if e.id in self.candidates]
+
+    def fitted_with(
+        self,
+        effects: Sequence[Effect],
+        free: np.ndarray | None = None,
+        model: DepositionModel | None = None,
+    ) -> Fit:
+        """The start model refitted with these effects instead of what was added.
+
+        Args:
+            effects: with their first values.
+            free: (P, n) directions over the noise that are left free beside them.
+            model: to start from; default the newest.
+        """
+        model = model or self.fit.model
+        kept = tuple(e for e in model.effects if e.id not in self.candidates)
+        start = model.model_copy(update={'effects': (*kept, *effects)})
+        nuisance = self.study.nuisance
+        if free is not None:
+            nuisance = np.hstack([nuisance, free])
+        return self.study.fit(self._free(start), nuisance=nuisance)
+
+    def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
+        """The newest model with the laws that these explanations, at these sizes, stand for."""
+        fit = self.fit
+        laws: tuple[LearnedLaw, ...] = ()
+        for _ in range(LEARNING_STEPS):
+            randoms = [
+                explanation.random.around(self.study, fit.model)
+                for explanation, _ in chosen
+                if explanation.random
+            ]
+            parts = [
+                size * random.change_um / self.study.sigma_um[:, np.newaxis]
+                for random, (_, size) in zip(randoms, chosen, strict=True)
+            ]
+            columns, before = np.hstack(parts), fit.objective
+            fit = self.fitted_with(self.candidates_in(fit), columns, fit.model)
+            covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
+            amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
+            known = fit.amplitudes[1][-len(amounts) :, -len(amounts) :]
+            stops = np.cumsum([part.shape[1] for part in parts])
+            laws = tuple(
+                random.learned(size * amounts[rows], size**2 * known[rows, rows])
+                for random, (_, size), part, stop in zip(
+                    randoms, chosen, parts, stops, strict=True
+                )
+                for rows in [slice(stop - part.shape[1], stop)]
+            )
+            if abs(before - fit.objective) < SETTLED:
+                break
+        start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
+        return self.study.fit(self._free(start), nuisance=self.study.nuisance)
+
+    def record(self, added: str, fit: Fit, holdout_um: float | None = None) -> None:
+        """Take a fit as the newest model.
+
+        Args:
+            added: what it has more than the one before.
+            fit: of the model.
+            holdout_um: its error on points left out when the choice was made without them, too
+                [um]; default: when the model was refitted without them.
+        """
+        self.fit = fit
+        step = Step.of(self.study, added, fit)
+        self.history.append(
+            step if holdout_um is None else replace(step, holdout_rmse_um=holdout_um)
+        )
+
+    def described(
+        self,
+        members: tuple[str, ...],
+        probability: float,
+        before: Step,
+        trial: Fit | None = None,
+    ) -> EffectClass:
+        """A class with its intervals and the errors before and after adding its best effect.
+
+        Args:
+            members: ids, the best first.
+            probability: that one of them is missing.
+            before: the model without it.
+            trial: a fit with the best one; default: the newest model.
+        """
+        after = self.history[-1] if trial is None else Step.of(self.study, members[0], trial)
+        return EffectClass(
+            members,
+            min(probability, 1.0),
+            members[0],
+            intervals(after.fit, members[0]),
+            {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um},
+        )
+
+    def diagnosis(
+        self,
+        p_value: float,
+        verdict: Verdict,
+        reason: str,
+        others: tuple[EffectClass, ...] = (),
+        unknown: Unknown | None = None,
+    ) -> Diagnosis:
+        """Put the results together."""
+        not_testable, detectable = self.testable or ((), {})
+        return Diagnosis(
+            self.study,
+            verdict,
+            reason,
+            p_value,
+            tuple(c.best for c in self.accepted),
+            (*self.accepted, *others),
+            tuple(self.history),
+            unknown,
+            not_testable,
+            detectable,
+            remarks=self.remarks,
+        )
+
+
+def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
+    """95 % intervals of an effect's amplitudes, within what is physical."""
+    found = {}
+    for estimate in estimates(fit.marginal):
+        owner, _, parameter = estimate.name.partition('.')
+        if owner == effect_id:
+            found[parameter] = Interval(estimate.value, estimate.low, estimate.high)
+    return found
+
+
+def trouble_with(study: Study, fit: Fit) -> str:
+    """Why the fit cannot be right, or nothing."""
+    mean = float(np.mean(study.measured_um))
+    painted = fit.residual > PAINTED
+    bare = float(np.mean(painted & (fit.predicted_um < REACHED * mean)))
+    freedom = len(study) - len(fit.vector)
+    if freedom < 5:
+        return (
+            f'{len(study)} points cannot determine {len(fit.vector)} parameters; '
+            'measure at 30 points or more'
+        )
+    if bare > MOST_UNREACHED:
+        return (
+            f'the recorded path leaves {100 * bare:.0f} % of the points bare, where '
+            'the gauge found paint; check the trajectory, its trigger and the mesh frame'
+        )
+    if not fit.converged:
+        return 'the fit did not converge; give a start model nearer to the bell in use'
+    if study.noise.source != 'assumed':
+        # Of the gauge alone: that a film has little texture is no fault.
+        over_gauge = fit.residual * study.sigma_um / study.gauge_um
+        reduced = float(over_gauge @ over_gauge) / freedom
+        chance = fdtr(freedom, min(study.noise.degrees_of_freedom, 1e6), reduced)
+        if chance < TOO_GOOD:
+            return (
+                f'the readings scatter about the model {np.sqrt(reduced):.2f} times as much as '
+                f'their noise says ({study.noise.source}); give their true sigma_um or repeats'
+            )
+    return ''

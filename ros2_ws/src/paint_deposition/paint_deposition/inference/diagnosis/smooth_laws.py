@@ -1,0 +1,273 @@
+"""Smooth laws of any form, as changes of the readings that are linear in the laws' values.
+
+A law is a random function with a length of correlation, given by its values at knots: a curve over
+a covariate, a map over a part, or a deviation of the footprint.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_positions
+from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
+from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weights
+from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
+from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.inference.readings.covariates import Rays
+
+# Knots of a curve; time is resolved more finely, as pumps pulsate.
+KNOTS, TIME_KNOTS = 12, 40
+# Rays that leave less than this share of the most are left out of a covariate's range, and
+# outermost rays by this share of their number.
+FAINT, OUTERMOST = 0.02, 0.01
+# Directions of a random function below this share of the largest variance are left out.
+NEGLIGIBLE = 1e-2
+# Steps between the knots of a map [m], and of the radius of a footprint.
+MAP_STEP_M, RADII = 0.06, 10
+# The pattern ends at this many of its widths beyond the ring.
+WIDTHS = 3.0
+# Distance of knots that have nothing in common.
+FAR = 1e6
+
+
+@dataclass(frozen=True)
+class Basis:
+    """Laws over one covariate, by their values at K knots.
+
+    Attributes:
+        law: what the values become in a model.
+        settings: what the law needs besides them.
+        film_um: (P, K) change of the film for a value of 1 (1 um) at each knot.
+        knots: (K, D) their places, in the unit in which lengths of correlation are given.
+        shortest: length that the knots resolve, in that unit.
+        edges: whether the law may change within less than its length of correlation.
+    """
+
+    law: type[LearnedLaw]
+    settings: Mapping[str, Any]
+    film_um: np.ndarray
+    knots: np.ndarray
+    shortest: float
+    edges: bool = False
+
+    def within(self, low: float, high: float) -> np.ndarray:
+        """(K,) knots of a curve at values of its covariate in a range."""
+        axis = CURVES[self.law.covariate].axis
+        first, last = axis(self.settings['low']), axis(self.settings['high'])
+        values = np.linspace(first, last, len(self.knots))
+        return (values >= axis(low)) & (values <= axis(high))
+
+    def random(self, size: float, length: float, among: np.ndarray | None = None) -> 'RandomLaw':
+        """Random laws.
+
+        Args:
+            size: standard deviation of the values.
+            length: of correlation.
+            among: (K,) bool, knots at which the law is not zero; default all.
+        """
+        kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
+        small = root_of_field(
+            self.knots[kept], max(length, self.shortest), NEGLIGIBLE,
+            with_edges if self.edges else smooth,
+        )  # fmt: skip
+        root = np.zeros((len(self.knots), small.shape[1]))
+        root[kept] = size * small
+        return RandomLaw(self, root)
+
+
+@dataclass(frozen=True)
+class RandomLaw:
+    """A law that is a random function.
+
+    Attributes:
+        basis: its values at knots.
+        at_knots: (K, n) those values for n independent amplitudes of unit variance.
+    """
+
+    basis: Basis
+    at_knots: np.ndarray
+
+    @property
+    def change_um(self) -> np.ndarray:
+        """(P, n) change of the film for each amplitude of one."""
+        return self.basis.film_um @ self.at_knots
+
+    def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
+        """The same where another model says what arrives where."""
+        bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
+        maps = self.basis.settings.get('maps')
+        (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)
+        return replace(self, basis=basis)
+
+    def learned(self, amplitudes: np.ndarray, covariance: np.ndarray | None = None) -> LearnedLaw:
+        """The law with these amplitudes (n,); a curve also tells how well they are known.
+
+        Args:
+            amplitudes: their posterior mean. covariance: (n, n), or None if it is not known.
+        """
+        values = tuple(map(float, self.at_knots @ amplitudes))
+        settings = dict(self.basis.settings)
+        if covariance is not None and issubclass(self.basis.law, LearnedCurve):
+            settings['sd'] = tuple(map(float, self.sd(covariance)))
+        return self.basis.law(**settings, learned=values)
+
+    def sd(self, covariance: np.ndarray) -> np.ndarray:
+        """(K,) standard deviations of the values, for a covariance (n, n) of the amplitudes.
+
+        For a factor, those of its deviation from the mean over all film: a factor on all film
+        alike is the pattern's.
+        """
+        root = self.at_knots
+        if self.basis.settings.get('kind') == 'factor':
+            film_um = self.basis.film_um.sum(axis=0)
+            root = root - film_um @ root / film_um.sum()
+        return np.sqrt(np.einsum('kn,nm,km->k', root, covariance, root))
+
+
+def bases_over(
+    study: Study, model: DepositionModel, law: type[LearnedLaw], kind: str
+) -> list[Basis]:
+    """Laws over any covariate; none where it does not vary."""
+    if law is LearnedFootprint:
+        return [footprint_basis(study, model)]
+    if law is LearnedMap:
+        return map_bases(study, model, kind)
+    basis = curve_basis(study, model, law.covariate, kind)
+    return [basis] if basis else []
+
+
+def curve_basis(
+    study: Study, model: DepositionModel, covariate: str, kind: str = 'factor'
+) -> Basis | None:
+    """Curves over a covariate; None where it does not vary.
+
+    Lengths of correlation are in standard deviations of the covariate over the points.
+
+    Args:
+        study: the readings.
+        model: whose rays and pattern say what arrives where.
+        covariate: one that a learned curve can have.
+        kind: 'factor' on what arrives, or 'addition' to the film.
+    """
+    law = CURVES[covariate]
+    knots = TIME_KNOTS if covariate == 'time_s' else KNOTS
+    rays = study.rays(model)
+    values = [part.along[covariate] for part in rays]
+    low, high = _range(rays, values)
+    if not law.axis(high) - law.axis(low) > 1e-9:
+        return None
+    films, positions = [], []
+    for part, value in zip(rays, values, strict=True):
+        at = knot_positions(law, value, low, high, knots)
+        if kind == 'addition':
+            films.append(hat_weights(at[0], knots))
+        elif value.shape[1] == 1:
+            films.append(part.share.T @ hat_weights(at[:, 0], knots))
+        else:
+            films.append(hat_sums(part.share, at, knots))
+        positions.append(part.mean(law.axis(value)))
+    step = (law.axis(high) - law.axis(low)) / (knots - 1)
+    step /= max(float(np.std(np.concatenate(positions))), 1e-9)
+    places = step * np.arange(knots)[:, np.newaxis]
+    settings = {'kind': kind, 'low': low, 'high': high}
+    return Basis(law, settings, np.vstack(films), places, step)
+
+
+def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> list[Basis]:
+    """A map over each part that was measured, and one over all; lengths in metres.
+
+    Parts of one shape share a map, however they were painted.
+    """
+    film_um = study.forward.predict_um(model)
+    owner, experiments = study.campaign.experiment_of, study.campaign.experiments
+    points = [experiment.measured_points for experiment in experiments]
+    sides = [tuple(map(float, np.round(p.extent_m, 3))) for p in points]
+    grids: list[PartGrid] = []
+    changes, knots = [], []
+    for side in dict.fromkeys(sides):
+        places = {k: places_m(points[k]) for k, other in enumerate(sides) if other == side}
+        everywhere = np.vstack(list(places.values()))
+        low, high = everywhere.min(axis=0), everywhere.max(axis=0)
+        if min(high - low) < MAP_STEP_M:
+            continue
+        columns, rows = (int(n) for n in np.ceil((high - low) / MAP_STEP_M) + 1)
+        grid = PartGrid(
+            part_m=side, low_m=tuple(low.tolist()), high_m=tuple(high.tolist()),
+            columns=columns, rows=rows,
+        )  # fmt: skip
+        change = np.zeros((len(study), grid.knots))
+        for k, place_m in places.items():
+            change[owner == k] = grid.weights(place_m)
+        # Parts have nothing in common.
+        knots.append(np.column_stack([grid.knots_m(), np.full(grid.knots, FAR * len(grids))]))
+        changes.append(change * film_um[:, np.newaxis] if kind == 'factor' else change)
+        grids.append(grid)
+    chosen = [[k] for k in range(len(grids))] + [list(range(len(grids)))] * (len(grids) > 1)
+    return [
+        Basis(
+            LearnedMap,
+            {'kind': kind, 'maps': tuple(grids[k] for k in parts)},
+            np.hstack([changes[k] for k in parts]),
+            np.vstack([knots[k] for k in parts]),
+            MAP_STEP_M,
+            edges=True,
+        )
+        for parts in chosen
+    ]
+
+
+def footprint_basis(study: Study, model: DepositionModel) -> Basis:
+    """Deviations of the pattern from eq. (1) at the points of a study."""
+    return footprint_along(study.rays(model), model.patterns)
+
+
+def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) -> Basis:
+    """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
+
+    Each harmonic of the angle is a random function of the radius by itself, the same for all
+    brushes.
+
+    Args:
+        parts: rays of each part. patterns: those that they come from.
+    """
+    reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
+    films = []
+    for rays in parts:
+        radius = np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1)
+        angle = waves(rays.x_m, rays.y_m)
+        films.append(np.stack([hat_sums(rays.share * wave, radius, RADII) for wave in angle]))
+    film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
+    radius, wave = np.indices((RADII, WAVES))
+    places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
+    change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
+    return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
+
+
+def footprint_kinds() -> list[np.ndarray]:
+    """(K,) knots of a footprint: those of the mean over the angle, of each harmonic, and of all.
+
+    At the centre the angle means nothing.
+    """
+    radius, wave = np.indices((RADII, WAVES)).reshape(2, -1)
+    sound = (wave == 0) | (radius > 0)
+    order = (wave + 1) // 2
+    return [sound & (order == k) for k in range(order.max() + 1)] + [sound]
+
+
+def _range(rays: list[Rays], values: list[np.ndarray]) -> tuple[float, float]:
+    """Least and greatest value of a covariate at which film arrives."""
+    lows, highs = [], []
+    for part, value in zip(rays, values, strict=True):
+        if value.shape == part.share.shape:
+            value = value[part.share > FAINT * part.share.max()]
+            lows.append(np.quantile(value, OUTERMOST))
+            highs.append(np.quantile(value, 1.0 - OUTERMOST))
+        else:
+            lows.append(value.min())
+            highs.append(value.max())
+    return float(min(lows)), float(max(highs))

@@ -1,0 +1,248 @@
+"""Sprays that a cell can do instead of the one that was recorded."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.axes import across_axis
+from paint_deposition.inference.readings.campaign import Experiment
+
+# How far the gun is moved to or from the part [m], and how near to it that may bring it.
+STANDOFF_STEP_M, NEAREST_M = 0.06, 0.12
+# The gun opens this much earlier and closes this much later than it did [s].
+LONGER_OPEN_S = 0.3
+# Passes are turned on parts that are at most this deep [m].
+DEEPEST_M = 0.15
+
+
+@dataclass(frozen=True)
+class Change:
+    """What is done otherwise than in a recorded spray.
+
+    Attributes:
+        key: one word.
+        words: complete 'the same passes ...'.
+        cost: 1 for an entry in the programme; more where someone must lay hands on part or cell.
+        made: gives the experiment painted that way, or None where the part does not allow it.
+        kind: changes of one kind exclude each other.
+        both: the two changes that this one consists of, if it does.
+    """
+
+    key: str
+    words: str
+    cost: float
+    made: Callable[[Experiment], Experiment | None]
+    kind: str
+    both: tuple['Change', ...] = ()
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """Of the single changes."""
+        return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
+
+
+def together(first: Change, second: Change) -> Change:
+    """Both changes in one spray."""
+
+    def made(experiment: Experiment) -> Experiment | None:
+        changed = first.made(experiment)
+        return None if changed is None else second.made(changed)
+
+    words = f'{first.words} and {second.words}'
+    return Change('', words, first.cost + second.cost, made, '', (first, second))
+
+
+def pairs(changes: Sequence[Change]) -> Iterator[Change]:
+    """Two of these changes at once, where they do not exclude each other."""
+    for first, second in combinations(changes, 2):
+        if first.kind != second.kind:
+            yield together(first, second)
+
+
+def _on_path(change: Callable[[SprayPath], SprayPath]) -> Callable[[Experiment], Experiment]:
+    return lambda experiment: replace(experiment, path=change(experiment.path))
+
+
+def _of_the_nearest_opening(path: SprayPath) -> SprayPath:
+    """Closed sub-steps with the brush of the opening that is nearest in time."""
+    opened = np.flatnonzero(path.flow > 0.0)
+    following = np.minimum(np.searchsorted(opened, np.arange(len(path))), len(opened) - 1)
+    before = (path.flow == 0.0) & (path.until_on_s < path.since_off_s)
+    return path.with_(brush=np.where(before, path.brush[opened[following]], path.brush))
+
+
+def _rolled(angle_deg: float) -> Callable[[SprayPath], SprayPath]:
+    cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
+    turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    return lambda path: path.with_(rotation=path.rotation @ turn)
+
+
+def _other_way(path: SprayPath) -> SprayPath:
+    """Each pass from its end to its begin, the passes in the same order."""
+    path = _of_the_nearest_opening(path)
+    time_s = path.time_s.copy()
+    for number in np.unique(path.spray_pass[path.spray_pass >= 0]):
+        rows = path.spray_pass == number
+        time_s[rows] = time_s[rows].min() + time_s[rows].max() - time_s[rows]
+    return path.with_(
+        time_s=time_s,
+        velocity_m_per_s=-path.velocity_m_per_s,
+        since_on_s=path.until_off_s,
+        until_off_s=path.since_on_s,
+        since_off_s=path.until_on_s,
+        until_on_s=path.since_off_s,
+        from_turn_m=path.to_turn_m,
+        to_turn_m=path.from_turn_m,
+    )
+
+
+def _other_order(path: SprayPath) -> SprayPath:
+    """The last pass first, each run the same way."""
+    backward = _other_way(path)
+    spraying = path.spray_pass >= 0
+    number = np.where(spraying, path.spray_pass.max() - path.spray_pass, -1)
+    ends_s = path.time_s.min() + path.time_s.max()
+    time_s = ends_s - backward.time_s
+    return path.with_(spray_pass=number, passes_before=np.maximum(number, 0), time_s=time_s)
+
+
+def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:
+    def moved(experiment: Experiment) -> Experiment | None:
+        path = experiment.path
+        if distance_m < 0.0:
+            spraying = path.position_m[path.flow > 0.0]
+            standoff, _ = cKDTree(experiment.surface.vertices_m).query(spraying)
+            if standoff.min() + distance_m < NEAREST_M:
+                return None
+        position = path.position_m - distance_m * path.rotation[:, :, 2]
+        return replace(experiment, path=path.with_(position_m=position))
+
+    return moved
+
+
+def _flow(factor: float) -> Callable[[SprayPath], SprayPath]:
+    return lambda path: path.with_flow_scaled(factor)
+
+
+def _speed(factor: float) -> Callable[[SprayPath], SprayPath]:
+    def changed(path: SprayPath) -> SprayPath:
+        times = ('time_s', 'dwell_s', 'since_on_s', 'since_off_s', 'until_on_s', 'until_off_s')
+        slower = {name: getattr(path, name) / factor for name in times}
+        return path.with_(velocity_m_per_s=factor * path.velocity_m_per_s, **slower)
+
+    return changed
+
+
+def _open_longer(path: SprayPath) -> SprayPath:
+    """The gun opens earlier and closes later, where the path goes on that long."""
+    path = _of_the_nearest_opening(path)
+    closed = path.flow == 0.0
+    early = closed & (path.until_on_s < LONGER_OPEN_S)
+    late = closed & (path.since_off_s < LONGER_OPEN_S)
+    opened = early | late
+    since_on = np.where(early, LONGER_OPEN_S - path.until_on_s, path.since_on_s + LONGER_OPEN_S)
+    until_off = np.where(late, LONGER_OPEN_S - path.since_off_s, path.until_off_s + LONGER_OPEN_S)
+    return path.with_(
+        flow=np.where(opened, path.open_flow, path.flow),
+        since_on_s=since_on,
+        until_off_s=until_off,
+        since_off_s=np.maximum(path.since_off_s - LONGER_OPEN_S, 0.0),
+        until_on_s=np.maximum(path.until_on_s - LONGER_OPEN_S, 0.0),
+    )
+
+
+def _passes_turned(experiment: Experiment) -> Experiment | None:
+    """The same passes turned by 90 deg and fitted to the part's other side, at the same speed."""
+    surface, path = experiment.surface, experiment.path
+    outward = surface.outward
+    across = across_axis(outward, surface.down)
+    along = np.cross(outward, across)
+    frame = np.column_stack([across, along, outward])
+    vertices = surface.vertices_m @ frame
+    if np.ptp(vertices[:, 2]) > DEEPEST_M:
+        return None
+    low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
+    middle, share = 0.5 * (low + high), (high - low)[::-1] / (high - low)
+    plane = path.position_m @ frame
+    there = ((plane[:, :2] - middle) * share)[:, ::-1] * [-1.0, 1.0] + middle
+    tree = cKDTree(vertices[:, :2])
+    spraying = path.flow > 0.0
+    _, below = tree.query(plane[:, :2])
+    standoff = float(np.median((plane[:, 2] - vertices[below, 2])[spraying]))
+    _, below = tree.query(there)
+    position = np.column_stack([there, vertices[below, 2] + standoff]) @ frame.T
+    quarter = frame @ np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]) @ frame.T
+    stretch = np.array([[0.0, -share[1], 0.0], [share[0], 0.0, 0.0], [0.0, 0.0, 0.0]])
+    velocity = path.velocity_m_per_s @ frame @ stretch.T @ frame.T
+    changed = path.with_(
+        position_m=position, rotation=quarter @ path.rotation, velocity_m_per_s=velocity
+    )
+    # Passes that are longer or shorter now take as much more or less time.
+    run = np.abs(path.velocity_m_per_s @ frame)[spraying].sum(axis=0)[:2]
+    return replace(experiment, path=_speed(1.0 / share[np.argmax(run)])(changed))
+
+
+def _upside_down(experiment: Experiment) -> Experiment:
+    surface = replace(experiment.surface, down=-experiment.surface.down)
+    return replace(
+        Experiment.of(experiment.name, surface, experiment.path, experiment.readings),
+        switched_off=experiment.switched_off,
+    )
+
+
+def _without(setting: str) -> Callable[[Experiment], Experiment]:
+    return lambda experiment: replace(experiment, switched_off=experiment.switched_off | {setting})
+
+
+AS_BEFORE = Change('', '', 0.0, lambda experiment: experiment, '')
+MENU = (
+    Change(
+        'roll_180',
+        'with the gun rolled 180 deg about its axis',
+        1.0,
+        _on_path(_rolled(180.0)),
+        'roll',
+    ),
+    Change(
+        'roll_90',
+        'with the gun rolled 90 deg about its axis',
+        1.0,
+        _on_path(_rolled(90.0)),
+        'roll',
+    ),
+    Change('reverse_order', 'in reverse order', 1.0, _on_path(_other_order), 'order'),
+    Change('other_way', 'each run the other way', 1.0, _on_path(_other_way), 'way'),
+    Change('further', '60 mm further off', 1.0, _moved_off(STANDOFF_STEP_M), 'standoff'),
+    Change('closer', '60 mm closer', 1.0, _moved_off(-STANDOFF_STEP_M), 'standoff'),
+    Change('half_flow', 'at half the flow', 1.0, _on_path(_flow(0.5)), 'film'),
+    Change('double_flow', 'at twice the flow', 1.0, _on_path(_flow(2.0)), 'film'),
+    Change('half_speed', 'at half the speed', 1.0, _on_path(_speed(0.5)), 'film'),
+    Change('double_speed', 'at twice the speed', 1.0, _on_path(_speed(2.0)), 'film'),
+    Change(
+        'longer_open',
+        'with the gun opened 0.3 s earlier and closed 0.3 s later',
+        1.0,
+        _on_path(_open_longer),
+        'trigger',
+    ),
+    Change('turned', 'turned by 90 deg together with the gun', 2.0, _passes_turned, 'passes'),
+    Change(
+        'upside_down',
+        'with the part hung upside down and the passes turned with it',
+        2.0,
+        _upside_down,
+        'part',
+    ),
+    Change('voltage_off', 'with the high voltage off', 2.0, _without('voltage'), 'voltage'),
+    Change(
+        'draught_off',
+        'with the booth air off, if safety allows',
+        3.0,
+        _without('draught'),
+        'draught',
+    ),
+)

@@ -1,0 +1,104 @@
+"""What the readings can show at all: effects that do not show, and the smallest that would."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
+
+# Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
+# effect counts as testable.
+TESTABLE = 2.0
+# An amplitude is detectable if the test that something is missing, at this level, finds it with
+# this power.
+LEVEL, POWER = 0.05, 0.9
+# Signal-to-noise ratios at which the power is simulated, and with how many draws.
+RATIOS, DRAWS = np.geomspace(2.5, 10.0, 10), 200
+# As many explanations as follow an effect most closely are computed with it; the others weigh as
+# much as they do without it.
+FOLLOWING = 6
+
+
+Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
+
+
+def testability(space: ModelSpace, seed: int) -> Testability:
+    """Ids of effects that do not show, and detectable amplitudes of the others by parameter.
+
+    Args:
+        space: around the model without them.
+        seed: of simulated deviations.
+    """
+    shapes: dict[str, list[Sensitivity]] = {}
+    for explanation in space.explanations:
+        if explanation.sensitivity is not None:
+            shapes.setdefault(explanation.cause, []).append(explanation.sensitivity)
+    null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]
+    not_testable, detectable = [], {}
+    for effect_id, found in shapes.items():
+        # Along the combination of amplitudes that shows most.
+        if max(np.linalg.norm(space.null.whiten(s.columns), 2) for s in found) >= TESTABLE:
+            detectable[effect_id] = _detectable(space, found, null, draws)
+        else:
+            not_testable.append(effect_id)
+    return tuple(not_testable), detectable
+
+
+def _detectable(
+    space: ModelSpace, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
+) -> dict[str, float]:
+    """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
+    info = type(shapes[0].effect).parameters()
+    found = {}
+    for k, name in enumerate(shapes[0].names):
+        columns = [space.null.whiten(s.columns[:, [k]])[:, 0] for s in shapes]
+        best = max(columns, key=lambda column: float(np.linalg.norm(column)))
+        strength = float(np.linalg.norm(best))
+        if strength < 1e-9:
+            continue
+        backward = shapes[0].sides[k] < 0.0
+        ratio = _ratio(space, (-best if backward else best) / strength, null, draws)
+        amount = ratio * info[name]['typical'] / strength
+        room = max(abs(info[name][end] - info[name]['neutral']) for end in ('low', 'high'))
+        if amount <= room:
+            found[name] = amount
+    return found
+
+
+def _ratio(space: ModelSpace, direction: np.ndarray, null: np.ndarray, draws: np.ndarray) -> float:
+    """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried."""
+    power = power_along(space, direction, RATIOS, null, draws)
+    if power[-1] < POWER:
+        return np.inf
+    return float(np.interp(POWER, np.maximum.accumulate(power), RATIOS))
+
+
+def power_along(
+    space: ModelSpace,
+    direction: np.ndarray,
+    ratios: np.ndarray,
+    null: np.ndarray,
+    draws: np.ndarray,
+) -> np.ndarray:
+    """(R,) probability that the test finds a deviation of each of R lengths.
+
+    Args:
+        space: its test is simulated.
+        direction: (P,) unit vector of whitened deviations. ratios: (R,) the lengths.
+        null: simulated evidence if no cause acted. draws: (P, D) deviations behind its first D.
+    """
+    chosen, count = _following(space, direction), draws.shape[1]
+    rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
+    along = space.evidence(draws, chosen, np.multiply.outer(direction, ratios))
+    evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
+    return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
+
+
+def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
+    """Numbers of the explanations that take up most of a direction."""
+    taken = [
+        float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))
+        for own in space.principal
+    ]
+    return np.argsort(taken)[::-1][:FOLLOWING].tolist()

@@ -1,0 +1,104 @@
+"""A painted part before it is measured: what readings at any place would tell of the effects."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.explanations import explanations
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, neutral_shapes, sensitivity
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import PointMeans, Readings
+
+
+@dataclass(frozen=True)
+class UnmeasuredPart:
+    """A part as it was, or will be, painted.
+
+    Attributes:
+        surface: the part, turned to the gun.
+        path: sub-steps of the gun's motion.
+        model: as far as it is known.
+        library: effects that may be missing, by id.
+        known: what earlier readings told of the model, or None.
+    """
+
+    surface: Surface
+    path: SprayPath
+    model: DepositionModel
+    library: Mapping[str, type[Effect]]
+    known: Posterior | None = None
+
+    @cached_property
+    def candidates(self) -> dict[str, list[Effect]]:
+        """Effects that the model does not have, neutral and in a few shapes, by id."""
+        return {
+            key: neutral_shapes(effect)
+            for key, effect in self.library.items()
+            if self.model.effect(key) is None
+        }
+
+    @cached_property
+    def film_um(self) -> np.ndarray:
+        """(V,) film that the model predicts at the vertices [um]."""
+        surface = self.surface
+        painted = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
+        painted.add(self.path)
+        return painted.film_um
+
+    def study(self, vertices: np.ndarray) -> Study:
+        """Readings of the predicted film at these vertices (P,), by a gauge of the usual noise."""
+        surface, count = self.surface, len(vertices)
+        readings = Readings.of(
+            surface.vertices_m[vertices], np.zeros(count), normals=surface.normals[vertices]
+        )
+        bare = Experiment.of('part', surface, self.path, readings)
+        neutral = tuple(shapes[0] for shapes in self.candidates.values())
+        effects = (*self.model.effects, *neutral)
+        film_um = Forward(Campaign((bare,)), effects).predict_um(self.model)
+        taken = replace(readings, thickness_um=film_um)
+        painted = replace(bare, readings=taken, means=PointMeans.of(taken), taken=taken)
+        return Study.of(Campaign((painted,)), effects)
+
+    def fit(self, study: Study) -> Fit:
+        """The model beside readings that are as it predicts."""
+        parameters = FreeParameters.of(self.model, *self.model.effects, known=self.known)
+        vector = parameters.encode(parameters.start)
+        jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
+        nothing = np.empty((len(study), 0))
+        return Fit(
+            parameters, vector, self.model, study.measured_um, np.zeros(len(study)), jacobian,
+            True, nothing,
+        )  # fmt: skip
+
+    def sensitivities(self, study: Study, fit: Fit) -> list[Sensitivity]:
+        """Of the readings to each effect that may be missing, in each of its shapes."""
+        return [
+            sensitivity(study.forward, fit, shape, study.sigma_um)
+            for shapes in self.candidates.values()
+            for shape in shapes
+        ]
+
+    def space(self, study: Study, freedom: float) -> ModelSpace:
+        """What the diagnosis would search.
+
+        Args:
+            study: of the readings.
+            freedom: degrees of freedom of the noise estimate.
+        """
+        fit = self.fit(study)
+        null = NullModel.around(fit, study.nuisance)
+        return ModelSpace(null, explanations(study, fit, self.candidates), freedom)

@@ -1,0 +1,234 @@
+"""What a diagnosis says."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any, Literal
+
+from paint_deposition.inference.comparison.comparison import Comparison, compare
+from paint_deposition.inference.diagnosis.cross_validation import hold_out
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.random_effects import Amount, amounts
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.residuals import root_mean_square
+
+if TYPE_CHECKING:
+    from paint_deposition.inference.diagnosis.proposals import Place, Spray
+
+Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
+
+
+def percent(probability: float) -> str:
+    """A probability in print, never as 0 % or 100 %: no diagnosis is certain."""
+    if probability > 0.99:
+        return '> 99 %'
+    return '< 1 %' if probability < 0.01 else f'{100 * probability:.0f} %'
+
+
+@dataclass(frozen=True)
+class Interval:
+    """A parameter's value with its 95 % interval, in its own unit."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class EffectClass:
+    """Effects that these readings cannot tell apart.
+
+    Attributes:
+        members: ids, most probable first.
+        probability: that one of them is missing.
+        best: id of the most probable member.
+        parameters: of the best member, by name.
+        holdout_rmse_um: before and after adding the best member, on points left out.
+    """
+
+    members: tuple[str, ...]
+    probability: float
+    best: str
+    parameters: dict[str, Interval] = field(default_factory=dict)
+    holdout_rmse_um: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Unknown:
+    """Where something shows that the library does not explain.
+
+    Attributes:
+        kind: 'footprint' if the pattern itself deviates from eq. (1), else 'effect'.
+        covariate: the one that the residual depends on most.
+        p_value: of that dependence.
+        curve: values of the covariate and mean residual there [um].
+        where: in words.
+    """
+
+    kind: str
+    covariate: str
+    p_value: float
+    curve: dict[str, list[float]]
+    where: str
+
+
+@dataclass(frozen=True)
+class Step:
+    """One model of the history.
+
+    Attributes:
+        added: effect id, '' for the model that the run started from.
+        fit: of the model to the readings.
+        rmse_um, holdout_rmse_um: on the fitted points and on points left out [um].
+    """
+
+    added: str
+    fit: Fit
+    rmse_um: float
+    holdout_rmse_um: float
+
+    @property
+    def model(self) -> DepositionModel:
+        """The fitted model."""
+        return self.fit.model
+
+    @staticmethod
+    def of(study: Study, added: str, fit: Fit) -> Step:
+        """Compute the errors of a fit, those on points left out too."""
+        null = NullModel.around(fit, study.nuisance)
+        left_out_um = hold_out(null, study.folds()) * study.sigma_um
+        fitted = study.residuals(fit.predicted_um)
+        return Step(added, fit, fitted.rmse_um, root_mean_square(left_out_um))
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict and what it rests on.
+
+    Attributes:
+        study: the readings.
+        verdict: the headline.
+        reason: one sentence for the user.
+        p_value: that as much evidence appears when nothing is missing; nan if not tested.
+        accepted: ids of the effects added to the model, in order.
+        classes: accepted ones in that order, then others by probability.
+        history: the models, base first.
+        unknown: where the unexplained shows, or None.
+        not_testable: ids that these readings cannot see at typical size.
+        detectable: smallest amplitude of each testable effect that would have been seen.
+        library: the effects that further experiments may be proposed for, by id.
+        remarks: on what was known before, a sentence each.
+    """
+
+    study: Study
+    verdict: Verdict
+    reason: str
+    p_value: float
+    accepted: tuple[str, ...]
+    classes: tuple[EffectClass, ...]
+    history: tuple[Step, ...]
+    unknown: Unknown | None = None
+    not_testable: tuple[str, ...] = ()
+    detectable: dict[str, dict[str, float]] = field(default_factory=dict)
+    library: Mapping[str, type[Effect]] = field(default_factory=dict)
+    remarks: tuple[str, ...] = ()
+
+    def __repr__(self) -> str:
+        before, after = self.history[0].rmse_um, self.history[-1].rmse_um
+        found = f' {", ".join(self.accepted)}' if self.accepted else ''
+        return f'Diagnosis({self.verdict}{found}, RMSE {before:.2f} -> {after:.2f} µm)'
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the user, warnings first."""
+        return (*self.warnings, *self.study.notes)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why what was known before does not suit this job, a sentence each."""
+        shift = self.pattern_shift
+        return (shift.warning, *self.remarks) if shift and shift.is_alarming else self.remarks
+
+    @cached_property
+    def pattern_shift(self) -> PatternShift | None:
+        """How far the pattern moved from what was known before; None if nothing was."""
+        return PatternShift.of(self.history[-1].fit)
+
+    @cached_property
+    def random_effects(self) -> tuple[Amount, ...]:
+        """Estimated levels of parts and zeros of gauge sessions."""
+        return amounts(self.history[-1].fit, self.study.random_effects)
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is known of the model with what was accepted: a prior for the next job."""
+        return posterior_of(self.history[-1].fit, self.study.campaign)
+
+    @property
+    def noise_floor_um(self) -> float:
+        """Standard deviation of the gauge at the points [um]."""
+        return self.study.noise_floor_um
+
+    @property
+    def model(self) -> DepositionModel:
+        """The model with what was accepted."""
+        return self.history[-1].model
+
+    @cached_property
+    def comparisons(self) -> tuple[Comparison, ...]:
+        """Each model of the history beside the readings."""
+        return tuple(compare(self.study, step.model) for step in self.history)
+
+    @property
+    def geometry(self) -> dict[str, SprayGeometry]:
+        """How the gun ran over each part, by experiment."""
+        return self.comparisons[-1].geometry
+
+    @cached_property
+    def proposals(self) -> tuple[list[Place], list[Spray]]:
+        """Places to measure and sprays that would settle the diagnosis, best first."""
+        from paint_deposition.inference.diagnosis.next_experiment import propose_for
+
+        return propose_for(self, self.library)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``diagnosis.json``."""
+        before, after = self.history[0], self.history[-1]
+        places, sprays = self.proposals
+        return {
+            'verdict': self.verdict,
+            'reason': self.reason,
+            'p_value': self.p_value,
+            'accepted': list(self.accepted),
+            'classes': [asdict(found) for found in self.classes],
+            'rmse_um': {
+                'before': before.rmse_um,
+                'after': after.rmse_um,
+                'holdout_before': before.holdout_rmse_um,
+                'holdout_after': after.holdout_rmse_um,
+                'noise_floor': self.noise_floor_um,
+            },
+            'unknown': None if self.unknown is None else asdict(self.unknown),
+            'not_testable': list(self.not_testable),
+            'detectable': self.detectable,
+            'regions': [region.to_dict() for region in self.comparisons[0].regions],
+            'next': {
+                'measure': [place.to_dict() for place in places],
+                'spray': [spray.to_dict() for spray in sprays],
+            },
+            'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
+            'random_effects': [asdict(amount) for amount in self.random_effects],
+            'noise': self.study.noise_figures,
+            'left_out': [slip.to_dict() for slip in self.study.slips],
+            'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
+            'notes': list(self.notes),
+        }

@@ -1,0 +1,310 @@
+"""The pattern from painted parts, section 4.1 of Conner et al. (IROS 2002).
+
+On a panel the three Gaussians of eq. (3) are fitted first; the greater offset radius and the
+greatest standard deviation start the fit of the 2D model, which goes through the same simulation
+as every film, so that door and panel alike can be in a campaign.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.film.paint_used import impossible_brushes
+from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.fitting.brush_figures import brush_figures
+from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
+from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
+from paint_deposition.inference.fitting.estimates import Correlation, Estimate, correlations, estimates
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.panel_reach import shifts, short_reaches
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.model.uniformity import sigma_n_closed_form
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.geometry import geometry_by_experiment
+from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.readings.plausibility import (
+    check_enough,
+    check_panel,
+    check_readings,
+    check_units_beside,
+)
+from paint_deposition.inference.readings.residuals import Residuals
+
+STARTS = 8
+# Residuals beyond this many standard deviations are named in a warning.
+OUTLIER_SIGMAS = 4.0
+# Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
+MOST_CHI_SQUARE = 2.0
+SHOWN_CORRELATIONS = 10
+
+
+@dataclass(frozen=True)
+class PanelFit:
+    """A panel's one-dimensional fit: where its points lie, and eq. (3)."""
+
+    panel: Panel
+    collapse: CollapseFit
+
+    def to_dict(self) -> dict[str, Any]:
+        """Eq. (3), and eq. (5) for it at the panel's own index if it has one."""
+        collapse = self.collapse.collapse
+        index = self.panel.scale_m if len(self.panel.passes_m) > 1 else None
+        return {
+            **collapse.model_dump(),
+            'index_m': index,
+            'sigma_n': None if index is None else sigma_n_closed_form(collapse, index),
+            'rmse_um': self.collapse.residuals.rmse_um,
+            'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
+        }
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """A model fitted to a campaign, and how well it is known.
+
+    Attributes:
+        study: the campaign, ready for inference. fit: the fit of all parameters.
+        parameters: of the pattern and of varied effects, with uncertainties.
+        correlations: of pairs, strongest first.
+        residuals: of each experiment's points.
+        panels: one-dimensional fit of each experiment, None where it is no flat panel.
+        warnings: what the reader must know, a sentence each.
+        shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
+            reach the pattern's edges; they widen the uncertainties.
+    """
+
+    study: Study
+    fit: Fit
+    parameters: tuple[Estimate, ...]
+    correlations: tuple[Correlation, ...]
+    residuals: tuple[Residuals, ...]
+    panels: tuple[PanelFit | None, ...]
+    warnings: tuple[str, ...]
+    shifts: np.ndarray
+
+    def __repr__(self) -> str:
+        known = sum(value.determined for value in self.parameters)
+        return (
+            f'Calibration({len(self.study)} points, {known} of {len(self.parameters)} parameters '
+            f'determined, chi2 per degree of freedom {self.chi_square_per_freedom:.2f})'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of ``calibration.json``."""
+        study, names = self.study, ('value', 'sigma', 'low', 'high', 'determined')
+        return {
+            'parameters': {
+                value.name: {name: getattr(value, name) for name in names}
+                for value in self.parameters
+            },
+            'correlations': [
+                {'parameters': [pair.first, pair.second], 'value': pair.value}
+                for pair in self.correlations[:SHOWN_CORRELATIONS]
+            ],
+            'experiments': [
+                {
+                    'experiment': experiment.name,
+                    'points': len(residuals),
+                    'measured_mean_um': float(residuals.measured_um.mean()),
+                    'predicted_mean_um': float(residuals.predicted_um.mean()),
+                    'residual_sd_um': residuals.sd_um,
+                    'rmse_um': residuals.rmse_um,
+                }
+                for experiment, residuals in zip(
+                    study.campaign.experiments, self.residuals, strict=True
+                )
+            ],
+            'collapse': [None if panel is None else panel.to_dict() for panel in self.panels],
+            'brushes': brush_figures(self.model, self.parameters),
+            'points': len(study),
+            'readings': len(study.campaign.readings),
+            'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
+            'converged': self.fit.converged,
+            'noise': study.noise_figures,
+            'left_out': [slip.to_dict() for slip in study.slips],
+            'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
+            'warnings': list(self.warnings),
+        }
+
+    @cached_property
+    def geometry(self) -> dict[str, SprayGeometry]:
+        """How the gun ran over each part, by experiment."""
+        return geometry_by_experiment(self.study.campaign, self.model)
+
+    @property
+    def model(self) -> DepositionModel:
+        """The calibrated model."""
+        return self.fit.model
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is known of the model's parameters: a prior for other jobs."""
+        return posterior_of(self.fit, self.study.campaign, self.shifts)
+
+    @property
+    def chi_square_per_freedom(self) -> float:
+        """About 1 where only the gauge's noise is left."""
+        return self.fit.chi_square / max(len(self.study) - len(self.fit.vector), 1)
+
+
+@on_one_thread
+def calibrate(
+    campaign: Campaign,
+    start: DepositionModel | None = None,
+    seed: int = 0,
+    progress: Callable[[str], None] = lambda line: None,
+) -> Calibration:
+    """Fit the pattern, and the amplitudes of the start's effects, to all readings.
+
+    Args:
+        campaign: painted parts with readings.
+        start: fixes projection and effects and is a first guess of the pattern; default: a 50 mm
+            bell, whose pattern is then guessed from the first panel.
+        seed: of the further starts.
+        progress: called with a line for each step.
+
+    Raises:
+        ReadingsError: the readings cannot be what they are said to be, or determine nothing.
+    """
+    model = with_brushes_of(campaign, start or DepositionModel())
+    study = Study.of(campaign, model.effects)
+    check_enough(len(study))
+    owner = study.campaign.experiment_of[study.campaign.means.owner]
+    for number, experiment in enumerate(study.campaign.experiments):
+        check_readings(experiment.readings, study.noise.sigma_um[owner == number])
+    progress('looking for slips among the readings')
+    study, _ = sifted(campaign, model, model.effects, seed=seed)
+    progress('fitting the collapse of the panels')
+    panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
+    progress('fitting the pattern')
+
+    def best_fit(study: Study) -> Fit:
+        return _best_fit(study, model, panels, given=start is not None, seed=seed)
+
+    fit = best_fit(study)
+    reaches = short_reaches(study.campaign, fit.model)
+    moved = shifts(study, fit, reaches, best_fit)
+    values = estimates(fit, moved)
+    pairs = correlations(fit)
+    residuals = study.residuals_by_experiment(fit.predicted_um)
+    warnings = [
+        f'{reach}; the intervals are widened by what the fit changes without the readings at '
+        'the ends'
+        for reach in reaches
+    ]
+    warnings += [*impossible_brushes(fit.model), *_warnings(study, fit, values, pairs)]
+    return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
+
+
+def _panel_fit(study: Study, number: int) -> PanelFit | None:
+    experiment = study.campaign.experiments[number]
+    panel = Panel.of(experiment)
+    if panel is None:
+        return None
+    rows = study.campaign.experiment_of == number
+    measured, sigma = study.measured_um[rows], study.sigma_um[rows]
+    check_panel(experiment.readings, panel, measured, sigma)
+    collapse = fit_collapse(panel, measured, sigma)
+    check_units_beside(experiment.readings, measured, collapse.residuals.predicted_um)
+    return PanelFit(panel, collapse)
+
+
+def _best_fit(
+    study: Study,
+    model: DepositionModel,
+    panels: tuple[PanelFit | None, ...],
+    given: bool,
+    seed: int,
+) -> Fit:
+    """The better of the fits from the given patterns and from the first panels' collapses."""
+    starts = [model] if given else []
+    guessed = _guessed(model, panels)
+    if guessed is not None:
+        starts.insert(0, guessed)
+    fits = [
+        study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts or [model]
+    ]
+    return min(fits, key=lambda fit: fit.objective)
+
+
+def _guessed(
+    model: DepositionModel, panels: tuple[PanelFit | None, ...]
+) -> DepositionModel | None:
+    """Each pattern from the first panel of its brush; None without any panel."""
+    patterns, found = list(model.patterns), [panel for panel in panels if panel]
+    for panel in reversed(found):
+        row = int(model.pattern_rows(np.array([panel.panel.brush]))[0])
+        patterns[row] = started_from(model.painting_with(panel.panel.brush), panel).planar
+    return model.with_patterns(patterns) if found else None
+
+
+def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
+    """First values of the 2D model from the 1D fit, as in the paper.
+
+    The greater offset radius is the ring's, the greatest standard deviation that of both
+    Gaussians; lengths are taken back from the panel's distance to the model plane. K1 is put
+    right by the fit.
+    """
+    collapse = panel.collapse.collapse
+    projection = model.projection
+    distance = panel.panel.distance_m + projection.emission_offset_m
+    shrink = projection.model_plane_m / distance
+    sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
+    planar = model.planar.model_copy(
+        update={
+            'r_m': float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9)),
+            'sigma1_m': sigma,
+            'sigma2_m': sigma,
+        }
+    )
+    return model.model_copy(update={'planar': planar})
+
+
+def _warnings(
+    study: Study,
+    fit: Fit,
+    values: tuple[Estimate, ...],
+    pairs: tuple[Correlation, ...],
+) -> list[str]:
+    warnings = list(study.left_out)
+    warnings += [] if fit.converged else ['the fit did not converge: its values are not final']
+    warnings += [
+        f'{value.name} is not determined by these readings: {value.reason}'
+        for value in values
+        if not value.determined
+    ]
+    warnings += [
+        f'{pair.first} and {pair.second} can hardly be told apart (correlation '
+        f'{pair.value:+.2f}): trust their combination, not each'
+        for pair in pairs
+        if pair.too_close
+    ]
+    freedom = max(len(study) - len(fit.vector), 1)
+    if fit.chi_square > MOST_CHI_SQUARE * freedom:
+        warnings.append(
+            f'residuals are {np.sqrt(fit.chi_square / freedom):.1f} times the noise of the gauge: '
+            'something is missing from the model, see paint diagnose'
+        )
+    far = np.flatnonzero(np.abs(fit.residual) > OUTLIER_SIGMAS)
+    if len(far):
+        campaign, worst = study.campaign, np.argmax(np.abs(fit.residual))
+        label = campaign.readings.point[campaign.means.first[worst]]
+        warnings.append(
+            f'{len(far)} of {len(study)} points are off by more than {OUTLIER_SIGMAS:g} standard '
+            f"deviations, most of all point '{label}': measure there again"
+        )
+    if study.noise.source == 'assumed':
+        warnings.append(
+            f'the noise of the gauge is assumed ({study.noise.typical_um:.2f} µm): repeat some '
+            'readings to know it'
+        )
+    return warnings

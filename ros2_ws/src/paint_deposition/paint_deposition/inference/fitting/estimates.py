@@ -1,0 +1,185 @@
+"""Fitted parameters with their uncertainties, in the model's own units."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.inference.fitting.least_squares import STEP, Fit
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
+
+TAILS = (0.025, 0.975)
+DRAWS = 4000
+# Places of K3 and phi among the parameters of a pattern.
+K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
+# A parameter whose width has not fallen below this share of its weak prior's was not measured.
+LEARNED = 0.5
+# A standard deviation this large a share of a positive value leaves no digit of it.
+LARGEST_SHARE = 0.5
+# With the asymmetry this few standard deviations from zero its phase means nothing.
+ASYMMETRY_SIGMAS = 2.0
+PHASE_LIMIT_RAD = np.radians(45.0)
+TOO_CLOSE = 0.95
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter of the fitted model.
+
+    Attributes:
+        name: as in the model file; 'effect.parameter' for effects.
+        value: fitted. sigma: its standard deviation.
+        low, high: 95 % interval, within what is possible.
+        determined: whether the readings say anything about it.
+        reason: if not, why.
+    """
+
+    name: str
+    value: float
+    sigma: float
+    low: float
+    high: float
+    determined: bool
+    reason: str = ''
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """How two estimates go together."""
+
+    first: str
+    second: str
+    value: float
+
+    @property
+    def too_close(self) -> bool:
+        """Whether one can make up for the other."""
+        return abs(self.value) > TOO_CLOSE
+
+
+def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
+    """Every varied parameter with its uncertainty.
+
+    The covariance is widened where residuals are larger than the noise, and by ``shifts``, see
+    ``scaled_covariance``. Intervals are quantiles
+    of the fit's normal distribution carried over to the parameters, in which a logarithm becomes
+    a ratio and two components of the asymmetry its size and phase.
+    """
+    covariance = scaled_covariance(fit, shifts)
+    sigma = np.sqrt(np.diag(_spread(fit, covariance)))
+    learned = np.sqrt(np.diag(covariance)) <= LEARNED * fit.parameters.weak_prior.width
+    values = fit.parameters.values(fit.vector[np.newaxis])[0]
+    low, high = _intervals(fit, covariance, values)
+    pattern, found = fit.parameters.pattern, []
+    for k, name in enumerate(_names(fit)):
+        row, place = divmod(k, len(PATTERN_NAMES))
+        if row < pattern.count:
+            own, first = learned[pattern.entries(row)], k - place
+            k3, sigma_k3 = values[first + K3], sigma[first + K3]
+            reason = _pattern_reason(PATTERN_NAMES[place], values[k], sigma[k], own, k3, sigma_k3)
+        else:
+            entry = k - len(pattern.names) + len(pattern)
+            reason = '' if learned[entry] else 'its effect hardly shows at these points'
+        found.append(
+            Estimate(
+                name,
+                float(values[k]),
+                float(sigma[k]),
+                float(low[k]),
+                float(high[k]),
+                not reason,
+                reason,
+            )
+        )
+    return tuple(found)
+
+
+def correlations(fit: Fit) -> tuple[Correlation, ...]:
+    """Correlations of all pairs of parameters, strongest first."""
+    spread = _spread(fit, scaled_covariance(fit))
+    sigma = np.sqrt(np.diag(spread))
+    matrix = spread / np.outer(sigma, sigma)
+    names = _names(fit)
+    pairs = [
+        Correlation(names[i], names[j], float(matrix[i, j]))
+        for i in range(len(names))
+        for j in range(i)
+        # Brushes share their phase.
+        if not names[i].endswith('phi_rad') or not names[j].endswith('phi_rad')
+    ]
+    return tuple(sorted(pairs, key=lambda pair: -abs(pair.value)))
+
+
+def scaled_covariance(fit: Fit, shifts: np.ndarray | None = None) -> np.ndarray:
+    """(k, k) covariance of the fit's vector, widened where residuals exceed the noise.
+
+    ``shifts`` (n, k) of the vector, each as likely as not, are added as further standard
+    deviations of their own directions.
+    """
+    freedom = max(len(fit.residual) - len(fit.vector), 1)
+    widening = max(fit.chi_square / freedom, 1.0)
+    data = fit.jacobian.T @ fit.jacobian / widening
+    covariance = np.linalg.inv(data + fit.parameters.prior.precision)
+    return covariance if shifts is None else covariance + shifts.T @ shifts
+
+
+def _names(fit: Fit) -> tuple[str, ...]:
+    parameters = fit.parameters
+    return (*parameters.pattern.names, *(f'{effect}.{name}' for effect, name in parameters.varied))
+
+
+def _around_phase(values: np.ndarray, centre: np.ndarray, pattern: PatternVector) -> np.ndarray:
+    """The phases, which run in a circle, at most half a turn from their centres."""
+    away = values - centre
+    phases = slice(PHASE, len(pattern.names), len(PATTERN_NAMES))
+    away[..., phases] = np.remainder(away[..., phases] + np.pi, 2.0 * np.pi) - np.pi
+    return away
+
+
+def _spread(fit: Fit, covariance: np.ndarray) -> np.ndarray:
+    """(k, k) covariance of the parameters, linearised."""
+    low, high = fit.parameters.bounds
+    steps = STEP * np.eye(len(fit.vector))
+    up, down = np.minimum(fit.vector + steps, high), np.maximum(fit.vector - steps, low)
+    parameters = fit.parameters
+    change = _around_phase(parameters.values(up), parameters.values(down), parameters.pattern)
+    by_vector = (change / (up - down).sum(axis=1, keepdims=True)).T
+    return by_vector @ covariance @ by_vector.T
+
+
+def _intervals(
+    fit: Fit, covariance: np.ndarray, values: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) ends of the 95 % intervals."""
+    random = np.random.default_rng(0)
+    vectors = random.multivariate_normal(fit.vector, covariance, DRAWS, method='cholesky')
+    inside = np.clip(vectors, *fit.parameters.bounds)
+    away = _around_phase(fit.parameters.values(inside), values, fit.parameters.pattern)
+    low, high = np.quantile(away, TAILS, axis=0)
+    return values + low, values + high
+
+
+def _pattern_reason(
+    name: str, value: float, sigma: float, learned: np.ndarray, k3: float, sigma_k3: float
+) -> str:
+    """Why a parameter of the pattern is not determined, '' if it is."""
+    if name == 'phi_rad':
+        if k3 < ASYMMETRY_SIGMAS * sigma_k3:
+            return 'the asymmetry K3 is not significant, so it has no phase'
+        if sigma > PHASE_LIMIT_RAD:
+            return 'parallel passes hardly show the asymmetry along their travel; roll the gun'
+        return ''
+    if name == 'K3':
+        if not learned[2] and not learned[3]:
+            return 'the asymmetry does not show at these points'
+        if not (learned[2] and learned[3]):
+            return (
+                'parallel passes show only its part across the travel; paint a pass with the '
+                'gun rolled by 90 deg'
+            )
+        return ''
+    row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
+    if not learned[row]:
+        return 'its value rests on what bells usually have'
+    if name in ('sigma1_m', 'sigma2_m') and sigma > LARGEST_SHARE * value:
+        return f'its standard deviation is {100 * sigma / value:.0f} % of it'
+    return ''

@@ -1,0 +1,184 @@
+"""The forward model: predictions at a campaign's points, fast enough to fit with."""
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numba
+import numpy as np
+from scipy.linalg import block_diag
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, shown_um
+from paint_deposition.film.layout import term_weights
+from paint_deposition.kernel.blocks import LANES
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+
+# Where effects act before the film has arrived: what they change, must be integrated again.
+LAWS = ('flux_factor', 'pattern_scale')
+BEFORE_ARRIVAL = ('on_path', 'reach', 'shadow', *LAWS)
+# Films and prepared paths that are kept for models that differ in other respects only.
+FILMS_KEPT, PATHS_KEPT = 8, 2
+# Effects on film and gauge are differentiated by a step of this share of a unit.
+STEP = 1e-4
+
+
+class Forward:
+    """Predictions at the P points of a campaign in double precision.
+
+    Args:
+        campaign: what was painted and where it was measured.
+        effects: effects that will be varied; their laws are compiled once, together.
+    """
+
+    def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
+        self.campaign, self.effects = campaign, effects
+        self._in_kernel = {effect.id: effect for effect in effects if _defines(effect, LAWS)}
+        self._parts = [_Part(experiment) for experiment in campaign.experiments]
+        # Where the integral is short, threads wait for each other longer than for it.
+        rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)
+        threads = min(numba.get_num_threads(), len(self._parts)) if rays > FEW_RAYS else 1
+        self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def at(self, campaign: Campaign) -> 'Forward':
+        """The same for the points of another campaign."""
+        return Forward(campaign, self.effects)
+
+    def predict_um(self, model: DepositionModel) -> np.ndarray:
+        """(P,) gauge readings that the model predicts [um], experiments one after the other."""
+        stages = self._stages(model)
+        return self._shown_um(self._each(_Part.film_um, stages), stages)
+
+    def terms(self, model: DepositionModel) -> 'Terms':
+        """What the readings are made of, for r, sigma1, sigma2 and the effects of a model."""
+        stages = self._stages(model)
+        terms = self._each(_Part.terms, stages)
+        return Terms(model, lambda w: self._shown_um([w @ part for part in terms], stages))
+
+    def _each(
+        self, work: Callable[['_Part', '_Stages'], np.ndarray], stages: list['_Stages']
+    ) -> list[np.ndarray]:
+        return list((self._pool.map if self._pool else map)(work, self._parts, stages))
+
+    def _shown_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
+        return np.concatenate([
+            shown_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
+            for part, film, one in zip(self._parts, films_um, stages, strict=True)
+        ])  # fmt: skip
+
+    def _stages(self, model: DepositionModel) -> list['_Stages']:
+        """The model of each part: without the effects of what was switched off."""
+        off = [part.experiment.switched_off for part in self._parts]
+        stages = {each: self._taken_apart(model.without(each)) for each in set(off)}
+        return [stages[each] for each in off]
+
+    def _taken_apart(self, model: DepositionModel) -> '_Stages':
+        acting = tuple(effect for effect in model.effects if not effect.is_neutral)
+        before = tuple(effect for effect in acting if _defines(effect, BEFORE_ARRIVAL))
+        if any(_defines(effect, LAWS) for effect in before):
+            # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
+            laws = self._in_kernel | {e.id: e for e in before if _defines(e, LAWS)}
+            before = (*(e for e in before if not _defines(e, LAWS)), *laws.values())
+        return _Stages(
+            model.model_copy(update={'effects': before}),
+            acting,
+            any(effect.needs_slope for effect in model.effects),
+        )
+
+
+@dataclass(frozen=True)
+class Terms:
+    """The readings as a function of the pattern's gains, for one r, sigma1 and sigma2.
+
+    Attributes:
+        model: whose shape and effects they are.
+        predict_um: (P,) gauge readings [um] for (7 B,) weights of the films' terms, by brush.
+    """
+
+    model: DepositionModel
+    predict_um: Callable[[np.ndarray], np.ndarray]
+
+    def with_gains_um(self, patterns: Sequence[PlanarPattern]) -> np.ndarray:
+        """(P,) readings [um] with the gains K1, K2, K3 and phi of patterns of these shapes."""
+        return self.predict_um(np.concatenate([term_weights(p)[0] for p in patterns]))
+
+    def derivatives_um(self) -> np.ndarray:
+        """(P, 7 B) derivatives of the readings by each pattern, as of ``layout.term_weights``."""
+        weights = [term_weights(planar) for planar in self.model.patterns]
+        film = np.concatenate([film for film, _ in weights])
+        rows = block_diag(*(rows for _, rows in weights))
+        ends = [(self.predict_um(film + STEP * w), self.predict_um(film - STEP * w)) for w in rows]
+        return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
+
+
+@dataclass(frozen=True)
+class _Stages:
+    """A model taken apart.
+
+    Attributes:
+        arrival: with the effects that act before the film has arrived, for the kernel.
+        effects: all that act.
+        slope: whether one needs the film's slope.
+    """
+
+    arrival: DepositionModel
+    effects: tuple[Effect, ...]
+    slope: bool
+
+
+def _defines(effect: Effect, names: tuple[str, ...]) -> bool:
+    return any(getattr(type(effect), name) is not getattr(Effect, name) for name in names)
+
+
+class _Part:
+    """One experiment, integrated at its points alone or with the stencils of the film's slope."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.experiment = experiment
+        self._integrators: dict[bool, FilmIntegrator] = {}
+        # Films and prepared paths depend on less than the model: many models share one.
+        self._film_um = lru_cache(FILMS_KEPT)(self._integrated_um)
+        self._steps = lru_cache(PATHS_KEPT)(self._prepared)
+
+    def points(self, slope: bool) -> SurfacePoints:
+        """The P measured points, followed by the stencils where the slope is needed."""
+        return self.experiment.points if slope else self.experiment.measured_points
+
+    def film_um(self, stages: _Stages) -> np.ndarray:
+        """(V,) film that arrived at the points [um]."""
+        return self._film_um(stages.arrival, stages.slope)
+
+    def terms(self, stages: _Stages) -> np.ndarray:
+        """(7 B, V) terms of that film."""
+        integrator, steps = self._ready(stages.arrival, stages.slope)
+        return integrator.terms(steps)[:, : len(self.points(stages.slope))]
+
+    def _integrated_um(self, model: DepositionModel, slope: bool) -> np.ndarray:
+        integrator, steps = self._ready(model, slope)
+        integrator.reset()
+        integrator.paint(steps)
+        return integrator.raw_um[: len(self.points(slope))]
+
+    def _ready(self, model: DepositionModel, slope: bool) -> tuple[FilmIntegrator, Steps]:
+        integrator = self._integrators.get(slope)
+        if integrator is None:
+            points = self.points(slope)
+            # Points left over from the kernel's SIMD lanes would cost several times their share.
+            filled = np.pad(np.arange(len(points)), (0, -len(points) % LANES), 'edge')
+            integrator = self._integrators[slope] = FilmIntegrator(
+                points.select(filled), model, 'double', self.experiment.surface.occluder,
+                keep_absent_laws=True, parallel=False,
+            )  # fmt: skip
+        integrator.use(model)
+        moving = tuple(e for e in model.effects if _defines(e, ('on_path',)))
+        return integrator, self._steps(slope, model.projection, moving, model.shadow > 0.0)
+
+    def _prepared(self, slope: bool, *_: object) -> Steps:
+        """The path as the integrator's effects have it."""
+        integrator = self._integrators[slope]
+        integrator.reset()
+        return integrator.steps(self.experiment.path)

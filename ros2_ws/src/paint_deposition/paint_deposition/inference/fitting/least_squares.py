@@ -1,0 +1,300 @@
+"""Weighted least squares on the readings, through the forward simulation."""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import OptimizeResult, least_squares, lsq_linear
+from scipy.special import ndtri
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.fitting.forward import Forward, Terms
+from paint_deposition.inference.fitting.halton import halton
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.pattern_vector import COS, SIN
+from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
+
+# Steps of the finite differences by effects, in the vector's units.
+STEP = 1e-3
+SPREAD_OF_STARTS = 0.8
+# Shapes that are tried for each start that is kept.
+TRIED_A_START = 8
+# Steps of the first search from each start, and how many of the best are taken to the end.
+SCREENING_STEPS = 6
+FINISHED = 4
+MOST_STEPS = 60
+# Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
+EVENNESS = 0.05
+# A weaker ring, as a share of all paint, has no asymmetry to speak of.
+LEAST_RING = 0.01
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A model fitted to readings.
+
+    Attributes:
+        parameters: what was varied.
+        vector: (k,) best values.
+        model: the model they stand for.
+        predicted_um: (P,) [um].
+        residual: (P,) measured minus predicted, over the standard deviation.
+        jacobian: (P, k) derivative of predictions over the standard deviation.
+        converged: whether the last search ended by itself.
+        nuisance: (P, n) nuisance directions that the fit allowed for, over the standard
+            deviation; their amplitudes are independent and standard normal.
+    """
+
+    parameters: FreeParameters
+    vector: np.ndarray
+    model: DepositionModel
+    predicted_um: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    converged: bool
+    nuisance: np.ndarray
+
+    @cached_property
+    def marginal(self) -> 'Fit':
+        """The same fit with residual and Jacobian whitened by the nuisance directions, too."""
+        factor = covariance_factor(self.nuisance)
+        return replace(
+            self,
+            residual=solve_triangular(factor, self.residual, lower=True),
+            jacobian=solve_triangular(factor, self.jacobian, lower=True),
+            nuisance=self.nuisance[:, :0],
+        )
+
+    @cached_property
+    def amplitudes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Posterior mean (n,) and covariance (n, n) of the nuisance directions' amplitudes.
+
+        The model is linear around the fit, and its vector is not known exactly either.
+        """
+        prior, count = self.parameters.prior, self.nuisance.shape[1]
+        columns = np.hstack([self.nuisance, self.jacobian @ prior.factor])
+        raw = self.residual + self.jacobian @ (self.vector - prior.centre)
+        covariance = np.linalg.inv(np.eye(columns.shape[1]) + columns.T @ columns)
+        mean = covariance @ (columns.T @ raw)
+        return mean[:count], covariance[:count, :count]
+
+    @property
+    def chi_square(self) -> float:
+        """Sum of squared residuals over the standard deviation."""
+        return float(self.residual @ self.residual)
+
+    @property
+    def penalty(self) -> float:
+        """Sum of squared deviations from the prior, whitened."""
+        return float(np.sum(self.parameters.prior.whiten(self.vector) ** 2))
+
+    @property
+    def objective(self) -> float:
+        """What the fit minimises: chi-square, nuisance integrated out, plus the penalty."""
+        return self.marginal.chi_square + self.penalty
+
+
+def fit_readings(
+    forward: Forward,
+    measured_um: np.ndarray,
+    sigma_um: np.ndarray,
+    parameters: FreeParameters,
+    starts: int = 1,
+    seed: int = 0,
+    nuisance: np.ndarray | None = None,
+) -> Fit:
+    """Find the most probable values (maximum a posteriori).
+
+    Args:
+        forward: predicts the points.
+        measured_um, sigma_um: (P,) point means and their standard deviations [um].
+        parameters: what is varied; its start model is the first start.
+        starts: how many starts; others are the best of many shapes of the pattern around the
+            first, drawn with the given seed.
+        nuisance: (P, n) nuisance directions, over the standard deviation, along which the
+            readings may deviate further with unit variance; default: none.
+    """
+    if nuisance is None:
+        nuisance = np.empty((len(measured_um), 0))
+    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance)
+    first = problem.scaled_to_mean(parameters.encode(parameters.start))
+    candidates = [first]
+    if starts > 1:
+        candidates += _promising(problem, first, starts - 1, seed)
+        rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
+        rough.sort(key=lambda result: result.cost)
+        candidates = [result.x for result in rough[:FINISHED]]
+    found = [problem.search(start, MOST_STEPS) for start in candidates]
+    best = min(found, key=lambda result: result.cost)
+    model = parameters.decode(best.x)
+    predicted = forward.predict_um(model)
+    return Fit(
+        parameters,
+        best.x,
+        model,
+        predicted,
+        (measured_um - predicted) / sigma_um,
+        derivatives(forward, parameters, best.x, sigma_um),
+        bool(best.status > 0),
+        nuisance,
+    )
+
+
+def covariance_factor(directions: np.ndarray) -> np.ndarray:
+    """(P, P) lower Cholesky factor of unit noise with deviations along directions (P, n)."""
+    return cholesky(np.eye(len(directions)) + directions @ directions.T, lower=True)
+
+
+def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+    """The best of many shapes of the pattern, spread evenly over what bells usually have.
+
+    For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
+    so that only these three need be searched (variable projection, Golub and Pereyra 1973).
+    """
+    shape = [
+        k for k, name in enumerate(problem.parameters.names[: len(problem.parameters.pattern)])
+        if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
+    ]  # fmt: skip
+    width = problem.prior.width
+    spread = ndtri(halton(TRIED_A_START * count, len(shape), seed))
+    tried = []
+    for away in spread:
+        vector = first.copy()
+        vector[shape] += SPREAD_OF_STARTS * width[shape] * away
+        shaped = np.clip(vector, problem.low, problem.high)
+        vector = problem.with_best_gains(shaped)
+        tried.append((problem.cost(vector, problem.terms(shaped)), vector))
+    return [vector for _, vector in sorted(tried, key=lambda pair: pair[0])[:count]]
+
+
+def derivatives(
+    forward: Forward, parameters: FreeParameters, vector: np.ndarray, sigma_um: np.ndarray
+) -> np.ndarray:
+    """(P, k) derivative of the predictions by the vector, over the standard deviation.
+
+    Exact by the pattern; by effects it is the difference of two predictions.
+    """
+    terms = forward.terms(parameters.decode(vector))
+    return _derivatives_um(forward, parameters, vector, terms) / sigma_um[:, np.newaxis]
+
+
+def _derivatives_um(
+    forward: Forward, parameters: FreeParameters, vector: np.ndarray, terms: Terms
+) -> np.ndarray:
+    count = len(parameters.pattern)
+    columns = [terms.derivatives_um() @ parameters.pattern.jacobian(vector[:count])]
+    _, high = parameters.bounds
+    for k in range(count, len(vector)):
+        step = STEP if vector[k] + STEP <= high[k] else -STEP
+        moved = vector.copy()
+        moved[k] += step
+        change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(terms.model)
+        columns.append(change[:, np.newaxis] / step)
+    return np.hstack(columns)
+
+
+class _Problem:
+    """Residuals and their derivatives for the optimiser; the prior gives further residuals."""
+
+    def __init__(
+        self,
+        forward: Forward,
+        measured_um: np.ndarray,
+        sigma_um: np.ndarray,
+        parameters: FreeParameters,
+        nuisance: np.ndarray,
+    ) -> None:
+        self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
+        self.parameters = parameters
+        # None spares a solve in every step where there are no nuisance directions.
+        self.lower = covariance_factor(nuisance) if nuisance.size else None
+        self.prior = parameters.prior
+        self.low, self.high = parameters.bounds
+        self._last: tuple[bytes, Terms] | None = None
+
+    def terms(self, vector: np.ndarray) -> Terms:
+        key = vector.tobytes()
+        if self._last is None or self._last[0] != key:
+            self._last = (key, self.forward.terms(self.parameters.decode(vector)))
+        return self._last[1]
+
+    def predict(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
+        """(P,) readings [um]; ``terms`` are those of a vector that differs in gains only."""
+        if terms is None:
+            terms = self.terms(vector)
+        return terms.with_gains_um(self.parameters.decode(vector).patterns)
+
+    def whitened(self, columns: np.ndarray) -> np.ndarray:
+        if self.lower is None:
+            return columns
+        return solve_triangular(self.lower, columns, lower=True)
+
+    def residuals(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
+        misfit = self.whitened((self.predict(vector, terms) - self.measured) / self.sigma)
+        return np.concatenate([misfit, self.prior.whiten(vector)])
+
+    def jacobian(self, vector: np.ndarray) -> np.ndarray:
+        slopes = _derivatives_um(self.forward, self.parameters, vector, self.terms(vector))
+        data = self.whitened(slopes / self.sigma[:, np.newaxis])
+        return np.vstack([data, self.prior.whitening])
+
+    def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
+        """The same with K1s such that the mean film is right: the rest is then close enough."""
+        predicted = self.predict(vector)
+        weights = self.sigma**-2.0
+        most = float(np.sum(weights * predicted**2))
+        ratio = float(np.sum(weights * predicted * self.measured)) / most if most > 0 else 1.0
+        scaled = vector.copy()
+        pattern = self.parameters.pattern
+        scaled[[pattern.entries(row)[0] for row in range(pattern.count)]] += np.log(
+            max(ratio, 1e-3)
+        )
+        return np.clip(scaled, self.low, self.high)
+
+    def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
+        """The same with the best K1, K2, K3 and phi, as far as other effects are linear.
+
+        Of several brushes K3 and phi are those that are best for the first.
+        """
+        pattern = self.parameters.pattern
+        # For each brush: ring alone, centre alone, and the ring lopsided along x and along y.
+        one = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
+        one[2:] += one[0]
+        parts = np.kron(np.eye(pattern.count), one)
+        films = np.stack([self.terms(vector).predict_um(part) for part in parts]) / self.sigma
+        films = films.reshape(pattern.count, len(one), -1)
+        films[:, 2:] -= films[:, :1]
+        even = EVENNESS * np.linalg.norm(films[:, 0], axis=1)
+        evenness = np.kron(np.diag(even), np.eye(len(one))[2:])
+        solved = lsq_linear(
+            np.vstack([films.reshape(len(parts), -1).T, evenness]),
+            np.concatenate([self.measured / self.sigma, np.zeros(len(evenness))]),
+            bounds=([0.0, 0.0, -np.inf, -np.inf] * pattern.count, np.inf),
+        ).x.reshape(pattern.count, len(one))
+        ring, centre = solved[:, 0], solved[:, 1]
+        if np.any(ring <= LEAST_RING * (ring + centre)):
+            return self.scaled_to_mean(vector)
+        found = vector.copy()
+        for row, (log_k1, k2, *_) in enumerate(map(pattern.entries, range(pattern.count))):
+            found[log_k1] = np.log(ring[row] + centre[row])
+            found[k2] = centre[row] / (ring[row] + centre[row])
+        found[[COS, SIN]] = solved[0, 2:] / ring[0]
+        return np.clip(found, self.low, self.high)
+
+    def cost(self, vector: np.ndarray, terms: Terms) -> float:
+        return float(np.sum(self.residuals(vector, terms) ** 2))
+
+    def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
+        margin = 1e-9 * (self.high - self.low)
+        return least_squares(
+            self.residuals,
+            np.clip(start, self.low + margin, self.high - margin),
+            jac=self.jacobian,
+            bounds=(self.low, self.high),
+            x_scale=self.prior.width,
+            max_nfev=most_steps,
+            ftol=1e-6,
+            xtol=1e-6,
+            gtol=1e-6,
+        )

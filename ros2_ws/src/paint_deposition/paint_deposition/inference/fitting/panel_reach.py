@@ -1,0 +1,129 @@
+"""Whether readings reach the edges of the pattern, and what a fit owes to those at the ends.
+
+Paint that lands beyond the readings is extrapolated. A little more film along a panel's rim, as
+fat edges have it, then makes a pattern far too wide, with intervals that know nothing of it.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import cumulative_trapezoid
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ReadingsError
+from paint_deposition.film.pass_film import sampled_collapse
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.readings.plausibility import FEWEST_POINTS
+
+# Readings reach an edge of the pattern beyond which no more of a pass's paint lands than this.
+MOST_BEYOND = 0.025
+# Width of the strips at the ends without which the fit is repeated [m].
+STRIPS_M = (0.05, 0.1)
+
+
+@dataclass(frozen=True)
+class Reach:
+    """How far the readings of a panel reach to both sides of the pass that they cover best.
+
+    Attributes:
+        experiment: its number. name: its name.
+        across_m: (P,) coordinate of its points across the passes [m].
+        ends_m: distance of the outermost reading on either side [m].
+        beyond: share of the pass's paint that lands further out on either side.
+        needed_m: distance at which both sides would be reached [m].
+    """
+
+    experiment: int
+    name: str
+    across_m: np.ndarray
+    ends_m: tuple[float, float]
+    beyond: tuple[float, float]
+    needed_m: float
+
+    @property
+    def is_enough(self) -> bool:
+        """Whether both edges of the pattern were measured."""
+        return max(self.beyond) <= MOST_BEYOND
+
+    def __str__(self) -> str:
+        return (
+            f'{self.name}: the readings end {self.ends_m[0]:.2f} and {self.ends_m[1]:.2f} m to '
+            f'the sides of a pass, where {100 * self.beyond[0]:.0f} and '
+            f'{100 * self.beyond[1]:.0f} % of its paint is still to land: the edges of the '
+            'pattern are extrapolated; measure, on a larger panel if need be, '
+            f'about {self.needed_m:.1f} m to both sides of a pass'
+        )
+
+
+def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[Reach, ...]:
+    """The panels of a campaign on which no pass was measured to both edges of its pattern.
+
+    Of a brush there are none if one of its panels shows both edges, or where no part is a flat
+    panel.
+    """
+    panels = [(k, Panel.of(one)) for k, one in enumerate(campaign.experiments)]
+    by_brush: dict[int, list[Reach]] = {}
+    for k, panel in panels:
+        if panel is not None:
+            of_brush = model.painting_with(panel.brush)
+            reach = _reach(k, campaign.experiments[k].name, panel, of_brush)
+            by_brush.setdefault(panel.brush, []).append(reach)
+    return tuple(
+        reach
+        for found in by_brush.values()
+        if not any(reach.is_enough for reach in found)
+        for reach in found
+    )
+
+
+def shifts(
+    study: Study, fit: Fit, reaches: tuple[Reach, ...], fitted: Callable[[Study], Fit]
+) -> np.ndarray:
+    """(n, k) by how much the fit's vector moves without the readings at the ends.
+
+    Args:
+        study: the readings. fit: to all of them.
+        reaches: panels whose ends are left out, strip by strip.
+        fitted: repeats the fit.
+    """
+    moved = []
+    for strip_m in STRIPS_M:
+        inside = np.ones(len(study), dtype=bool)
+        for reach in reaches:
+            low, high = reach.across_m.min() + strip_m, reach.across_m.max() - strip_m
+            here = study.campaign.experiment_of == reach.experiment
+            inside[here] = (reach.across_m >= low) & (reach.across_m <= high)
+        if FEWEST_POINTS <= inside.sum() < len(inside):
+            try:
+                moved.append(fitted(study.of_points(inside)).vector - fit.vector)
+            except ReadingsError:  # no reading of a part is left
+                continue
+    return np.array(moved).reshape(len(moved), len(fit.vector))
+
+
+def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reach:
+    best = None
+    low, high = panel.across_m.min(), panel.across_m.max()
+    for line, speed, mirrored in zip(
+        panel.passes_m, panel.speed_m_per_s, panel.mirrored, strict=True
+    ):
+        collapse = sampled_collapse(
+            model, speed, standoff_m=panel.distance_m, travel_rad=panel.travel_rad, turned=mirrored
+        )
+        x, landed = collapse.x_m, cumulative_trapezoid(collapse.film_um, collapse.x_m, initial=0.0)
+        landed = landed / landed[-1]
+        below, above = np.interp([low - line, high - line], x, landed, left=0.0, right=1.0)
+        beyond = float(below), float(1.0 - above)
+        ends = np.interp([MOST_BEYOND, 1.0 - MOST_BEYOND], landed, x)
+        reach = Reach(
+            number, name, panel.across_m, (float(line - low), float(high - line)), beyond,
+            float(np.abs(ends).max()),
+        )  # fmt: skip
+        if best is None or max(reach.beyond) < max(best.beyond):
+            best = reach
+    assert best is not None  # a panel has a pass
+    return best

@@ -1,0 +1,215 @@
+"""The free parameters of a fit as one vector, and the model that a vector stands for.
+
+The vector holds the coordinates of the patterns, see ``pattern_vector``. Amplitudes of
+effects are in units of their typical size, shapes logarithms of the ratio to their default.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.pattern_vector import COS, SIN, PatternVector
+from paint_deposition.inference.fitting.prior import Prior
+from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
+
+# The range that is physical for a shape parameter is this many standard deviations of its prior.
+SHAPE_DEVIATIONS = 4.0
+
+
+@dataclass(frozen=True)
+class EffectParameter:
+    """One entry of the vector for an effect: an amplitude, or a shape such as a length.
+
+    Attributes:
+        effect: id. name: of the parameter.
+        neutral, low, high: its neutral (for a shape: default) value and its bounds.
+        unit: an amplitude's typical size; for a shape, the logarithm that counts as one.
+        is_shape: whether it is a shape.
+        coordinate: its name in a posterior, where it is ``offset`` + ``unit`` times the entry.
+    """
+
+    effect: str
+    name: str
+    neutral: float
+    low: float
+    high: float
+    unit: float
+    is_shape: bool
+    coordinate: str
+
+    @staticmethod
+    def of(effect: Effect, name: str) -> 'EffectParameter':
+        """The entry of an effect's parameter."""
+        info = effect.parameters()[name]
+        is_shape = info['role'] == 'shape'
+        low, high = info['low'], info['high']
+        unit = np.log(high / low) / SHAPE_DEVIATIONS if is_shape else info['typical']
+        coordinate = effect.coordinates()[name]
+        return EffectParameter(
+            effect.id, name, info['neutral'], low, high, unit, is_shape, coordinate
+        )
+
+    @property
+    def offset(self) -> float:
+        """Value of its coordinate where the entry is zero."""
+        return float(np.log(self.neutral)) if self.is_shape else self.neutral
+
+    def encode(self, value: float) -> float:
+        """The vector's entry for a value."""
+        if self.is_shape:
+            return float(np.log(value / self.neutral) / self.unit)
+        return (value - self.neutral) / self.unit
+
+    def decode(self, entry: np.ndarray) -> np.ndarray:
+        """Values for entries, kept within the bounds; arrays of any shape."""
+        entry = np.asarray(entry, dtype=float)
+        value = (
+            self.neutral * np.exp(self.unit * entry)
+            if self.is_shape
+            else self.neutral + self.unit * entry
+        )
+        return np.clip(value, self.low, self.high)
+
+
+@dataclass(frozen=True)
+class FreeParameters:
+    """The parameters of a model that are varied.
+
+    Attributes:
+        start: the model that fixes everything else, effects included.
+        varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
+        known: what an earlier job told of them, or None.
+    """
+
+    start: DepositionModel
+    varied: tuple[tuple[str, str], ...] = ()
+    known: Posterior | None = None
+
+    @staticmethod
+    def of(
+        start: DepositionModel, *effects: Effect, known: Posterior | None = None
+    ) -> 'FreeParameters':
+        """The pattern and all parameters of these effects; those the model lacks are added."""
+        for effect in effects:
+            if start.effect(effect.id) is None:
+                start = start.with_effect(effect)
+        varied = [(e.id, name) for e in effects for name in e.parameters()]
+        return FreeParameters(start, tuple(varied), known)
+
+    @cached_property
+    def pattern(self) -> PatternVector:
+        """The entries for the patterns; they come first."""
+        return PatternVector(tuple(brush.number for brush in self.start.brushes))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Name of each entry."""
+        of_effects = (f'{e}.{n}' for e, n in self.varied)
+        return (*(c.name for c in self.pattern.coordinates), *of_effects)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Names of the entries in a posterior: there it is ``offset`` + ``scale`` times one."""
+        effects = (f'{e.effect}.{e.coordinate}' for e in self.of_effects)
+        return (*(c.name for c in self.pattern.coordinates), *effects)
+
+    @property
+    def offset(self) -> np.ndarray:
+        """(k,) values of a posterior's coordinates where the entries are zero."""
+        return np.array([0.0] * len(self.pattern) + [e.offset for e in self.of_effects])
+
+    @property
+    def scale(self) -> np.ndarray:
+        """(k,) changes of a posterior's coordinates for one unit of the entries."""
+        return np.array([1.0] * len(self.pattern) + [e.unit for e in self.of_effects])
+
+    def __len__(self) -> int:
+        return len(self.pattern) + len(self.varied)
+
+    @cached_property
+    def of_effects(self) -> tuple[EffectParameter, ...]:
+        """The entries behind those of the pattern."""
+        known = {effect.id: effect for effect in self.start.effects}
+        return tuple(EffectParameter.of(known[e], n) for e, n in self.varied)
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper bounds of the vector."""
+        ends = [(c.low, c.high) for c in self.pattern.coordinates]
+        for entry in self.of_effects:
+            first, second = sorted((entry.encode(entry.low), entry.encode(entry.high)))
+            ends.append((first, second))
+        low, high = zip(*ends, strict=True)
+        return np.array(low), np.array(high)
+
+    def are_physical(self, vectors: np.ndarray) -> np.ndarray:
+        """(n,) bool, whether vectors (n, k) lie within the bounds, K3 <= 1 among them."""
+        low, high = self.bounds
+        patterns = self.pattern.of_patterns(vectors[:, : len(self.pattern)])
+        asymmetry = np.hypot(patterns[..., COS], patterns[..., SIN])
+        return ((low <= vectors) & (vectors <= high)).all(axis=1) & (asymmetry <= 1.0).all(axis=1)
+
+    @property
+    def weak_prior(self) -> Prior:
+        """Of the vector where nothing is known of this bell."""
+        centre = [c.centre for c in self.pattern.coordinates] + [0.0] * len(self.varied)
+        width = [c.width for c in self.pattern.coordinates] + [1.0] * len(self.varied)
+        return Prior(np.array(centre), np.diag(width))
+
+    @cached_property
+    def prior(self) -> Prior:
+        """Of the vector: weak, but for what is known, widened by what differs between jobs."""
+        weak, known = self.weak_prior, self.known
+        if known is None:
+            return weak
+        names = self.coordinates
+        of_known = [k for k, name in enumerate(known.names) if name in names]
+        own = [names.index(known.names[k]) for k in of_known]
+        centre, covariance = weak.centre.copy(), np.diag(weak.width**2)
+        scale = self.scale[own]
+        centre[own] = (known.centre[of_known] - self.offset[own]) / scale
+        covariance[np.ix_(own, own)] = (
+            known.matrix[np.ix_(of_known, of_known)] / np.outer(scale, scale)
+            + self._between_jobs[np.ix_(own, own)]
+        )  # fmt: skip
+        return Prior(centre, np.linalg.cholesky(covariance))
+
+    @property
+    def _between_jobs(self) -> np.ndarray:
+        """(k, k) covariance of the entries between jobs."""
+        of_effects = EFFECT_BETWEEN_JOBS**2 * np.eye(len(self.varied))
+        return block_diag(self.pattern.between_jobs, of_effects)
+
+    def encode(self, model: DepositionModel) -> np.ndarray:
+        """The vector of a model that has the varied effects, kept inside the bounds."""
+        entries = self.pattern.encode(model.patterns)
+        entries += [e.encode(getattr(model.effect(e.effect), e.name)) for e in self.of_effects]
+        return np.clip(np.array(entries), *self.bounds)
+
+    def values(self, vectors: np.ndarray) -> np.ndarray:
+        """(n, k) parameters in the model's units, pattern first, for vectors (n, k)."""
+        count = len(self.pattern)
+        amounts = [
+            entry.decode(column)
+            for entry, column in zip(self.of_effects, vectors[:, count:].T, strict=True)
+        ]
+        return np.column_stack([self.pattern.values(vectors[:, :count]), *amounts])
+
+    def decode(self, vector: np.ndarray) -> DepositionModel:
+        """The model of a vector."""
+        values = [float(value) for value in self.values(vector[np.newaxis])[0]]
+        count = len(self.pattern.names)
+        changed: dict[str, dict[str, float]] = {}
+        for entry, value in zip(self.of_effects, values[count:], strict=True):
+            changed.setdefault(entry.effect, {})[entry.name] = value
+        effects = tuple(
+            e.model_copy(update=changed[e.id]) if e.id in changed else e
+            for e in self.start.effects
+        )
+        found = self.start.with_patterns(self.pattern.patterns(values[:count]))
+        return found.model_copy(update={'effects': effects})

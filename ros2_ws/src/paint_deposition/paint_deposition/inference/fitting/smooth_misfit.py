@@ -1,0 +1,174 @@
+"""How readings scatter about anything smooth, whatever the model lacks.
+
+Nothing is assumed of what is missing but that neighbours share it: neighbours on the part, or
+readings alike in one covariate. The misfit of the pattern, of every size of such a field, and of
+every texture of the film together form a mixture of normal models (a Gaussian process with its
+hyperparameters integrated over a grid). Each predicts every reading from all the others in
+closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006, section 5.4.2).
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import cholesky, solve_triangular
+from scipy.special import logsumexp
+
+from paint_deposition.inference.fitting.smooth_fields import field_over_values, fields_over_parts
+from paint_deposition.inference.readings.covariates import Covariate
+
+# The film's texture, as a share of it: what is usual, within a factor, and what is considered.
+USUAL_TEXTURE, TEXTURE_FACTOR = 0.01, 2.0
+TEXTURES = np.array([0.001, 0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.045])
+# Sizes of a field as a share of the film, and lengths of its correlation: over a covariate in its
+# standard deviations, over the part in metres.
+SHARES = (0.03, 0.1, 0.3)
+COVARIATE_LENGTH, PART_LENGTHS_M = 0.5, (0.1, 0.25)
+# Where the pattern is thin, a field is as large as where the film is this share of the mean.
+THINNEST = 0.2
+# Directions of a field below this share of the largest variance are left out.
+NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Readings beside a fitted model.
+
+    Attributes:
+        residual_um: (P,) measured minus predicted.
+        predicted_um: (P,).
+        gauge_um: (P,) standard deviation of the points without the film's texture.
+        free_um: (P, n) directions in which the model may be off, for unit amplitudes.
+        experiment_of: (P,) part of each point. positions_m: (P, 3).
+        covariates: of the points.
+    """
+
+    residual_um: np.ndarray
+    predicted_um: np.ndarray
+    gauge_um: np.ndarray
+    free_um: np.ndarray
+    experiment_of: np.ndarray
+    positions_m: np.ndarray
+    covariates: tuple[Covariate, ...]
+
+    @cached_property
+    def scatter(self) -> 'Scatter':
+        """What all models say of the readings."""
+        return Scatter.of(self)
+
+    def select(self, rows: np.ndarray) -> 'Misfit':
+        """Some of the readings."""
+        return Misfit(
+            self.residual_um[rows],
+            self.predicted_um[rows],
+            self.gauge_um[rows],
+            self.free_um[rows],
+            self.experiment_of[rows],
+            self.positions_m[rows],
+            tuple(Covariate(c.name, c.values[rows]) for c in self.covariates),
+        )
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What each of M models says of the readings.
+
+    Attributes:
+        log_weight: (M,) logarithm of prior share times likelihood.
+        texture: (M,) of each model.
+        expected_um: (M, P) residual that the other readings predict.
+        sigma_um: (M, P) standard deviation of that prediction.
+        residual_um: (P,).
+    """
+
+    log_weight: np.ndarray
+    texture: np.ndarray
+    expected_um: np.ndarray
+    sigma_um: np.ndarray
+    residual_um: np.ndarray
+
+    @staticmethod
+    def of(misfit: Misfit) -> 'Scatter':
+        """Compute all models."""
+        fields = list(_fields(misfit))
+        log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
+        weights, expected, sigmas = [], [], []
+        for field, log_share in fields:
+            directions = np.hstack([misfit.free_um, field])
+            for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
+                variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
+                likelihood, mean, sigma = _left_out(misfit.residual_um, variance, directions)
+                weights.append(likelihood + log_share + log_texture)
+                expected.append(mean)
+                sigmas.append(sigma)
+        return Scatter(
+            np.array(weights),
+            np.tile(TEXTURES, len(fields)),
+            np.array(expected),
+            np.array(sigmas),
+            misfit.residual_um,
+        )
+
+    @property
+    def texture_share(self) -> float:
+        """Posterior mean of the texture, as a share of the film."""
+        return float(np.sum(np.exp(self.log_weight - logsumexp(self.log_weight)) * self.texture))
+
+    @property
+    def log_density(self) -> np.ndarray:
+        """(P,) logarithm of the density that the other readings predict for each [1/um]."""
+        own = _log_normal(self.residual_um, self.expected_um, self.sigma_um)
+        others = self.log_weight[:, np.newaxis] - own
+        return logsumexp(self.log_weight) - logsumexp(others, axis=0)
+
+    def predicted(self, row: int) -> tuple[float, float]:
+        """Residual that the other readings predict for one, and its standard deviation [um]."""
+        own = _log_normal(self.residual_um[row], self.expected_um[:, row], self.sigma_um[:, row])
+        log_weight = self.log_weight - own
+        weight = np.exp(log_weight - logsumexp(log_weight))
+        mean = float(weight @ self.expected_um[:, row])
+        square = float(weight @ (self.sigma_um[:, row] ** 2 + self.expected_um[:, row] ** 2))
+        return mean, float(np.sqrt(square - mean**2))
+
+
+def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0) -> np.ndarray:
+    """Logarithm of the normal density."""
+    away = np.subtract(value, mean) / sigma
+    return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
+
+
+def _left_out(
+    residual: np.ndarray, variance: np.ndarray, directions: np.ndarray
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
+    over = directions / variance[:, np.newaxis]
+    factor = cholesky(np.eye(directions.shape[1]) + directions.T @ over, lower=True)
+    solved = solve_triangular(factor, over.T, lower=True)
+    weighted = residual / variance - solved.T @ (solved @ residual)
+    diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+    log_det = np.log(variance).sum() + 2.0 * np.log(np.diag(factor)).sum()
+    likelihood = -0.5 * (residual @ weighted + log_det)
+    return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
+
+
+def _fields(misfit: Misfit) -> Iterator[tuple[np.ndarray, float]]:
+    """Directions (P, n) of what may be missing [um], and the logarithm of its prior share.
+
+    Nothing; a field over the part; over one covariate; over all of them at once.
+    """
+    film = np.hypot(
+        misfit.predicted_um, THINNEST * np.mean(misfit.predicted_um)
+    )[:, np.newaxis]  # fmt: skip
+    over_part = fields_over_parts(
+        misfit.experiment_of, misfit.positions_m, PART_LENGTHS_M, NEGLIGIBLE
+    )
+    scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
+    over = [field_over_values(values, COVARIATE_LENGTH, NEGLIGIBLE) for values in scaled]
+    every = np.hstack([over_part[-1], *over])
+    roots = [*over_part, *over, every]
+    yield np.empty((len(film), 0)), np.log(0.5)
+    for root in roots:
+        for share in SHARES:
+            yield share * film * root, np.log(0.5 / len(roots) / len(SHARES))

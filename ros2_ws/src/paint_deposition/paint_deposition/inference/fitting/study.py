@@ -1,0 +1,297 @@
+"""A campaign prepared for inference: point means, noise, blocks and forward model."""
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.facet_error import facet_errors_um
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.least_squares import Fit, fit_readings
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.random_effects import RandomEffects, random_effects
+from paint_deposition.inference.fitting.slips import Slip
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.covariates import Covariate, Rays
+from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
+from paint_deposition.inference.readings.plausibility import check_unit
+from paint_deposition.inference.readings.residuals import Residuals, root_mean_square
+
+# Times that points are left out for cross-validation, each of them once.
+FOLDS = 6
+# Texture that is assumed where the readings do not show it.
+TEXTURE_SHARE = 0.01
+# What facets cost the film is left out below this share of the noise, and told of from this. The
+# estimate is off by this share of itself, see ``film.facet_error``.
+LEAST_FACETS, WORTH_TELLING, FACETS_OFF = 0.1, 1.0, 0.5
+
+
+@dataclass(frozen=True)
+class Texture:
+    """The film's own variation from spot to spot, which no model follows.
+
+    Repeats at one spot do not average it out, and no gauge is to blame for it.
+
+    Attributes:
+        share: standard deviation as a share of the film.
+        source: 'neighbours' if estimated from readings near each other, else 'assumed'.
+    """
+
+    share: float = TEXTURE_SHARE
+    source: str = 'assumed'
+
+    def __str__(self) -> str:
+        share = f'{100.0 * self.share:.2g} % of the film'
+        if self.source == 'assumed':
+            return f"The film's own texture was assumed to be {share}."
+        return f"The film's own texture is {share}, estimated from neighbouring readings."
+
+
+@dataclass(frozen=True)
+class Study:
+    """A campaign with everything that inference needs of it.
+
+    Attributes:
+        campaign: the experiments.
+        forward: predicts the P points.
+        measured_um: (P,) means over repeats [um].
+        sigma_um: (P,) their standard deviations, with the film's texture [um].
+        noise: of single readings.
+        texture: of the film.
+        slips: single readings that were left out, see ``sifted``.
+        facet_um: (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
+    """
+
+    campaign: Campaign
+    forward: Forward
+    measured_um: np.ndarray
+    sigma_um: np.ndarray
+    noise: GaugeNoise
+    texture: Texture = Texture()
+    slips: tuple[Slip, ...] = ()
+    facet_um: np.ndarray | None = None
+    _rays: dict = field(default_factory=dict, repr=False)
+
+    @staticmethod
+    def of(campaign: Campaign, effects: tuple[Effect, ...] = ()) -> 'Study':
+        """Prepare a campaign; ``effects`` are those whose amplitudes may be varied.
+
+        Readings that contradict others at their point are left out, see ``notes``.
+
+        Raises:
+            ReadingsError: readings in another unit, with the remedy.
+        """
+        for experiment in campaign.experiments:
+            check_unit(experiment.readings)
+        noise = gauge_noise(campaign.readings)
+        campaign, noise = campaign.without(noise.gross), noise.without_gross()
+        mean_um, texture = campaign.means.mean_um, Texture()
+        sigma_um = _sigma_um(campaign, noise, texture, None)
+        return Study(campaign, Forward(campaign, effects), mean_um, sigma_um, noise, texture)
+
+    def textured(self, texture: Texture) -> 'Study':
+        """The same with another texture."""
+        sigma_um = _sigma_um(self.campaign, self.noise, texture, self.facet_um)
+        return replace(self, texture=texture, sigma_um=sigma_um)
+
+    def with_facets(self, model: DepositionModel) -> 'Study':
+        """The same with what facets cost under a model, if it is worth telling from the noise.
+
+        How much of it is true is fitted for each part: it is one of the nuisance directions. What
+        it does not follow is noise of its own.
+        """
+        facet_um = np.concatenate(
+            [
+                facet_errors_um(e.surface, e.measured_points, e.path, model)
+                for e in self.campaign.experiments
+            ]
+        )
+        if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
+            return self
+        sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
+        return replace(self, sigma_um=sigma_um, facet_um=facet_um)
+
+    def without(self, slips: dict[int, Slip]) -> 'Study':
+        """The same without some points, by their row."""
+        if not slips:
+            return self
+        kept = ~np.isin(np.arange(len(self)), list(slips))
+        return replace(self.of_points(kept), slips=tuple(slips.values()))
+
+    def of_points(self, kept: np.ndarray) -> 'Study':
+        """The same with some of the points only, (P,) bool.
+
+        Raises:
+            ReadingsError: an experiment has no reading left.
+        """
+        left_out = ~kept[self.campaign.means.owner]
+        campaign = self.campaign.without(left_out)
+        noise = self.noise.select(~left_out)
+        facet_um = None if self.facet_um is None else self.facet_um[kept]
+        return Study(
+            campaign, self.forward.at(campaign), campaign.means.mean_um,
+            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.slips,
+            facet_um,
+        )  # fmt: skip
+
+    @property
+    def gauge_um(self) -> np.ndarray:
+        """(P,) standard deviation of the points from the gauge alone, without texture [um]."""
+        return _of_means(self.noise, self.campaign)
+
+    def __len__(self) -> int:
+        return len(self.measured_um)
+
+    def fit(
+        self,
+        parameters: FreeParameters,
+        starts: int = 1,
+        seed: int = 0,
+        nuisance: np.ndarray | None = None,
+    ) -> Fit:
+        """Fit these parameters to the points; see ``fit_readings``."""
+        return fit_readings(
+            self.forward, self.measured_um, self.sigma_um, parameters, starts, seed, nuisance
+        )
+
+    def residuals(self, predicted_um: np.ndarray) -> Residuals:
+        """The P points beside predictions (P,) for them [um]."""
+        return Residuals(self.measured_um, self._levelled(predicted_um), self.sigma_um)
+
+    def _levelled(self, predicted_um: np.ndarray) -> np.ndarray:
+        """With the measured level on parts painted with something switched off.
+
+        How much paint arrives then is not the model's to predict.
+        """
+        levelled = predicted_um.copy()
+        for number, experiment in enumerate(self.campaign.experiments):
+            rows = self.campaign.experiment_of == number
+            if experiment.switched_off and predicted_um[rows].any():
+                weight = predicted_um[rows] / self.sigma_um[rows] ** 2
+                levelled[rows] *= (weight @ self.measured_um[rows]) / (weight @ predicted_um[rows])
+        return levelled
+
+    def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
+        """The same for each experiment on its own."""
+        residuals, owner = self.residuals(predicted_um), self.campaign.experiment_of
+        return tuple(residuals.select(owner == k) for k in range(len(self.campaign.experiments)))
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the readings for the user."""
+        assumed = (
+            'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
+            'p-values that can be trusted.',
+        )
+        return (
+            *(assumed if self.noise.source == 'assumed' else ()),
+            *(() if self.texture.source == 'assumed' else (str(self.texture),)),
+            *self._facet_notes,
+            *self.left_out,
+        )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """A line for each point at which readings were left out."""
+        return (*self.campaign.notes, *map(str, self.slips))
+
+    @property
+    def noise_figures(self) -> dict[str, Any]:
+        """Noise and texture as results name them."""
+        return {
+            'sigma_um': self.noise.typical_um,
+            'source': self.noise.source,
+            'texture_share': self.texture.share,
+            'texture_source': self.texture.source,
+        }
+
+    @property
+    def noise_floor_um(self) -> float:
+        """Root mean square of the points' standard deviations [um]."""
+        return root_mean_square(self.sigma_um)
+
+    @cached_property
+    def random_effects(self) -> tuple[RandomEffects, ...]:
+        """By how much parts and gauge sessions differ; none with one part and one session."""
+        return random_effects(self.campaign, self.measured_um, self.sigma_um)
+
+    @cached_property
+    def nuisance(self) -> np.ndarray:
+        """(P, n) nuisance directions over the noise: random effects, and facets of each part."""
+        facets = [direction[:, np.newaxis] for direction in self._facets.values()]
+        none = np.empty((len(self), 0))
+        return np.hstack([none, *facets, *(effects.columns for effects in self.random_effects)])
+
+    @property
+    def _facets(self) -> dict[str, np.ndarray]:
+        """By experiment, (P,) what its facets cost the film, over the noise."""
+        if self.facet_um is None:
+            return {}
+        owner, over_noise = self.campaign.experiment_of, self.facet_um / self.sigma_um
+        found = {
+            experiment.name: np.where(owner == number, over_noise, 0.0)
+            for number, experiment in enumerate(self.campaign.experiments)
+        }
+        return {name: direction for name, direction in found.items() if direction.any()}
+
+    @property
+    def _facet_notes(self) -> tuple[str, ...]:
+        found = []
+        for name, direction in self._facets.items():
+            off_um = np.abs(direction * self.sigma_um)
+            worst = int(off_um.argmax())
+            if off_um[worst] > WORTH_TELLING * self.gauge_um[worst]:
+                found.append(
+                    f'The mesh of {name} is coarser than its curvature allows: its facets put the '
+                    f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '
+                    f'has a noise of {self.gauge_um[worst]:.1f} µm. That was allowed for as far '
+                    'as it can be estimated; export the mesh finer.'
+                )
+        return tuple(found)
+
+    def has(self, effect: type[Effect]) -> np.ndarray:
+        """(P,) bool, whether the cell had what an effect needs switched on."""
+        parts = [effect.needs not in e.switched_off for e in self.campaign.experiments]
+        return np.array(parts)[self.campaign.experiment_of]
+
+    def rays(self, model: DepositionModel) -> list[Rays]:
+        """The rays of each experiment for a model's pattern and projection."""
+        key = (model.patterns, model.projection)
+        if key not in self._rays:
+            self._rays.clear()
+            self._rays[key] = [Rays.of(e, model) for e in self.campaign.experiments]
+        return self._rays[key]
+
+    def covariates(self, model: DepositionModel) -> list[Covariate]:
+        """Covariates of all points."""
+        return [
+            Covariate(same[0].name, np.concatenate([part.values for part in same]))
+            for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
+        ]
+
+    def folds(self, seed: int = 0) -> np.ndarray:
+        """(P,) number of the fold in which each point is left out, all at one place together."""
+        places, place = np.unique(self.campaign.positions_m, axis=0, return_inverse=True)
+        fold = np.random.default_rng(seed).permutation(np.arange(len(places)) % FOLDS)
+        return fold[place.ravel()]
+
+    def passes(self, model: DepositionModel) -> np.ndarray:
+        """(P,) pass, from 0 in each experiment, that on average painted each point."""
+        means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
+        return np.round(means).astype(int)
+
+
+def _sigma_um(
+    campaign: Campaign, noise: GaugeNoise, texture: Texture, facet_um: np.ndarray | None
+) -> np.ndarray:
+    """(P,) standard deviation of the points: gauge, texture, and what is not known of facets."""
+    sigma_um = np.hypot(_of_means(noise, campaign), texture.share * campaign.means.mean_um)
+    return sigma_um if facet_um is None else np.hypot(sigma_um, FACETS_OFF * facet_um)
+
+
+def _of_means(noise: GaugeNoise, campaign: Campaign) -> np.ndarray:
+    means = campaign.means
+    return np.sqrt(np.bincount(means.owner, noise.sigma_um**2)) / means.repeats

@@ -1,0 +1,264 @@
+"""A campaign: painted parts with their gauge readings, ready to be compared with the model."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+
+import numpy as np
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.off_surface import lie_on_a_spot, off_surface_hint
+from paint_deposition.inference.readings.outliers import left_out_lines
+from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
+
+# Readings further from the surface, or facing more away from it, do not belong to the part.
+MAX_DISTANCE_M = 0.02
+MAX_ANGLE_RAD = np.radians(60.0)
+# Half the width of the stencil from which the film's slope at a reading is taken [m].
+STENCIL_M = 0.006
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """One painted part: the surface, the path that painted it, the readings taken on it.
+
+    Attributes:
+        name: for reports.
+        surface: the refined part.
+        path: sub-steps of the recorded motion.
+        readings: those that are used.
+        means: the readings averaged over repeats; its P points are what is fitted.
+        points: the P measured points on the surface, followed by the stencils around them from
+            which the film's slope is taken.
+        taken: all readings; used: (N,) which of them are used.
+        files: where mesh, trajectory and readings came from, for reports.
+        settings: of the process, by name, where known.
+        switched_off: of the cell while the part was painted: 'voltage', 'draught'.
+        frame_id: of the recorded poses, '' where not known.
+    """
+
+    name: str
+    surface: Surface
+    path: SprayPath
+    readings: Readings
+    means: PointMeans
+    points: SurfacePoints
+    taken: Readings
+    used: np.ndarray
+    files: dict[str, str] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
+    switched_off: frozenset[str] = frozenset()
+    frame_id: str = ''
+
+    @staticmethod
+    def of(
+        name: str,
+        surface: Surface,
+        path: SprayPath,
+        readings: Readings,
+        files: dict[str, str] | None = None,
+        settings: Mapping[str, float] | None = None,
+        switched_off: frozenset[str] = frozenset(),
+        frame_id: str = '',
+    ) -> 'Experiment':
+        """Match readings to the surface; those without groups get the rows or columns found.
+
+        Raises:
+            ReadingsError: readings too far off the surface or on its other side.
+        """
+        means = PointMeans.of(readings)
+        normals = None if readings.normals is None else readings.normals[means.first]
+        positions = readings.positions_m[means.first]
+        place = surface.locate(positions, normals)
+        _refuse_far(surface, readings, means, place.distance_m)
+        if normals is not None:
+            _refuse_other_side(readings, means, place.angle_rad)
+        points = surface.at(positions, normals, stencil_m=STENCIL_M)
+        if not readings.group.astype(bool).any():
+            lines = columns_or_rows(surface, path, place.positions_m)
+            readings = replace(readings, group=lines[means.owner])
+        used = np.ones(len(readings), dtype=bool)
+        return Experiment(
+            name, surface, path, readings, means, points, readings, used, files or {},
+            settings or {}, switched_off, frame_id,
+        )  # fmt: skip
+
+    def without(self, left_out: np.ndarray) -> 'Experiment':
+        """The same part without some of the readings (N,) that were used.
+
+        Raises:
+            ReadingsError: no reading is left.
+        """
+        if not left_out.any():
+            return self
+        if left_out.all():
+            raise ReadingsError(
+                f'{self.readings.source}: its {len(left_out)} readings contradict each other; '
+                'measure again'
+            )
+        used = self.used.copy()
+        used[used] = ~left_out
+        kept = Experiment.of(
+            self.name, self.surface, self.path, self.taken.select(used), self.files,
+            self.settings, self.switched_off, self.frame_id,
+        )  # fmt: skip
+        return replace(kept, taken=self.taken, used=used)
+
+    def __len__(self) -> int:
+        return len(self.means.mean_um)
+
+    @cached_property
+    def brushes(self) -> frozenset[int]:
+        """Numbers of the brushes that painted the part."""
+        return frozenset(np.unique(self.path.brush[self.path.flow > 0.0]).tolist())
+
+    @cached_property
+    def measured_points(self) -> SurfacePoints:
+        """The P measured points without the stencils."""
+        return self.points.select(slice(0, len(self)))
+
+    @cached_property
+    def off_surface_m(self) -> np.ndarray:
+        """(P,) how far each point was moved onto the surface [m]."""
+        taken = self.readings.positions_m[self.means.first]
+        return np.linalg.norm(taken - self.measured_points.positions_m, axis=1)
+
+    @property
+    def understood(self) -> str:
+        """How the readings were read and how far off the surface they were, in one line."""
+        median, largest = 1e3 * np.median(self.off_surface_m), 1e3 * self.off_surface_m.max()
+        moved = f'moved onto the surface by {median:.1f} mm (median), {largest:.1f} mm at most'
+        return f'{self.readings.understood or self.readings.source}; {moved}'
+
+    @property
+    def groups(self) -> np.ndarray:
+        """(P,) group label of each point."""
+        return self.readings.group[self.means.first]
+
+
+@dataclass(frozen=True)
+class Campaign:
+    """Experiments under one process setting, or with a few brushes.
+
+    Arrays over the N readings or the P points of a campaign hold those of the first experiment
+    first, then those of the second, and so on.
+
+    Attributes:
+        experiments: at least one.
+        model_file: the start model's file, or None.
+        name: that of its file, '' for none; errors compare within one campaign only.
+        head: what the report says of part and batch, by key.
+        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not told.
+
+    Raises:
+        ReadingsError: two experiments have one name.
+    """
+
+    experiments: tuple[Experiment, ...]
+    model_file: str | None = None
+    name: str = ''
+    head: Mapping[str, str] = field(default_factory=dict)
+    target_um: float | None = None
+    tolerance_um: float | None = None
+
+    def __repr__(self) -> str:
+        names = ', '.join(experiment.name for experiment in self.experiments)
+        return f'Campaign({len(self.readings)} readings on {names})'
+
+    def __post_init__(self) -> None:
+        names = [experiment.name for experiment in self.experiments]
+        for name in names:
+            if names.count(name) > 1:
+                raise ReadingsError(f"two experiments are called '{name}'; rename one")
+
+    def __len__(self) -> int:
+        return len(self.means.mean_um)
+
+    @cached_property
+    def readings(self) -> Readings:
+        """The N readings that are used; the label of a point names its experiment."""
+        return Readings.joined({e.name: e.readings for e in self.experiments})
+
+    @cached_property
+    def means(self) -> PointMeans:
+        """The readings averaged over repeats, P points."""
+        return PointMeans.of(self.readings)
+
+    @cached_property
+    def experiment_of(self) -> np.ndarray:
+        """(P,) number of the experiment of each point."""
+        return np.repeat(np.arange(len(self.experiments)), [len(e) for e in self.experiments])
+
+    @cached_property
+    def positions_m(self) -> np.ndarray:
+        """(P, 3) measured points on the surfaces [m]."""
+        return np.concatenate([e.measured_points.positions_m for e in self.experiments])
+
+    @property
+    def brushes(self) -> frozenset[int]:
+        """Numbers of the brushes that painted its parts."""
+        return frozenset[int]().union(*(e.brushes for e in self.experiments))
+
+    @property
+    def settings(self) -> dict[str, float]:
+        """Mean over the experiments of each setting of the process that is known."""
+        names = dict.fromkeys(name for e in self.experiments for name in e.settings)
+        told = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
+        return {name: float(np.mean(values)) for name, values in told.items()}
+
+    def without(self, left_out: np.ndarray) -> 'Campaign':
+        """The same campaign without some of its readings (N,).
+
+        Raises:
+            ReadingsError: an experiment has no reading left.
+        """
+        owner = self.experiment_of[self.means.owner]
+        kept = (e.without(left_out[owner == k]) for k, e in enumerate(self.experiments))
+        return replace(self, experiments=tuple(kept))
+
+    @property
+    def understood(self) -> tuple[str, ...]:
+        """How the readings of each experiment were read, a line each."""
+        return tuple(f'{e.name}: {e.understood}' for e in self.experiments)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """A line for each point at which readings were left out."""
+        return tuple(
+            f'{experiment.name}: {line}'
+            for experiment in self.experiments
+            for line in left_out_lines(experiment.taken, experiment.used)
+        )
+
+
+def _refuse_far(
+    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
+) -> None:
+    far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
+    if not len(far):
+        if lie_on_a_spot(surface, readings.positions_m):
+            hint = off_surface_hint(surface, readings.positions_m)
+            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
+        return
+    worst = far[np.argmax(distance_m[far])]
+    where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
+    raise ReadingsError(
+        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
+        f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
+        f'm (limit {MAX_DISTANCE_M:g}); {off_surface_hint(surface, readings.positions_m)}'
+    )
+
+
+def _refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
+    away = np.flatnonzero(angle_rad > MAX_ANGLE_RAD)
+    if len(away):
+        worst = away[np.argmax(angle_rad[away])]
+        raise ReadingsError(
+            f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
+            f"surface, point '{readings.point[means.first[worst]]}' by "
+            f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
+        )

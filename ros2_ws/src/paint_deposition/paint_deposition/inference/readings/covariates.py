@@ -1,0 +1,112 @@
+"""Covariates: quantities that differ from point to point, against which a residual can show."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import along_path, at_points
+from paint_deposition.inference.readings.campaign import Experiment
+
+# Most sub-steps from which rays are traced; a longer path is thinned.
+SUB_STEPS_USED = 4000
+# A quantity whose standard deviation is a smaller share of its largest value is constant.
+ROUNDING = 1e-4
+
+
+@dataclass(frozen=True)
+class Covariate:
+    """One quantity at each point.
+
+    Attributes:
+        name: with its unit, as in the report.
+        values: (P,).
+    """
+
+    name: str
+    values: np.ndarray
+
+    @property
+    def varies(self) -> bool:
+        """Whether it differs between points by more than rounding in the recording."""
+        return bool(np.std(self.values) > ROUNDING * np.max(np.abs(self.values)))
+
+
+@dataclass(frozen=True)
+class Rays:
+    """Straight rays from the M sub-steps that spray to the P points, for eqs. (1) and (2) alone.
+
+    Attributes:
+        share: (M, P) film that each sub-step leaves at each point [um].
+        x_m, y_m: (M, P) where the ray pierces the model plane, tool axes [m].
+        cos_incidence: (M, P). standoff_ratio: (M, P) distance along the axis over Omega.
+        rows: (M,) rows of the experiment's path.
+        experiment: whose path and points they join.
+    """
+
+    share: np.ndarray
+    x_m: np.ndarray
+    y_m: np.ndarray
+    cos_incidence: np.ndarray
+    standoff_ratio: np.ndarray
+    rows: np.ndarray
+    experiment: Experiment
+
+    @staticmethod
+    def of(experiment: Experiment, model: DepositionModel) -> 'Rays':
+        """Trace them in plain NumPy; sub-steps are thinned to SUB_STEPS_USED."""
+        path, points = experiment.path, experiment.measured_points
+        rows = np.flatnonzero(path.flow * path.dwell_s > 0.0)
+        stride = 1 + len(rows) // SUB_STEPS_USED
+        rows = rows[::stride]
+        axes = path.rotation[rows]
+        offset, omega = model.projection.emission_offset_m, model.projection.model_plane_m
+        origin = path.position_m[rows] - offset * axes[:, :, 2]
+        to_point = points.positions_m[np.newaxis] - origin[:, np.newaxis]
+        local = np.einsum('mpi,mij->mpj', to_point, axes)
+        distance = np.linalg.norm(to_point, axis=2)
+        facing = -np.einsum('mpi,pi->mp', to_point, points.normals)
+        along = local[:, :, 2]
+        lit = (along > max(offset, 1e-3)) & (facing > 0.0)
+        depth = np.where(lit, along, 1.0)
+        x, y = (omega * local[:, :, k] / depth for k in (0, 1))
+        flux = np.empty(x.shape)
+        brush = model.pattern_rows(path.brush[rows])
+        for number, planar in enumerate(model.patterns):
+            own = brush == number
+            flux[own] = planar.flux_um_per_s(x[own], y[own])
+        flux *= (omega / depth) ** 2 * facing / depth
+        weight = (path.flow * path.dwell_s)[rows] * stride
+        share = np.where(lit, flux, 0.0) * weight[:, np.newaxis]
+        cos_incidence = facing / np.maximum(distance, 1e-9)
+        return Rays(share, x, y, cos_incidence, depth / omega, rows, experiment)
+
+    def mean(self, values: np.ndarray) -> np.ndarray:
+        """(P,) average of (M, P) or (M, 1) values, weighted by the film each ray left."""
+        total = np.maximum(self.share.sum(axis=0), 1e-12)
+        return (self.share * values).sum(axis=0) / total
+
+    @cached_property
+    def along(self) -> dict[str, np.ndarray]:
+        """Covariates by name, as arrays that broadcast to the M sub-steps and P points.
+
+        (M, 1) what the path is like, (M, P) how a ray lands, (1, P) what the surface is like.
+        """
+        points, path = self.experiment.measured_points, self.experiment.path.select(self.rows)
+        of_path = {name: values[:, np.newaxis] for name, values in along_path(path).items()}
+        of_points = {name: values()[np.newaxis] for name, values in at_points(points).items()}
+        return {
+            'incidence_deg': np.degrees(np.arccos(np.clip(self.cos_incidence, -1.0, 1.0))),
+            'standoff_ratio': self.standoff_ratio,
+            **of_path,
+            **of_points,
+            'tool_x_m': self.x_m,
+            'tool_y_m': self.y_m,
+            'film_um': self.share.sum(axis=0)[np.newaxis],
+        }
+
+    @cached_property
+    def covariates(self) -> list[Covariate]:
+        """All covariates of the P points, on average over the film that arrived."""
+        return [Covariate(name, self.mean(values)) for name, values in self.along.items()]

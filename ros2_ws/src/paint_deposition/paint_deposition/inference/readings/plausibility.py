@@ -1,0 +1,152 @@
+"""Plausibility of readings: units, signs and coverage, checked before anything is fitted."""
+
+import numpy as np
+from scipy.special import chdtrc
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.readings.readings import Readings
+
+# The pattern has seven parameters, and a fit needs a few points more.
+FEWEST_POINTS = 10
+UM_PER_MIL, UM_PER_MM = 25.4, 1000.0
+# No paint film is thinner than this everywhere; such numbers are mils or millimetres.
+THINNEST_FILM_UM = 3.0
+THINNEST_MILS = 0.15
+# Two units in one column leave a gap: sorted by size, neighbours differ by more than this factor.
+LEAST_GAP = 6.0
+UNIT_SLACK = 1.8
+NEGATIVE_SIGMAS = 4.0
+# The film has structure if noise alone scatters as much with a smaller probability.
+NO_STRUCTURE_P = 1e-3
+# A point lies beside a pass from this share of the panel's scale on.
+BESIDE = 0.05
+
+
+def check_enough(points: int) -> None:
+    """Refuse a campaign with hardly more points than the pattern has parameters.
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    if points < FEWEST_POINTS:
+        raise ReadingsError(
+            f'readings at {points} points; the pattern has 7 parameters, measure at least '
+            f'{FEWEST_POINTS} points, better 30'
+        )
+
+
+def check_unit(readings: Readings) -> None:
+    """Refuse readings in another unit.
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    highest = float(readings.thickness_um.max())
+    if highest < THINNEST_FILM_UM:
+        unit, factor = ('mils', UM_PER_MIL) if highest > THINNEST_MILS else ('mm', UM_PER_MM)
+        raise ReadingsError(
+            f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
+            f'multiply by {factor:g}'
+        )
+
+
+def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
+    """Refuse readings that no film gives.
+
+    Args:
+        readings: as taken.
+        sigma_um: (N,) standard deviation of a reading [um].
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    film = readings.thickness_um
+    below = film < -NEGATIVE_SIGMAS * sigma_um
+    if below.any():
+        worst = int(np.argmin(film))
+        raise ReadingsError(
+            f"{readings.source}: point '{readings.point[worst]}' reads {film[worst]:g} µm; film "
+            'is not negative, zero the gauge on bare metal'
+        )
+    _refuse_mixed_units(readings)
+
+
+def check_panel(
+    readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
+) -> None:
+    """Refuse a panel whose readings cannot determine a pass.
+
+    Args:
+        readings: as taken. panel: where points and passes lie.
+        measured_um, sigma_um: (P,) point means and their standard deviations [um].
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    places = panel.places_m
+    nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
+    beside = BESIDE * panel.scale_m
+    if nearest.min() > -beside or nearest.max() < beside:
+        missing = 'x < 0' if nearest.min() > -beside else 'x > 0'
+        raise ReadingsError(
+            f'{readings.source}: all readings lie on one side of the passes ({missing} is bare '
+            'of readings, x from tool z times travel); measure across whole passes'
+        )
+    weights = sigma_um**-2.0
+    mean = float(weights @ measured_um) / float(weights.sum())
+    scatter = float(weights @ (measured_um - mean) ** 2)
+    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
+        raise ReadingsError(
+            f'{readings.source}: the film varies by no more than the noise of the gauge '
+            f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
+            'measure beyond the passes or paint at a wider index'
+        )
+
+
+def check_units_beside(
+    readings: Readings, measured_um: np.ndarray, expected_um: np.ndarray
+) -> None:
+    """Refuse points that agree with a robust fit if they are taken for another unit.
+
+    Args:
+        readings: as taken.
+        measured_um, expected_um: (P,) point means, and the film expected there [um].
+
+    Raises:
+        ReadingsError: one line with the remedy.
+    """
+    thick = (expected_um > THINNEST_FILM_UM) & (measured_um > 0.0)
+    ratio = np.where(thick, expected_um, 1.0) / np.where(thick, measured_um, 1.0)
+    for unit, exact in (('mils', UM_PER_MIL), ('mm', UM_PER_MM)):
+        strange = (ratio > exact / UNIT_SLACK) & (ratio < exact * UNIT_SLACK)
+        if strange.any():
+            raise _other_unit(readings, measured_um[strange], expected_um[strange], unit, exact)
+
+
+def _refuse_mixed_units(readings: Readings) -> None:
+    film = np.sort(readings.thickness_um[readings.thickness_um > 0.0])
+    if len(film) < 2:
+        return
+    ratio = film[1:] / film[:-1]
+    cut = int(np.argmax(ratio))
+    if ratio[cut] < LEAST_GAP:
+        return
+    low, high = film[: cut + 1], film[cut + 1 :]
+    factor = float(np.median(high) / np.median(low))
+    # Readings beside the pattern are small, too, but they differ among themselves.
+    if np.median(high) < THINNEST_FILM_UM or low.max() > LEAST_GAP * low.min():
+        return
+    for unit, exact in (('mils', UM_PER_MIL), ('mm', UM_PER_MM)):
+        if exact / UNIT_SLACK < factor < exact * UNIT_SLACK:
+            raise _other_unit(readings, low, high, unit, exact)
+
+
+def _other_unit(
+    readings: Readings, strange: np.ndarray, others_um: np.ndarray, unit: str, factor: float
+) -> ReadingsError:
+    return ReadingsError(
+        f'{readings.source}: {len(strange)} of the readings are about {np.median(strange):.3g} '
+        f'where {np.median(others_um):.3g} µm is expected; they look like {unit}, multiply '
+        f'them by {factor:g}'
+    )

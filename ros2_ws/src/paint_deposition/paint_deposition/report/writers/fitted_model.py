@@ -1,0 +1,146 @@
+"""A model fitted to readings as a model file: what it started from stays on record."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.inference.diagnosis.verdict import Step
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.files.model_file import ModelFile, write_model
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.study import Study
+
+# So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
+DIGITS = 8
+# What a step of the history added, where it was no effect.
+PATTERN, REFIT = 'pattern', 'refit'
+
+
+def write_fitted(
+    path: str | Path,
+    study: Study,
+    steps: Sequence[Step],
+    start: ModelFile | None = None,
+    header_comment: str = '',
+) -> None:
+    """Write the last step's model; an older file is replaced at once.
+
+    Fitted numbers are rounded to ``DIGITS`` significant digits, all others stay as given.
+
+    Args:
+        path: YAML.
+        study: the readings that it was fitted to.
+        steps: the models, the one started from, fitted anew, first.
+        start: what was started from: the name stays, the history goes on, and uncertainties
+            stay where the fit has no newer ones.
+        header_comment: lines to put at the top.
+    """
+    start = start or ModelFile(steps[0].model)
+    fit = steps[-1].fit
+    history = history_as_list(study, steps, start.history)
+    uncertainty = _uncertainty(fit, start.uncertainty)
+    fitted = _rounded(fit, steps[0].model.effects)
+    posterior: Posterior | None = _short(posterior_of(fit, study.campaign))
+    whole = fitted.with_others(start.model)
+    if whole is not fitted:
+        # It is that of some brushes only and would be taken for that of all.
+        fitted, posterior = whole, None
+    write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
+
+
+def history_as_list(
+    study: Study, steps: Sequence[Step], older: Sequence[Mapping[str, Any]] = ()
+) -> list[dict[str, Any]]:
+    """What was added to a model and the errors it left.
+
+    Errors can be compared within one campaign only, so each step names its campaign, with the
+    noise of its gauge. The model started from is the last of the older steps: fitted anew to the
+    same campaign it replaces that step, fitted to another one it follows it.
+
+    Args:
+        study: the readings.
+        steps: the models, the one started from, fitted anew, first.
+        older: what the start model's own file says.
+    """
+    campaign = study.campaign.name
+    found = [
+        {
+            'added': step.added,
+            'rmse_um': round(step.rmse_um, 4),
+            'holdout_rmse_um': round(step.holdout_rmse_um, 4),
+            'noise_floor_um': round(study.noise_floor_um, 4),
+            'campaign': campaign,
+        }
+        for step in steps
+    ]
+    kept = [dict(step) for step in older]
+    if kept and kept[-1].get('campaign', campaign) == campaign:
+        found[0] = kept.pop() | found[0] | {'added': older[-1].get('added', PATTERN)}
+    else:
+        found[0]['added'] = REFIT if kept or steps[0].model.effects else PATTERN
+    return [*kept, *found]
+
+
+def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
+    """The fitted model with what was fitted at few digits, within its bounds.
+
+    Learned laws among the ``given`` effects were not learned here and stay as they are.
+    """
+    model = fit.model.with_patterns(
+        p.model_copy(update={name: _few_digits(getattr(p, name)) for name in PATTERN_NAMES})
+        for p in fit.model.patterns
+    )
+    for effect in model.effects:
+        values: dict[str, Any] = {
+            name: _few_digits(getattr(effect, name), info['low'], info['high'])
+            for name, info in effect.parameters().items()
+            if (effect.id, name) in fit.parameters.varied
+        }
+        if isinstance(effect, LearnedLaw) and effect not in given:
+            values = {
+                name: _few_digits(value)
+                for name, value in dict(effect).items()
+                if isinstance(value, float)
+            }
+            values['learned'] = tuple(map(_few_digits, effect.learned))
+            if isinstance(effect, LearnedCurve):
+                values['sd'] = tuple(float(f'{value:.3g}') for value in effect.sd)
+        model = model.with_effect(effect.model_copy(update=values))
+    return model
+
+
+def _short(posterior: Posterior) -> Posterior:
+    """The same with few digits."""
+    return posterior.model_copy(
+        update={
+            'mean': {name: _few_digits(value) for name, value in posterior.mean.items()},
+            'covariance': {
+                name: [_few_digits(value) for value in row]
+                for name, row in posterior.covariance.items()
+            },
+        }
+    )
+
+
+def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:
+    return min(max(float(f'{value:.{DIGITS}g}'), low), high)
+
+
+def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
+    """Standard deviations in the sections of the model."""
+    sections = {key: dict(value) for key, value in older.items() if isinstance(value, Mapping)}
+    for value in estimates(fit):
+        section, _, name = value.name.rpartition('.')
+        if value.name in PATTERN_NAMES:
+            section = 'planar'
+        sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
+    return sections

@@ -1,0 +1,103 @@
+"""What many parts say together and one does not; what changes, and when."""
+
+import numpy as np
+import pytest
+
+from batch.line.synthetic import FIRST_S, HOUR_S, parts
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
+from paint_deposition.batch.line.causes import pooled
+from paint_deposition.batch.line.change_points import changes_of
+from paint_deposition.batch.line.part import amplitudes
+from paint_deposition.batch.line.series import Series, series_of
+
+FIRST = amplitudes()[0]
+
+
+def changes(made):
+    series = series_of(made, pooled(made))
+    return changes_of(series, np.array([part.time_s for part in made]))
+
+
+def test_an_effect_too_small_for_one_part_shows_in_many():
+    made = parts(150, seed=1, drift=0.3, points=24)
+    assert all(pooled([part, part]).causes == () for part in made[:2])
+    (cause,) = pooled(made).causes
+    assert (cause.effect, cause.parameter) == FIRST
+    assert cause.one_part < 3.0 < 10.0 < cause.all_parts
+
+
+def test_the_patterns_of_two_brushes_are_shared_by_all_parts():
+    """What the second brush changes is taken for no effect; an effect is found beside it."""
+    brushes = PatternVector((1, 2))
+    assert all(pooled(parts(60, k, pattern=len(brushes)), brushes).causes == () for k in range(3))
+    made = parts(150, seed=1, drift=0.5, points=36, pattern=len(brushes))
+    (cause,) = pooled(made, brushes).causes
+    assert (cause.effect, cause.parameter) == FIRST
+    assert cause.value == pytest.approx(0.5 * EFFECTS[FIRST[0]].parameters()[FIRST[1]]['typical'],
+                                        abs=4.0 * cause.sd)  # fmt: skip
+
+
+def test_nothing_is_pooled_where_there_is_nothing():
+    assert all(pooled(parts(60, seed)).causes == () for seed in range(4))
+
+
+def test_a_misfit_that_all_parts_share_is_no_effect():
+    found = pooled(parts(100, seed=2, misfit=0.03))
+    assert found.causes == ()
+    assert found.pool.scales.misfit is not None
+
+
+def test_level_and_noise_are_estimated():
+    scales = pooled(parts(300, seed=3, level=0.02)).pool.scales
+    assert scales.level == pytest.approx(0.02, rel=0.15)
+    assert scales.noise == pytest.approx(1.0, abs=0.06)
+
+
+def test_the_level_of_a_part_is_that_of_its_film():
+    made = parts(40, seed=4, level=0.0, steps=[(25, -0.1)])
+    level = series_of(made, pooled(made))[0]
+    drop = level.values[:25].mean() - level.values[25:].mean()
+    assert drop == pytest.approx(10.0, abs=4 * level.sd[0] * np.hypot(25**-0.5, 15**-0.5))
+
+
+def test_a_step_has_its_date_and_its_size():
+    made = parts(90, seed=5, steps=[(60, -0.04)])
+    (change,) = changes(made)
+    assert (change.series, change.kind) == ('level', 'step')
+    assert abs(change.part - 60) <= 1
+    assert change.earliest_s <= FIRST_S + 60 * HOUR_S <= change.latest_s
+    assert change.after - change.before == pytest.approx(-4.0, abs=3 * change.sd)
+    assert 'fell by' in change.sentence
+
+
+def test_an_effect_that_grows_has_a_beginning():
+    amount = np.concatenate([np.zeros(60), np.linspace(0.0, 8.0, 60)])
+    found = changes(parts(120, seed=6, drift=amount))
+    # One thing changed. What shares its mark on the film changed with it and is named there.
+    (grown,) = found
+    assert '.'.join(FIRST) in grown.members
+    assert grown.kind == 'drift'
+    assert 45 <= grown.part <= 75
+    assert grown.per_day > 0.0
+    assert 'level' in grown.also
+
+
+def test_a_steady_line_has_few_alarms_and_changes():
+    alarms = made = 0
+    for seed in range(10, 13):
+        line = parts(150, seed)
+        series = series_of(line, pooled(line))
+        alarms += sum(len(rows) for one in series for rows in one.charts.alarms.values())
+        made += len(changes_of(series, np.array([part.time_s for part in line])))
+    # One alarm in 1000 parts is wanted; the centre is known from 50 parts only.
+    assert alarms <= 3
+    assert made == 0
+
+
+def test_one_bad_part_is_an_alarm_and_no_change():
+    values = np.random.default_rng(7).normal(size=100)
+    values[70] += 9.0
+    series = Series('level', '%', ('level',), values, np.ones(100), 33, 10_000.0)
+    assert series.charts.alarms['shewhart'].tolist() == [70]
+    assert changes_of([series], FIRST_S + HOUR_S * np.arange(100)) == []

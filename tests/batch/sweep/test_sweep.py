@@ -1,0 +1,198 @@
+"""A sweep by worker processes: the films of single runs, whatever dies on the way."""
+
+import hashlib
+import json
+import os
+import signal
+
+import pyarrow.parquet as pq
+import pytest
+import yaml
+
+import paint_deposition as pd
+from booth import SAMPLES
+from cli.command import assert_refused, installed_paint, paint
+from paint_deposition.batch.cluster.finished import NAME, Finished
+from paint_deposition.batch.cluster.run import run
+from paint_deposition.batch.cluster.workers import workers
+from paint_deposition.batch.sweep.case import computed
+from paint_deposition.batch.sweep.job import Job
+from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.batch.sweep.varied_motion import varied_motion
+
+DOOR = SAMPLES / 'measured_door'
+EDGE_M = 0.08
+SPEEDS, K1 = [0.9, 1.0, 1.1], [1.8, 1.9]
+TOLD = {
+    'mesh': 'door.stl', 'trajectory': 'door', 'state_topic': '/atomizer/state',
+    'max_edge_length_m': EDGE_M, 'readings': 'door.csv',
+    'grid': {'planar.K1_cm3_per_s': K1, 'speed_factor': SPEEDS},
+}  # fmt: skip
+
+
+@pytest.fixture
+def sweep_file(tmp_path):
+    path = tmp_path / 'sweep.yaml'
+    inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
+    path.write_text(yaml.safe_dump(TOLD | inputs))
+    return path
+
+
+def film_by_itself(k1: float, speed: float) -> pd.Film:
+    """The same as one run."""
+    surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
+    motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
+    model = pd.DepositionModel()
+    planar = model.planar.model_copy(update={'K1_cm3_per_s': k1})
+    return pd.simulate(
+        surface, varied_motion(motion, speed), model.model_copy(update={'planar': planar}),
+        readings=pd.read_readings(DOOR / 'door.csv', surface=surface),
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
+    job = Job.of(SweepFile.model_validate(TOLD), DOOR)
+    finished = Finished(tmp_path / NAME)
+    killed = []
+
+    def kill_one(what: str, share: float) -> None:
+        if share > 0.0 and not killed:
+            killed.append(client.run(os.getpid).popitem()[1])
+            os.kill(killed[0], signal.SIGKILL)
+
+    with workers(count=2) as client:
+        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 6
+        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 0
+        assert len(killed) == 1
+        assert killed[0] not in client.run(os.getpid).values()
+    table = finished.table(case.digest for case in job.cases).to_pylist()
+    for values, row in zip(job.values, table, strict=True):
+        alone = film_by_itself(values['planar.K1_cm3_per_s'], values['speed_factor'])
+        assert row['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+        assert row['mean_um'] == alone.statistics.mean_um
+        assert row['predicted_um'] == alone.predicted_um.tolist()
+
+
+@pytest.mark.slow
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
+    output = tmp_path / 'out'
+    told = json.loads(installed_paint('sweep', sweep_file, '-o', output, '--json').stdout)
+    assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
+    assert told['judged_by'] == 'sigma_n'
+    first = pq.read_table(output / 'cases.parquet')
+    kept = sorted((output / NAME).iterdir())
+    kept[2].unlink()
+    again = json.loads(paint('sweep', sweep_file, '-o', output, '--workers', 1, '--json').stdout)
+    assert again['computed'] == 1
+    assert pq.read_table(output / 'cases.parquet').equals(first)
+    assert first['speed_factor'].to_pylist() == SPEEDS * 2
+    # The film goes as K1 over the speed.
+    film = first['painted_volume_cm3'].to_numpy()
+    assert film[3:] / film[:3] == pytest.approx(K1[1] / K1[0])
+    assert film[0] / film[2] == pytest.approx(SPEEDS[2] / SPEEDS[0], rel=1e-3)
+    assert len(pq.read_table(output / 'points.parquet')) == 6 * len(
+        pd.read_readings(DOOR / 'door.csv')
+    )
+    assert (output / 'sweep.png').stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ('changed', 'words'),
+    [
+        ({'grid': {'index_m': [0.2]}}, ['index_m varies planned passes', 'leave trajectory out']),
+        ({'mesh': 'none.stl'}, ['none.stl', 'no such mesh file']),
+        ({'sample': {'count': 2, 'posterior': True}}, ['no model is given']),
+        ({'grid': {'own.gain': [0.1]}}, ["no effect 'own' is in the library or in a model"]),
+        (
+            {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
+            ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
+        ),
+        ({'campaign': str(DOOR / 'campaign.yaml')}, ['speed_factor varies', 'campaign']),
+        (
+            {'campaign': str(DOOR / 'campaign.yaml'), 'grid': {'planar.K2': [0.1]}},
+            ['campaign.yaml names no model', 'give model'],
+        ),
+    ],
+)
+def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path, changed, words):
+    path = tmp_path / 'sweep.yaml'
+    inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
+    path.write_text(yaml.safe_dump(TOLD | inputs | changed))
+    assert_refused(paint('sweep', path, '-o', tmp_path / 'out'), *words)
+    assert not (tmp_path / 'out').exists()
+
+
+@pytest.mark.slow
+def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
+    """Names of files and lists of effects are drawn over, too; a bare part is no best case."""
+    told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
+    told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
+    (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    assert done.returncode == 0, done.stderr
+    assert 'warning: case 1: ' in done.stderr
+    assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
+    assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
+    told['cases'] = told['cases'][:1] * 2
+    (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    done.stderr = done.stderr.splitlines()[-1]  # after the notes
+    assert_refused(done, 'none of 2 cases has a result; case 1: ')
+
+
+def test_a_campaigns_own_model_is_varied(tmp_path):
+    door = yaml.safe_load((DOOR / 'campaign.yaml').read_text())['experiments'][:1]
+    door[0] |= {key: str(DOOR / door[0][key]) for key in ('mesh', 'trajectory', 'measurements')}
+    (tmp_path / 'model.yaml').write_text('planar: {K2: 0.4, r_m: 0.3}')
+    campaign = {'experiments': door, 'model': 'model.yaml'}
+    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(campaign))
+    told = {'campaign': 'campaign.yaml', 'grid': {'planar.K2': [0.1]}}
+    (case,) = Job.of(SweepFile.model_validate(told), tmp_path).cases
+    planar = case.given['model'].planar
+    assert (planar.K2, planar.r_m) == (0.1, 0.3)
+
+
+def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
+    monkeypatch.setattr('paint_deposition.batch.cluster.workers.CONNECT_S', 1)
+    address = 'tcp://127.0.0.1:9'
+    done = paint('sweep', sweep_file, '-o', tmp_path / 'out', '--scheduler', address)
+    assert_refused(done, address, 'dask scheduler')
+
+
+OWN = """
+from paint_deposition.effects.base import Effect, parameter
+
+class Own(Effect):
+    id = 'own'
+    family = 'incidence'
+    gain: float = parameter(0.0, low=-1.0, high=1.0, typical=0.1, unit='1', description='gain')
+
+    @staticmethod
+    def flux_factor(ray, gain):
+        return 1.0 + gain * ray.cos_incidence
+"""
+
+
+@pytest.mark.slow
+def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
+    """Its parameters vary like any others, and its text is part of what a case is known by."""
+    file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
+    file.write_text(OWN)
+    model_file.write_text('effects:\n  - {file: own.py, gain: 0.5}\n')
+    varied = {'model': [str(model_file)], 'speed_factor': SPEEDS[:1], 'own.gain': [0.5, -0.25]}
+    told = TOLD | {'grid': varied}
+    sweep = SweepFile.model_validate(told)
+    job = Job.of(sweep, DOOR)
+    surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
+    motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
+    alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
+    file.unlink()
+    finished = Finished(tmp_path / NAME)
+    with workers(count=1) as client:
+        run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
+    as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
+    assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
+    assert weaker['mean_um'] < as_told['mean_um']
+    file.write_text(OWN.replace('1.0 + gain', '1.5 + gain'))
+    assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest

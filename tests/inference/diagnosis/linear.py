@@ -1,0 +1,109 @@
+"""Fits of models that are exactly linear, to compare closed forms with direct ones."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.law import hat_weights
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.parameters import FreeParameters
+
+PARAMETERS = FreeParameters.of(DepositionModel())
+
+
+def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
+    """A posterior narrower than the weak prior, in which every coordinate goes with all others."""
+    prior, random = parameters.weak_prior, np.random.default_rng(seed)
+    root = random.normal(size=(len(parameters), len(parameters))) / 5.0
+    covariance = np.outer(prior.width, prior.width) * (root @ root.T)
+    covariance *= np.outer(parameters.scale, parameters.scale)
+    centre = parameters.offset + parameters.scale * (prior.centre + 0.1 * prior.width)
+    return Posterior(
+        mean=dict(zip(parameters.coordinates, centre.tolist(), strict=True)),
+        covariance=dict(zip(parameters.coordinates, covariance.tolist(), strict=True)),
+        readings=('those of another job',),
+    )
+
+
+# The same parameters after another job.
+KNOWN = replace(PARAMETERS, known=correlated(PARAMETERS))
+
+
+def linear_fit(
+    random: np.random.Generator,
+    count: int,
+    data: np.ndarray | None = None,
+    parameters: FreeParameters = PARAMETERS,
+) -> Fit:
+    """Most probable values of a linear model with the parameters' prior and noise 1.
+
+    Args:
+        random: draws the model, and data from it if none are given.
+        count: of the readings.
+        data: (count,) readings.
+        parameters: whose prior is taken.
+    """
+    prior = parameters.prior
+    jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening
+    if data is None:
+        data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(prior.centre)))
+        data = data + random.normal(size=count)
+    return fit_linear(jacobian, data, parameters)
+
+
+def fit_linear(
+    jacobian: np.ndarray, data: np.ndarray, parameters: FreeParameters = PARAMETERS
+) -> Fit:
+    """The most probable values (ridge regression toward the priors)."""
+    prior = parameters.prior
+    covariance = prior.factor @ prior.factor.T
+    gain = covariance @ jacobian.T
+    innovation = np.eye(len(data)) + jacobian @ gain
+    misfit = data - jacobian @ prior.centre
+    vector = prior.centre + gain @ np.linalg.solve(innovation, misfit)
+    predicted = jacobian @ vector
+    nuisance = np.empty((len(data), 0))
+    return Fit(
+        parameters, vector, parameters.start, predicted, data - predicted, jacobian, True, nuisance
+    )
+
+
+def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
+    """The null hypothesis around a fit, with nuisance directions (P, n) or none."""
+    return NullModel.around(fit, fit.nuisance if nuisance is None else nuisance)
+
+
+def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
+    """Curves of unit size over a covariate, for readings of which each has one value.
+
+    Args:
+        place: (P,) values, in knots from the first on.
+        knots: of the curve.
+        length: of correlation, in standard deviations of the values.
+    """
+    spread = float(np.std(place))
+    at = np.arange(knots)[:, np.newaxis] / spread
+    basis = Basis(CURVES['height_fraction'], {}, hat_weights(place, knots), at, 1.0 / spread)
+    return basis.random(1.0, length)
+
+
+def prior_covariance(fit: Fit) -> np.ndarray:
+    """(P, P) covariance of readings that the base model predicts before it is fitted."""
+    scaled = fit.jacobian @ fit.parameters.prior.factor
+    return np.eye(len(fit.residual)) + scaled @ scaled.T
+
+
+def deviation(fit: Fit) -> np.ndarray:
+    """(P,) data minus prediction at the priors' centre."""
+    return fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
+
+
+def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
+    """Bounds of amplitudes with these signs, ten typical sizes wide."""
+    sides = np.array(sides, dtype=float)
+    return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)

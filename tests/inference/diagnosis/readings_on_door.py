@@ -1,0 +1,36 @@
+"""Readings without noise on the sample door and on a panel."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from booth import door, painted, panel, path_of, serpentine
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
+
+# Two passes of few sub-steps, over the door's arch and edges and over the panel.
+PASSES_M = {'door': (0.75, 0.45), 'panel': (0.05, -0.1)}
+LEAST_UM = 1.0
+
+
+def measured(surface: Surface, name: str, count: int = 24, **options) -> Experiment:
+    """An experiment with readings at places that got some paint."""
+    path = path_of(serpentine(PASSES_M[name], opens_at_m=0.3, period_s=0.1))
+    film_um = painted(surface, path).raw_um
+    at = np.random.default_rng(1).choice(np.flatnonzero(film_um > LEAST_UM), count, replace=False)
+    readings = Readings.of(surface.vertices_m[at], film_um[at], normals=surface.normals[at])
+    return Experiment.of(name, surface, path, readings, **options)
+
+
+def study_of(*experiments: Experiment) -> Study:
+    return Study.of(Campaign(experiments))
+
+
+def on_door(**options) -> Experiment:
+    return measured(door(), 'door', **options)
+
+
+def on_panel(name: str = 'panel') -> Experiment:
+    return replace(measured(panel(0.4, 0.04), 'panel'), name=name)

@@ -1,0 +1,257 @@
+"""Log Bayes factors in closed form against the densities they stand for."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.integrate import dblquad, quad
+from scipy.special import log_ndtr
+from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
+
+from inference.diagnosis.linear import KNOWN, PARAMETERS, deviation, fit_linear, linear_fit, null_of
+from inference.diagnosis.linear import prior_covariance as covariance_of
+from paint_deposition.inference.diagnosis.evidence import (
+    KNOWN_NOISE,
+    NullModel,
+    Principal,
+    log_bayes_factor,
+    log_normal_cdf,
+    simulated,
+)
+from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.model.coordinates import PATTERN
+
+READINGS = 30
+
+
+@pytest.fixture(params=[PARAMETERS, KNOWN], ids=['weak', 'known'])
+def fit(request):
+    return linear_fit(np.random.default_rng(3), READINGS, parameters=request.param)
+
+
+@pytest.fixture
+def columns():
+    return np.random.default_rng(4).normal(size=(READINGS, 3))
+
+
+def log_factor(columns, deviations, sides=None, sizes=None, freedom=np.inf) -> float:
+    """The log Bayes factor of whitened directions (P, n) for whitened deviations (P,)."""
+    count = columns.shape[1]
+    known = np.zeros(count) if sides is None else np.array(sides, dtype=float)
+    return log_bayes_factor(
+        columns.T @ columns,
+        columns.T @ deviations,
+        float(deviations @ deviations),
+        np.eye(count)[known != 0.0],
+        known[known != 0.0],
+        np.ones(count) if sizes is None else np.array(sizes, dtype=float),
+        min(freedom, 2.0 * KNOWN_NOISE),
+        len(deviations),
+    )
+
+
+def test_whitening_makes_the_null_model_standard_normal(fit, columns):
+    null = null_of(fit, columns)
+    covariance = covariance_of(fit) + columns @ columns.T
+    assert null.lower @ null.lower.T == pytest.approx(covariance)
+    assert null.lower @ null.deviation == pytest.approx(deviation(fit))
+
+
+def test_some_of_the_readings_have_the_covariance_among_them(fit, columns):
+    null, rows = null_of(fit, columns), np.arange(READINGS) % 3 > 0
+    part = null.select(rows)
+    covariance = null.lower @ null.lower.T
+    assert part.lower @ part.lower.T == pytest.approx(covariance[np.ix_(rows, rows)])
+    assert part.lower @ part.deviation == pytest.approx(null.raw[rows])
+
+
+@pytest.mark.parametrize('of_the_pattern', [PARAMETERS, KNOWN], ids=['weak', 'known'])
+def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart(of_the_pattern):
+    """Its directions are no longer the null's, and the data are compared with those without it."""
+    random = np.random.default_rng(5)
+    known = of_the_pattern.known
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(), known=known)
+    names = parameters.names[len(PATTERN) :]
+    assert set(names) == {'corner_slowdown.gain', 'corner_slowdown.length_m'}
+    prior = parameters.prior
+    jacobian = random.normal(size=(READINGS, len(parameters))) @ prior.whitening
+    jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
+    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(parameters)))
+    fit = fit_linear(jacobian, data, parameters)
+    apart = NullModel.around(fit, fit.nuisance, frozenset(['corner_slowdown']))
+    without = fit_linear(jacobian[:, : len(PATTERN)], data, of_the_pattern)
+    assert apart.raw == pytest.approx(deviation(without))
+    assert apart.lower @ apart.lower.T == pytest.approx(covariance_of(without))
+    kept = NullModel.around(fit, fit.nuisance)
+    assert kept.lower @ kept.lower.T == pytest.approx(covariance_of(fit))
+
+
+def test_factor_is_the_ratio_of_gaussian_densities(fit, columns):
+    null, without = null_of(fit), covariance_of(fit)
+    sizes = np.array([0.5, 1.0, 2.0])
+    expected = multivariate_normal.logpdf(
+        deviation(fit), cov=without + (columns * sizes**2) @ columns.T
+    ) - multivariate_normal.logpdf(deviation(fit), cov=without)
+    found = log_factor(null.whiten(columns), null.deviation, sizes=sizes)
+    assert found == pytest.approx(expected)
+
+
+@pytest.mark.parametrize('freedom', [6.0, 40.0])
+def test_factor_is_the_ratio_of_student_densities_where_the_noise_was_estimated(
+    fit, columns, freedom
+):
+    null, without = null_of(fit), covariance_of(fit)
+    expected = multivariate_t.logpdf(
+        deviation(fit), shape=without + columns @ columns.T, df=freedom
+    ) - multivariate_t.logpdf(deviation(fit), shape=without, df=freedom)
+    found = log_factor(null.whiten(columns), null.deviation, freedom=freedom)
+    assert found == pytest.approx(expected)
+
+
+def test_many_degrees_of_freedom_are_a_known_noise(fit, columns):
+    null = null_of(fit)
+    white = null.whiten(columns)
+    known = log_factor(white, null.deviation)
+    assert log_factor(white, null.deviation, freedom=1e7) == pytest.approx(known, abs=1e-3)
+    assert log_factor(white, null.deviation, freedom=10.0) != pytest.approx(known, abs=1e-3)
+
+
+@pytest.mark.parametrize('side', [1.0, -1.0])
+@pytest.mark.parametrize('strength', [-0.6, 0.0, 0.9])
+def test_factor_of_a_signed_amplitude_is_the_integral_over_its_side(fit, columns, side, strength):
+    null = null_of(fit)
+    column, size = null.whiten(columns[:, :1]), 1.4
+    data = null.deviation + strength * column[:, 0]
+
+    def likelihood_ratio(amplitude: float) -> float:
+        left = data - amplitude * column[:, 0]
+        return np.exp(0.5 * (data @ data - left @ left)) * 2.0 * norm.pdf(amplitude, scale=size)
+
+    ends = sorted((0.0, 8.0 * side))
+    integral, _ = quad(likelihood_ratio, *ends, points=[strength] if ends[0] < strength < ends[1]
+                       else None, limit=200)  # fmt: skip
+    found = log_factor(column, data, [side], [size])
+    assert found == pytest.approx(np.log(integral), abs=1e-6)
+
+
+def test_a_signed_amplitude_beside_free_ones_is_integrated_over_its_side():
+    """Two directions that are not orthogonal, the second of one sign."""
+    random = np.random.default_rng(6)
+    columns = random.normal(size=(8, 2)) * 0.5
+    columns[:, 1] += 0.5 * columns[:, 0]
+    data = random.normal(size=8) + columns @ [0.5, 1.0]
+
+    def likelihood_ratio(second: float, first: float) -> float:
+        left = data - columns @ [first, second]
+        prior = 2.0 * norm.pdf(first) * norm.pdf(second)
+        return np.exp(0.5 * (data @ data - left @ left)) * prior
+
+    integral, _ = dblquad(likelihood_ratio, -7.0, 7.0, 0.0, 7.0)
+    assert log_factor(columns, data, [0, 1]) == pytest.approx(np.log(integral), abs=1e-5)
+
+
+def test_the_wrong_sign_speaks_against_a_signed_amplitude(fit, columns):
+    null = null_of(fit)
+    column = null.whiten(columns[:, :1])
+    data = null.deviation - 1.5 * column[:, 0]
+    free, right, wrong = (log_factor(column, data, [side]) for side in (0.0, -1.0, 1.0))
+    assert right == pytest.approx(free + np.log(2.0), abs=1e-3)
+    assert wrong < 0.0 < free
+
+
+def test_the_normal_distribution_function_holds_far_out():
+    """Where it underflows, an expansion is used, which is good to 1 / x^2."""
+    x = np.array([-200.0, -31.0, -29.0, -5.0, 0.0, 3.0])
+    assert [log_normal_cdf(value) for value in x] == pytest.approx(log_ndtr(x), abs=2e-3)
+
+
+@pytest.mark.parametrize('freedom', [np.inf, 12.0])
+@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, 0), (1, 0, -1)])
+def test_simulated_deviations_are_weighed_like_the_readings(columns, freedom, sides):
+    """Of many deviations at once and of one, at every size."""
+    draws = simulated(READINGS, freedom, 5, seed=1)
+    sides = np.array(sides, dtype=float)
+    together = Principal.of(columns, sides).log_bayes_factors(draws, SIZES, freedom)
+    assert together.shape == (len(SIZES), 5)
+    for size, row in zip(SIZES, together, strict=True):
+        one_by_one = [log_factor(columns, draw, sides, [size] * 3, freedom) for draw in draws.T]
+        assert row == pytest.approx(one_by_one, rel=1e-6)
+
+
+@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, -1)])
+def test_amplitudes_are_the_posterior_means_of_the_directions_as_they_were(columns, sides):
+    data = np.random.default_rng(9).normal(size=READINGS)
+    found = Principal.of(columns, np.array(sides, dtype=float)).amplitudes(data, SIZES)
+    for size, amounts in zip(SIZES, found, strict=True):
+        precision = columns.T @ columns + np.eye(3) / size**2
+        assert amounts == pytest.approx(np.linalg.solve(precision, columns.T @ data))
+
+
+def test_directions_that_nearly_coincide_are_no_trouble():
+    column = np.random.default_rng(7).normal(size=(READINGS, 1))
+    data = 2.0 * column[:, 0]
+    twice = log_factor(np.hstack([column, column]) / np.sqrt(2.0), data)
+    assert twice == pytest.approx(log_factor(column, data), rel=1e-9)
+
+
+def test_a_factor_averages_to_one_where_nothing_is_missing(columns):
+    """The defining property of a Bayes factor, whatever the sides and the noise."""
+    draws = simulated(READINGS, np.inf, 40_000, seed=2)
+    principal = Principal.of(0.1 * columns[:, :2], np.array([1.0, 0.0]))
+    (factors,) = np.exp(principal.log_bayes_factors(draws, SIZES[1:2], np.inf))
+    assert factors.mean() == pytest.approx(1.0, abs=4.0 * factors.std() / 200.0)
+
+
+def test_simulated_deviations_are_as_wide_as_the_noise_is_uncertain():
+    squares = (simulated(1, 8.0, 4000, seed=3) ** 2).ravel()
+    assert kstest(squares, f(1, 8).cdf).pvalue > 0.01
+    assert np.std(simulated(50, np.inf, 400, seed=3)) == pytest.approx(1.0, abs=0.02)
+
+
+def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
+    """The fit would go on if it could: what it leaves is a deviation, not the pattern's."""
+    _, high = fit.parameters.bounds
+    last = len(fit.vector) - 1
+    stopped = replace(fit, vector=np.where(np.arange(last + 1) == last, high, fit.vector))
+    null = null_of(stopped)
+    rest, prior = slice(0, last), fit.parameters.prior
+    columns = fit.jacobian[:, rest] @ prior.factor[rest, rest]
+    assert null.columns == pytest.approx(columns)
+    away = (stopped.vector - prior.centre)[rest]
+    assert null.raw == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)
+
+
+@pytest.mark.parametrize('count', [3, 40])
+def test_directions_that_nothing_shows_do_not_count(count: int) -> None:
+    """Whether there are more of them than readings or fewer."""
+    random = np.random.default_rng(4)
+    seen = random.normal(size=(12, count))
+    columns = np.hstack([seen, seen @ random.normal(size=(count, 30))])
+    data = random.normal(size=(12, 5))
+    found = Principal.of(columns, np.zeros(columns.shape[1]))
+    assert found.columns.shape[1] == min(count, 12)
+    factor = found.log_bayes_factors(data, np.array([0.7]), np.inf)[0]
+    covariance = np.eye(12) + 0.49 * columns @ columns.T
+    expected = [
+        multivariate_normal(cov=covariance).logpdf(d)
+        - multivariate_normal(cov=np.eye(12)).logpdf(d)
+        for d in data.T
+    ]
+    np.testing.assert_allclose(factor, expected, rtol=1e-8)
+    amounts = found.amplitudes(data[:, 0], np.array([0.7]))[0]
+    mean = 0.49 * columns.T @ np.linalg.solve(covariance, data[:, 0])
+    np.testing.assert_allclose(amounts, mean, atol=1e-8)
+    assert found.length(amounts) == pytest.approx(float(np.linalg.norm(columns @ amounts)))
+
+
+@pytest.mark.parametrize('side', [0.0, 1.0])
+def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
+    draws = simulated(READINGS, 8.0, 4, seed=6)
+    shifts = np.random.default_rng(8).normal(size=(READINGS, 3))
+    moved = (draws[:, np.newaxis] + shifts[:, :, np.newaxis]).reshape(READINGS, -1)
+    principal = Principal.of(columns, np.array([side, 0.0, 0.0]))
+    expected = principal.log_bayes_factors(moved, SIZES, 8.0)
+    np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)

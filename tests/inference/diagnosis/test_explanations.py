@@ -1,0 +1,109 @@
+"""Errors of the laws of accepted effects: smooth, in proportion to what the effects do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from booth import MODEL
+from inference.diagnosis.linear import linear_fit
+from inference.diagnosis.readings_on_door import on_door, study_of
+from paint_deposition.inference.diagnosis.explanations import LAW_ERROR, law_errors
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.effects.library.fog_gradient import FogGradient
+from paint_deposition.effects.library.gauge_gain import GaugeGain
+from paint_deposition.effects.library.gauge_zero import GaugeZero
+from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.inference.fitting.study import Study
+
+EDGE = EdgeBuild(gain=0.3, length_m=0.05)
+
+
+@pytest.fixture(scope='module')
+def study() -> Study:
+    return study_of(on_door())
+
+
+def errors(study: Study, *effects: Effect, kept: tuple[str, ...] | None = None) -> np.ndarray:
+    """(P, n) of a model with these effects, of which all or some are kept."""
+    model = MODEL.model_copy(update={'effects': effects})
+    fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=model)
+    ids = [effect.id for effect in effects] if kept is None else kept
+    return law_errors(study, fit, frozenset(ids))
+
+
+def change_um(study: Study, effect: Effect) -> np.ndarray:
+    """(P,) what an effect adds to the readings [um]."""
+    predict = study.forward.predict_um
+    return predict(MODEL.with_effect(effect)) - predict(MODEL)
+
+
+def size(columns: np.ndarray) -> np.ndarray:
+    """(P,) standard deviation over the noise."""
+    return np.linalg.norm(columns, axis=1)
+
+
+def test_without_effects_no_law_is_off(study):
+    assert errors(study).shape == (len(study), 0)
+    assert errors(study, EDGE, kept=()).shape == (len(study), 0)
+
+
+@pytest.mark.parametrize('effect', [EdgeBuild(), GaugeZero()], ids=lambda effect: effect.id)
+def test_an_effect_that_does_nothing_has_no_error(study, effect):
+    assert not errors(study, effect).any()
+
+
+@pytest.mark.parametrize(
+    ('effect', 'twice'),
+    [
+        (OversprayFog(fog_um=2.0), OversprayFog(fog_um=4.0)),
+        (FogGradient(fog_um=2.0), FogGradient(fog_um=4.0)),
+        (GaugeZero(offset_um=1.0), GaugeZero(offset_um=2.0)),
+    ],
+    ids=lambda effect: effect.id,
+)
+def test_the_error_is_in_proportion_to_the_effect(study, effect, twice):
+    assert size(errors(study, effect)).max() > 0.05
+    np.testing.assert_allclose(errors(study, twice), 2.0 * errors(study, effect), rtol=1e-9)
+
+
+@pytest.mark.parametrize('effect', [OversprayFog(fog_um=3.0), GaugeGain(gain=0.08)], ids=repr)
+def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, effect):
+    expected = LAW_ERROR * np.abs(change_um(study, effect)) / study.sigma_um
+    assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
+
+
+def test_over_two_covariates_the_error_is_as_large_as_over_one(study):
+    drift = AirDrift(shift_down_m=0.02)
+    assert len(drift.covariates) == 2
+    expected = LAW_ERROR * np.abs(change_um(study, drift)) / study.sigma_um
+    assert size(errors(study, drift)) == pytest.approx(expected, rel=0.03)
+
+
+def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
+    """Where it does least as much as where it does most: the law itself may be elsewhere."""
+    relative = change_um(study, EDGE) / study.forward.predict_um(MODEL.with_effect(EDGE))
+    film_um = study.forward.predict_um(MODEL)
+    found = size(errors(study, EDGE)) * study.sigma_um / film_um
+    assert found.max() < 1.1 * LAW_ERROR * np.abs(relative).max()
+    assert found.min() > 0.5 * LAW_ERROR * np.quantile(np.abs(relative), 0.95)
+
+
+def test_errors_of_several_effects_stand_side_by_side(study):
+    fog = FogGradient(fog_um=2.0)
+    both, kept = errors(study, fog, EDGE), errors(study, fog, EDGE, kept=('edge_build',))
+    assert both.shape[1] == errors(study, fog).shape[1] + errors(study, EDGE).shape[1]
+    np.testing.assert_allclose(both[:, -kept.shape[1] :], kept)
+
+
+def test_an_effect_that_was_switched_off_has_no_error_on_that_part(study):
+    """Edge build needs the voltage; the same door painted without it has none."""
+    assert EdgeBuild.needs == 'voltage'
+    off = on_door(switched_off=frozenset(['voltage']))
+    both = study_of(on_door(), replace(off, name='without voltage'))
+    found = size(errors(both, EDGE))
+    owner = both.campaign.experiment_of
+    assert found[owner == 0].max() > 0.05
+    assert not found[owner == 1].any()

@@ -1,0 +1,222 @@
+"""What to spray and measure next: rivals that look alike must look different afterwards."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, FOOTPRINT_SHARE, LENGTHS
+from paint_deposition.inference.diagnosis.next_experiment import EDGE_MARGIN_M, SPACING_M, propose
+from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
+from paint_deposition.inference.diagnosis.sprays import MENU, together
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
+from paint_deposition.effects.base import PathContext
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.pose_lag import PoseLag
+from paint_deposition.effects.library.trigger_lag import TriggerLag
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.model.projection import Projection
+from paint_deposition.inference.readings.campaign import Campaign
+
+BY_KEY = {change.key: change for change in MENU}
+
+
+@pytest.fixture(scope='module')
+def study(sample):
+    """The panel alone."""
+    return Study.of(Campaign(sample.experiments[:1]))
+
+
+@pytest.fixture(scope='module')
+def fit(study):
+    return study.fit(FreeParameters.of(DepositionModel()), starts=3)
+
+
+def rivals(study, fit, *names):
+    return Rivals.of(study, fit, {name: EFFECTS.get(name, name) for name in names})
+
+
+@pytest.fixture(scope='module')
+def drift_or_tool(study, fit):
+    """Drifting air, or a tool that is off its point."""
+    return propose(rivals(study, fit, 'air_drift', 'tcp_offset'))
+
+
+def best_of(sprays, key):
+    """The spray with this change alone."""
+    return next(spray for spray in sprays if spray.changes == (key,))
+
+
+@pytest.mark.slow
+def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drift_or_tool):
+    """The air drifts in the booth, the tool is off in its own frame."""
+    _, sprays = drift_or_tool
+    rolled = best_of(sprays, 'roll_180')
+    assert rolled.separates == ('air_drift', 'tcp_offset')
+    assert rolled.separation > 2.0 * rolled.now
+    # Half a turn of the part in the booth does to the air what half a turn of the gun does to it.
+    assert best_of(sprays, 'upside_down').separation > 0.8 * rolled.separation
+    # The order of the passes tells nothing of it: it is not among the best.
+    assert all(spray.changes != ('reverse_order',) for spray in sprays)
+
+
+@pytest.mark.slow
+def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit):
+    found = rivals(study, fit, 'tcp_offset', 'footprint')
+    predicted = found.here[1]
+    # Its amplitudes are not free: what they need of their prior is separation, too.
+    assert predicted.precision == pytest.approx(1.0 / 9.0)
+    basis = footprint_along(study.rays(fit.model), fit.model.patterns)
+    random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], footprint_kinds()[-1])
+    law = random.learned(1e-3 * predicted.amounts)
+    film_um = [
+        Forward(study.campaign, (law,)).predict_um(
+            fit.model.model_copy(update={'effects': effects})
+        )
+        for effects in ((), (law,))
+    ]
+    change = 1e3 * (film_um[1] - film_um[0]) / study.sigma_um
+    assert np.linalg.norm(predicted.change) > 1.0
+    assert np.linalg.norm(predicted.change - change) < 0.05 * np.linalg.norm(change)
+
+
+@pytest.mark.slow
+def test_the_reverse_order_tells_drifting_flow_from_fog(study, fit):
+    _, sprays = propose(rivals(study, fit, 'flow_drift', 'fog_gradient'))
+    single = [spray for spray in sprays if len(spray.changes) == 1]
+    assert {single[0].changes[0], single[1].changes[0]} & {'reverse_order', 'upside_down'}
+    rolled = [s.separation for s in single if s.changes == ('roll_180',)]
+    assert best_of(sprays, 'reverse_order').separation > max(rolled, default=0.0)
+
+
+@pytest.mark.slow
+def test_no_spray_makes_rivals_more_alike(drift_or_tool):
+    """But for the level of the new part, which the nuisance of two parts has and one has not."""
+    _, sprays = drift_or_tool
+    assert all(spray.separation >= spray.now - 0.1 for spray in sprays)
+    assert any(len(spray.changes) == 2 for spray in sprays)
+    assert sprays[0].chance >= 0.85 * max(spray.chance for spray in sprays)
+
+
+@pytest.mark.slow
+def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_tool):
+    places, sprays = drift_or_tool
+    positions = np.array([place.position_m for place in places])
+    surface = study.campaign.experiments[0].surface
+    at = surface.at(positions)
+    assert at.positions_m == pytest.approx(positions, abs=1e-9)
+    assert (at.edge_distance_m > EDGE_MARGIN_M).all()
+    apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
+    assert (apart + np.eye(len(places)) > SPACING_M).all()
+    # The same measure as that of the sprays, from the readings at hand on.
+    assert f': {sprays[0].now:.1f} to ' in places[0].why
+    film_um = np.array([place.film_um for place in places])
+    assert 0.2 * study.measured_um.mean() < film_um.min() < film_um.max() < 100.0
+
+
+@pytest.mark.slow
+def test_without_voltage_what_needs_it_is_gone(study, fit):
+    """Edges then tell a field from a robot that brakes."""
+    names = ('edge_build', 'corner_slowdown')
+    spray = best_of(propose(rivals(study, fit, *names))[1], 'voltage_off')
+    assert spray.separation > spray.now
+    experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
+    model = DepositionModel(effects=(EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)))
+    left = model.without(experiment.switched_off)
+    assert left.effect('edge_build').is_neutral
+    assert left.effect('air_drift') == AirDrift(shift_down_m=0.03)
+
+
+@pytest.mark.parametrize('change', MENU, ids=lambda change: change.key)
+def test_every_spray_is_the_same_paint_another_way(study, change):
+    experiment = study.campaign.experiments[0]
+    changed = change.made(experiment).path
+    share = {'half_flow': 0.5, 'double_flow': 2.0, 'half_speed': 2.0, 'double_speed': 0.5}
+    if change.key == 'turned':
+        assert np.median(changed.speed_m_per_s) == pytest.approx(
+            np.median(experiment.path.speed_m_per_s), rel=0.02
+        )
+    elif change.key != 'longer_open':
+        expected = share.get(change.key, 1.0) * experiment.path.spraying_time_s
+        assert changed.spraying_time_s == pytest.approx(expected)
+    rotation = changed.rotation
+    assert np.linalg.det(rotation) == pytest.approx(np.ones(len(rotation)))
+    assert np.isfinite(changed.position_m).all()
+
+
+@pytest.mark.parametrize('key', ['reverse_order', 'other_way', 'upside_down'])
+def test_done_twice_changes_nothing(study, key):
+    experiment = study.campaign.experiments[0]
+    change = BY_KEY[key]
+    twice = together(change, change).made(experiment)
+    assert np.array_equal(twice.surface.down, experiment.surface.down)
+    before, after = experiment.path, twice.path
+    rows = before.flow > 0.0
+    for column in ('rotation', 'velocity_m_per_s', 'since_on_s', 'from_turn_m', 'spray_pass'):
+        assert np.array_equal(getattr(after, column)[rows], getattr(before, column)[rows]), column
+    assert after.time_s[rows] == pytest.approx(before.time_s[rows], abs=1e-9)
+
+
+def test_order_and_way_together_are_time_run_backward(study):
+    experiment = study.campaign.experiments[0]
+    path = experiment.path
+    both = together(BY_KEY['reverse_order'], BY_KEY['other_way']).made(experiment).path
+    rows = path.flow > 0.0
+    backward = path.time_s.min() + path.time_s.max() - path.time_s
+    assert both.time_s[rows] == pytest.approx(backward[rows], abs=1e-6)
+    assert np.array_equal(both.since_on_s[rows], path.until_off_s[rows])
+
+
+def diagnosed(study, fit, *classes: EffectClass, accepted=(), unknown=None) -> Diagnosis:
+    step = Step('', fit, 1.0, 1.0)
+    return Diagnosis(study, 'undecided', '', 0.01, accepted, classes, (step,), unknown)
+
+
+def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(study, fit):
+    alone = EffectClass(('air_drift',), 0.6, 'air_drift')
+    group = replace(alone, members=('air_drift', 'tcp_offset', 'tcp_tilt'))
+    other = EffectClass(('fog_gradient',), 0.3, 'fog_gradient')
+    unknown = Unknown('effect', 'tool_x_m', 0.01, {}, '')
+    footprint = replace(unknown, kind='footprint')
+    for diagnosis, expected in (
+        (diagnosed(study, fit, group, other), ('air_drift', 'tcp_offset', 'tcp_tilt')),
+        (diagnosed(study, fit, alone, other), ('air_drift', 'fog_gradient')),
+        (diagnosed(study, fit, alone, unknown=unknown), ('air_drift', 'unknown')),
+        (diagnosed(study, fit, alone, unknown=footprint), ('air_drift',)),
+    ):
+        # The pattern may always be another one.
+        assert rivals_of(diagnosis, EFFECTS).names == (*expected, 'footprint')
+    settled = diagnosed(study, fit, alone, other, accepted=('air_drift',))
+    for diagnosis in (diagnosed(study, fit), settled):
+        assert rivals_of(diagnosis, EFFECTS) is None
+    assert rivals_of(diagnosed(study, fit, group), {}) is None
+
+
+@pytest.mark.parametrize('lag', [TriggerLag(rise_s=0.05, fall_s=0.05), PoseLag(lag_s=0.02)])
+def test_at_half_the_flow_the_tails_of_a_lag_are_half_too(study, lag):
+    experiment = study.campaign.experiments[0]
+    changed = BY_KEY['half_flow'].made(experiment).path
+    surface = experiment.surface
+    context = PathContext(Projection(), surface.down, surface.outward, surface.centre_m)
+    usual = lag.on_path(experiment.path, context)
+    np.testing.assert_array_equal(lag.on_path(changed, context).flow, 0.5 * usual.flow)
+
+
+def test_a_part_without_voltage_has_a_level_of_its_own(study):
+    (usual,) = study.campaign.experiments
+    off = replace(BY_KEY['voltage_off'].made(usual), name='off')
+    both = Study.of(Campaign((usual, off)))
+    (level, *_) = both.random_effects
+    first, other = level.columns.T
+    assert not first.any()  # there is no other part that it could differ from
+    rows = both.campaign.experiment_of == 1
+    np.testing.assert_allclose(other, np.where(rows, 0.3 * both.measured_um / both.sigma_um, 0.0))
+    double = both.residuals(both.measured_um * np.where(rows, 2.0, 1.0))
+    np.testing.assert_allclose(double.predicted_um, both.measured_um)
+    assert both.has(EFFECTS['edge_build']).tolist() == [True] * len(usual) + [False] * len(off)
+    assert both.has(EFFECTS['sag']).all()

@@ -1,0 +1,149 @@
+"""Points for the gauge: the design beside exact figures, and what it is worth on a part."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, ncx2
+
+from booth import MODEL, panel, path_of, serpentine
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose, marks_at
+from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged, power, slope
+from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.errors import ReadingsError
+from paint_deposition.part.gauge_places import grid_places
+
+PLACES, FREE, COLUMNS = 40, 3, 5
+EFFECT_OF = np.array(['a', 'a', 'b', 'c', 'd'])
+
+
+@pytest.fixture
+def marks() -> Marks:
+    random = np.random.default_rng(4)
+    return Marks(
+        3.0 * random.normal(size=(PLACES, FREE)), random.normal(size=(PLACES, COLUMNS)), EFFECT_OF
+    )
+
+
+def on_panel(*names: str) -> UnmeasuredPart:
+    """The panel under three level passes that overlap."""
+    path = path_of(serpentine((0.12, 0.0, -0.12), opens_at_m=0.4, period_s=0.1))
+    library = {name: EFFECTS[name] for name in names or EFFECTS}
+    return UnmeasuredPart(panel(), path, MODEL, library)
+
+
+@cache
+def chosen_on_panel() -> ChosenReadings:
+    return choose(on_panel('air_drift', 'flow_drift', 'gauge_zero', 'edge_build'), 24)
+
+
+def test_noncentrality_is_what_the_whitened_mark_leaves(marks):
+    """Against the covariance of noise and model parameters, built in full."""
+    rows = np.arange(0, PLACES, 3)
+    free, columns = marks.free[rows], marks.columns[rows]
+    covariance = np.eye(len(rows)) + free @ free.T
+    exact = columns.T @ np.linalg.solve(covariance, columns)
+    np.testing.assert_allclose(marks.around(rows).information, exact, rtol=1e-9)
+
+
+def test_one_more_reading_gains_what_is_predicted(marks):
+    """For a change so small that the worth is linear in it."""
+    faint = Marks(1e-3 * marks.free, 1e-3 * marks.columns, marks.effects)
+    rows = np.arange(12)
+    design = faint.around(rows)
+    before, gains = design.worth, design.gains()
+    for place in (15, 22, 31):
+        after = faint.around(np.append(rows, place)).worth
+        assert after - before == pytest.approx(gains[place], rel=0.02)
+
+
+def test_a_point_left_out_costs_its_share(marks):
+    rows = np.arange(15)
+    design = marks.around(rows)
+    without = marks.around(rows[1:]).noncentralities
+    lost = 1.0 - without / design.noncentralities
+    np.testing.assert_allclose(design.shares(rows)[0], lost, rtol=1e-9)
+
+
+def test_power_is_that_of_the_likelihood_ratio(monkeypatch):
+    """Both tails of a normal score are one tail of the noncentral chi-square."""
+    from paint_deposition.inference.diagnosis import reading_exchange
+
+    monkeypatch.setattr(reading_exchange, 'SIZES', np.array([1.0]))
+    strength = np.array([0.0, 2.0, 8.0])
+    limit = chi2.isf(0.05 / 6, 1)
+    exact = ncx2.sf(limit, 1, np.maximum(strength, 1e-12))
+    np.testing.assert_allclose(power(strength, 6), exact, rtol=1e-6)
+    step = 1e-4
+    rise = (power(strength + step, 6) - power(strength, 6)) / step
+    np.testing.assert_allclose(slope(strength, 6), rise, rtol=0.02)
+
+
+def test_the_exchange_finds_the_best_of_all_sets():
+    """Few places, so that all sets can be tried."""
+    from itertools import combinations
+
+    random = np.random.default_rng(8)
+    marks = Marks(random.normal(size=(10, 1)), 2.0 * random.normal(size=(10, 3)),
+                  np.array(['a', 'b', 'c']))  # fmt: skip
+    apart = np.arange(10)[:, np.newaxis] * np.eye(3)[0]
+    best = max(marks.around(np.array(rows)).worth for rows in combinations(range(10), 3))
+    found = marks.around(exchanged(marks, apart, 3, 0.5)).worth
+    assert found >= 0.99 * best
+
+
+def test_points_keep_off_edges_and_apart():
+    chosen = chosen_on_panel()
+    positions = chosen.positions_m
+    assert np.abs(positions[:, [0, 2]]).max() <= 0.5 - chosen.foot_m
+    distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
+    assert distance[~np.eye(len(chosen), dtype=bool)].min() >= chosen.apart_m
+    assert chosen.expected_um.min() > 0.1 * chosen.film_um.max()
+
+
+def test_the_walk_goes_down_row_by_row():
+    height = chosen_on_panel().from_edges_m[:, 1]
+    assert np.all(np.diff(height) < 2.0 * chosen_on_panel().apart_m)
+    assert height[0] > height[-1]
+
+
+def test_an_effect_is_measured_where_it_shows():
+    """A drift of the air moves the film where it is steep, across the passes."""
+    part = on_panel('air_drift')
+    chosen = choose(part, 12)
+    places = grid_places(part.surface, chosen.film_um > 0.2 * chosen.film_um.max(), 12)
+    found, even = (
+        marks_at(part, rows).around(np.arange(12)).noncentralities.min()
+        for rows in (chosen.vertices, places)
+    )
+    assert found > 1.5 * even
+    assert chosen.power['air_drift'] > chosen.grid_power['air_drift']
+    assert all(effects in ((), ('air_drift',)) for effects in chosen.speaks_for)
+
+
+def test_what_the_model_has_already_is_not_looked_for():
+    model = MODEL.with_effect(AirDrift(shift_down_m=0.01))
+    part = on_panel('air_drift', 'flow_drift')
+    part = UnmeasuredPart(part.surface, part.path, model, part.library)
+    assert list(part.candidates) == ['flow_drift']
+    # Its amplitudes are free, as the pattern is.
+    painted = np.flatnonzero(np.abs(part.surface.vertices_m).max(axis=1) < 0.03)
+    assert marks_at(part, painted).free.shape[1] > len(MODEL.planar.model_dump())
+
+
+def test_a_part_without_paint_is_refused():
+    part = on_panel('flow_drift')
+    aside = part.path.with_(position_m=np.add(part.path.position_m, [0.0, 0.0, 5.0]))
+    with pytest.raises(ReadingsError, match='no paint lands'):
+        choose(UnmeasuredPart(part.surface, aside, MODEL, part.library), 12)
+
+
+@pytest.mark.parametrize(
+    ('count', 'repeats', 'words'),
+    [(4, 0, '12 to 400'), (20, 21, 'ask for 0 to 20'), (300, 0, 'room for 0')],
+)
+def test_impossible_wishes_are_refused(count, repeats, words):
+    with pytest.raises(ReadingsError, match=words):
+        choose(on_panel('flow_drift'), count, repeats, foot_m=0.6 if count == 300 else 0.015)

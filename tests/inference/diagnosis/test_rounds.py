@@ -1,0 +1,127 @@
+"""Whole diagnoses of small panels that the model itself painted: pairs, size and power.
+
+Sixty and more points on one panel and a library of three effects make a diagnosis cheap enough
+for dozens of them.
+"""
+
+import numpy as np
+import pytest
+from scipy.stats import binom, kstest
+
+from inference.fitting.panels import PANEL, passes, readings_at
+from paint_deposition.inference.diagnosis import run
+from paint_deposition.inference.diagnosis.model_space import SURE
+from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.flow_drift import FlowDrift
+from paint_deposition.effects.library.fog_gradient import FogGradient
+from paint_deposition.effects.library.gauge_zero import GaugeZero
+from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.fitting.study import TEXTURE_SHARE
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+
+pytestmark = pytest.mark.slow
+
+BASE = DepositionModel()
+PATH, _ = spray_path(passes((0.3, 1.1, 0.7, 1.5), samples=80))
+LIBRARY = {effect.id: effect for effect in (FogGradient, FlowDrift, AirDrift)}
+CAMPAIGNS = 30
+# Probability that a correct rate fails one of these bounds with other seeds.
+CHANCE = 0.01
+
+
+def gauged(model: DepositionModel, seed: int, columns: int = 3) -> Campaign:
+    """A panel painted by a model, two readings a point, with noise and texture as assumed."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.03, 1.97, 20))
+    points_m = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+    integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
+    integrator.add(PATH)
+    texture = np.random.default_rng([seed, 1]).normal(1.0, TEXTURE_SHARE, x.size)
+    readings = readings_at(points_m, integrator.gauge_um * texture, noise_um=0.7, seed=seed)
+    return Campaign((Experiment.of('panel', PANEL, PATH, readings),))
+
+
+@pytest.fixture(scope='module')
+def two_missing() -> Diagnosis:
+    """The diagnosis of a panel on which two effects acted."""
+    truth = BASE.with_effect(FogGradient(fog_um=6.0)).with_effect(FlowDrift(drift_per_pass=0.1))
+    return diagnose(gauged(truth, seed=0, columns=5), BASE, LIBRARY)
+
+
+def test_a_second_effect_is_found_beside_the_first(two_missing):
+    assert two_missing.verdict == 'effect_missing'
+    assert set(two_missing.accepted) == {'fog_gradient', 'flow_drift'}
+    assert [c.best for c in two_missing.classes[:2]] == list(two_missing.accepted)
+    assert all(c.probability > SURE for c in two_missing.classes[:2])
+    assert {effect.id for effect in two_missing.model.effects} == set(two_missing.accepted)
+    for name in two_missing.accepted:
+        assert name in two_missing.reason
+
+
+def test_each_accepted_effect_has_a_step_that_improves_the_prediction(two_missing):
+    steps = two_missing.history
+    assert [step.added for step in steps] == ['', *two_missing.accepted]
+    for before, after, found in zip(steps, steps[1:], two_missing.classes, strict=False):
+        assert after.rmse_um < before.rmse_um
+        assert after.holdout_rmse_um < before.holdout_rmse_um
+        assert found.holdout_rmse_um == {
+            'before': before.holdout_rmse_um,
+            'after': after.holdout_rmse_um,
+        }
+    assert steps[-1].rmse_um < 1.2 * two_missing.noise_floor_um
+
+
+def test_amounts_of_two_effects_are_found_together(two_missing):
+    fog = two_missing.model.effect('fog_gradient').fog_um
+    drift = two_missing.model.effect('flow_drift').drift_per_pass
+    assert fog == pytest.approx(6.0, abs=1.2)
+    assert drift == pytest.approx(0.1, abs=0.03)
+
+
+def test_effects_that_cannot_be_told_apart_are_one_group(monkeypatch):
+    """Overspray and a wrong zero of the gauge add the same amount to every reading."""
+    monkeypatch.setattr(run, 'STARTS', 1)
+    library = {effect.id: effect for effect in (OversprayFog, GaugeZero, FlowDrift)}
+    campaign = gauged(BASE.with_effect(OversprayFog(fog_um=8.0)), seed=1)
+    diagnosis = diagnose(campaign, BASE, library)
+    (found,) = (c for c in diagnosis.classes if c.best in diagnosis.accepted)
+    assert set(found.members) == {'overspray_fog', 'gauge_zero'}
+    # The rival of an accepted effect is neither accepted nor listed beside it.
+    assert len(diagnosis.accepted) == 1
+    assert [m for c in diagnosis.classes for m in c.members].count(found.members[1]) == 1
+
+
+@pytest.mark.slow
+def test_size_of_the_procedure(monkeypatch):
+    """False alarms come at the stated level, and p-values are uniform where nothing is missing."""
+    monkeypatch.setattr(run, 'STARTS', 1)
+    found = [diagnose(gauged(BASE, seed), BASE, LIBRARY) for seed in range(CAMPAIGNS)]
+    p_values = np.array([diagnosis.p_value for diagnosis in found])
+    assert kstest(p_values, 'uniform').pvalue > CHANCE
+    alarms = sum(diagnosis.verdict != 'none_missing' for diagnosis in found)
+    assert alarms == np.count_nonzero(p_values < ALPHA)
+    assert alarms <= binom.isf(CHANCE, CAMPAIGNS, ALPHA)
+    # An alarm by chance is no accepted effect but in rare cases.
+    assert sum(bool(diagnosis.accepted) for diagnosis in found) <= binom.isf(
+        CHANCE, CAMPAIGNS, 0.02
+    )
+
+
+@pytest.mark.slow
+def test_power_of_the_procedure(monkeypatch):
+    """An effect of typical size is mostly detected, a large one is named, none is misnamed."""
+    monkeypatch.setattr(run, 'STARTS', 1)
+    detected, named = {}, {}
+    for drift in (0.02, 0.06):
+        truth = BASE.with_effect(FlowDrift(drift_per_pass=drift))
+        found = [diagnose(gauged(truth, seed), BASE, LIBRARY) for seed in range(6)]
+        assert all(set(diagnosis.accepted) <= {'flow_drift'} for diagnosis in found)
+        detected[drift] = sum(diagnosis.verdict != 'none_missing' for diagnosis in found)
+        named[drift] = sum(diagnosis.accepted == ('flow_drift',) for diagnosis in found)
+    assert detected[0.02] >= 4
+    assert detected[0.06] == named[0.06] == 6
+    assert named[0.02] >= 3

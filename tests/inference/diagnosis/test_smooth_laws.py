@@ -1,0 +1,157 @@
+"""Laws of any form as changes of readings: what they are in a model is what they were in a fit."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from booth import MODEL
+from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
+from paint_deposition.inference.diagnosis.smooth_laws import (
+    Basis,
+    bases_over,
+    curve_basis,
+    footprint_basis,
+    footprint_kinds,
+    map_bases,
+)
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.curves import LearnedHeight, LearnedSpeed
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Experiment
+from reference import reference_film_um
+
+OF_ANY_KIND = pytest.mark.parametrize(
+    ('law', 'kind'),
+    [(law, kind) for law in LEARNED.values() for kind in law.kinds if law is not LearnedSpeed],
+    ids=lambda value: value if isinstance(value, str) else value.covariate,
+)
+
+
+@pytest.fixture(scope='module')
+def study() -> Study:
+    return study_of(on_door(count=12))
+
+
+def film_um(experiment: Experiment, model: DepositionModel, law: LearnedLaw | None = None):
+    """(P,) film at the readings, ray by ray, with a law in the model or none."""
+    points, path = experiment.measured_points, experiment.path
+    if law is None:
+        return reference_film_um(points, path, model)
+    arrived_um = reference_film_um(points, law.on_path(path, None), model.with_effect(law))
+    return law.on_film(arrived_um, points)
+
+
+@pytest.mark.slow
+@OF_ANY_KIND
+def test_a_random_law_changes_the_readings_as_the_law_in_the_model_does(law, kind, study):
+    """No linearisation is left: film is linear in the values of one law at its knots."""
+    (basis,) = bases_over(study, MODEL, law, kind)
+    random = basis.random(0.03, 1.0)
+    amplitudes = np.random.default_rng(2).normal(size=random.at_knots.shape[1])
+    change_um = random.change_um @ amplitudes
+    (door,) = study.campaign.experiments
+    in_model = film_um(door, MODEL, random.learned(amplitudes)) - film_um(door, MODEL)
+    assert np.abs(in_model).max() > 0.01
+    np.testing.assert_allclose(change_um, in_model, atol=1e-10)
+
+
+def test_around_another_model_a_law_keeps_its_values_and_changes_other_film(study):
+    twice = MODEL.planar.model_copy(update={'K1_cm3_per_s': 2.0 * MODEL.planar.K1_cm3_per_s})
+    other = MODEL.model_copy(update={'planar': twice})
+    for covariate in ('time_s', 'place', 'footprint'):
+        (basis,) = bases_over(study, MODEL, LEARNED[covariate], 'factor')
+        random = basis.random(0.05, 1.0)
+        moved = random.around(study, other)
+        assert np.array_equal(moved.at_knots, random.at_knots)
+        np.testing.assert_allclose(moved.change_um, 2.0 * random.change_um, rtol=1e-6, atol=1e-12)
+
+
+def basis_on_a_line(knots: int = 9, step: float = 0.5) -> Basis:
+    at = step * np.arange(knots)[:, np.newaxis]
+    return Basis(LearnedHeight, {}, np.eye(knots), at, step)
+
+
+@pytest.mark.parametrize('length', [0.5, 1.0, 3.0])
+def test_values_have_the_size_and_the_correlation_that_were_asked_for(length):
+    random = basis_on_a_line().random(0.2, length)
+    covariance = random.at_knots @ random.at_knots.T
+    away = 0.5 * np.subtract.outer(np.arange(9), np.arange(9))
+    expected = 0.2**2 * np.exp(-0.5 * (away / length) ** 2)
+    assert covariance == pytest.approx(expected, abs=0.03 * 0.2**2)
+
+
+def test_no_law_is_shorter_than_its_knots_resolve():
+    basis = basis_on_a_line()
+    at_once, resolved = basis.random(1.0, 0.01), basis.random(1.0, 0.5)
+    assert np.array_equal(at_once.at_knots, resolved.at_knots)
+
+
+def test_where_a_law_is_to_be_zero_it_is():
+    among = np.arange(9) > 3
+    random = basis_on_a_line().random(1.0, 1.0, among)
+    assert not random.at_knots[~among].any()
+    assert random.at_knots[among].any(axis=1).all()
+
+
+def test_harmonics_of_a_footprint_are_independent_and_absent_at_the_centre(study):
+    basis = footprint_basis(study, MODEL)
+    *orders, everything = footprint_kinds()
+    assert np.array_equal(np.sum(orders, axis=0).astype(bool), everything)
+    assert [int(kind[:5].sum()) for kind in orders] == [1, 0, 0]
+    random = basis.random(1.0, 2.0, everything)
+    covariance = random.at_knots @ random.at_knots.T
+    wave = np.arange(len(covariance)) % 5
+    assert np.abs(covariance[wave[:, np.newaxis] != wave]).max() < 1e-9
+    assert covariance[10, 5] == pytest.approx(np.exp(-0.5 / 2.0**2), abs=0.03)
+
+
+def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
+    study = study_of(on_door(count=12), on_panel('first'), on_panel('second'))
+    owner = study.campaign.experiment_of
+    door, panel, both = map_bases(study, MODEL)
+    assert door.film_um[owner == 0].any()
+    assert not door.film_um[owner > 0].any()
+    assert not panel.film_um[owner == 0].any()
+    assert np.array_equal(panel.film_um[owner == 1], panel.film_um[owner == 2])
+    # The laws say so themselves.
+    points = [experiment.measured_points for experiment in study.campaign.experiments]
+    grids = both.settings['maps']
+    assert grids == (*door.settings['maps'], *panel.settings['maps'])
+    assert [[grid.is_of(p) for p in points] for grid in grids] == [
+        [True, False, False],
+        [False, True, True],
+    ]
+
+
+def test_a_map_over_several_parts_has_nothing_in_common_between_them():
+    door, panel, both = map_bases(study_of(on_door(count=12), on_panel()), MODEL)
+    random = both.random(0.1, 0.25)
+    covariance = random.at_knots @ random.at_knots.T
+    assert np.abs(covariance[: len(door.knots), len(door.knots) :]).max() < 1e-12
+    law = random.learned(np.ones(random.at_knots.shape[1]))
+    (_, on_its_door), (_, on_its_panel) = law.on_parts()
+    assert on_its_door.size == len(door.knots)
+    assert on_its_panel.size == len(panel.knots)
+    np.testing.assert_allclose(both.film_um, np.hstack([door.film_um, panel.film_um]))
+
+
+def test_a_map_bends_more_sharply_than_a_curve():
+    """Half a length from an edge it still knows less of the other side."""
+    curve = basis_on_a_line(knots=41, step=0.05)
+    over_map = replace(curve, edges=True)
+    near, middle = np.arange(41), 20
+    correlation = [
+        (random.at_knots @ random.at_knots.T)[middle, near]
+        for random in (curve.random(1.0, 1.0), over_map.random(1.0, 1.0))
+    ]
+    assert correlation[1][middle + 10] < correlation[0][middle + 10] - 0.05
+    d = np.sqrt(3.0) * 0.5
+    assert correlation[1][middle + 10] == pytest.approx((1.0 + d) * np.exp(-d), abs=0.03)
+
+
+@pytest.mark.parametrize('covariate', ['curvature_per_m', 'sky_view_factor', 'speed_m_per_s'])
+def test_over_what_does_not_vary_there_is_no_law(covariate):
+    assert curve_basis(study_of(on_panel()), MODEL, covariate) is None

@@ -1,0 +1,115 @@
+"""A gun that stands still before one spot: doable, within the film given, and without motion."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from paint_deposition.inference.diagnosis.next_experiment import propose
+from paint_deposition.inference.diagnosis.proposals import Spray, chance_of_settling
+from paint_deposition.inference.diagnosis.rivals import Rivals
+from paint_deposition.inference.diagnosis.sprays import MENU
+from paint_deposition.inference.diagnosis.standing import Stand, spots, suits
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign
+
+MODEL = DepositionModel()
+MOST_UM = 25.0
+BY_KEY = {change.key: change for change in MENU}
+
+
+@pytest.fixture(scope='module')
+def panel(sample):
+    return sample.experiments[0]
+
+
+def stand(panel, **more) -> Stand:
+    return Stand.before(panel, spots(panel, 1)[0], MODEL, MOST_UM, **more)
+
+
+def film_um(panel, one, model=MODEL):
+    return Forward(Campaign((one.sprayed(panel),)), model.effects).predict_um(model)
+
+
+def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(panel):
+    one = stand(panel)
+    path = one.sprayed(panel).path
+    assert path.rotation[:, :, 2] == pytest.approx(np.tile(-one.normal, (len(path), 1)), abs=1e-9)
+    away = path.position_m - one.position_m
+    assert np.linalg.norm(away, axis=1) == pytest.approx(one.standoff_m, abs=1e-9)
+    assert path.spraying_time_s == pytest.approx(one.dwell_s, abs=1e-9)
+    assert path.speed_m_per_s.max() == 0.0
+    # The tool is turned about its axis as it was on the passes.
+    assert one.across @ panel.path.rotation[0, :, 0] > 0.99
+
+
+def test_the_film_stays_within_the_one_given_and_comes_near_it(panel):
+    one = stand(panel)
+    film = film_um(panel, one)
+    assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
+    half = film_um(panel, replace(one, dwell_s=0.5 * one.dwell_s))
+    assert half == pytest.approx(0.5 * film, rel=1e-9)
+    closer = Stand.before(BY_KEY['closer'].made(panel), spots(panel, 1)[0], MODEL, MOST_UM)
+    assert closer.dwell_s < one.dwell_s
+    assert 0.7 * MOST_UM < film_um(panel, closer).max() <= MOST_UM
+    # Half a second is needed: the trigger is not quick enough for less film.
+    assert Stand.before(panel, spots(panel, 1)[0], MODEL, 0.1) is None
+
+
+@pytest.mark.parametrize('name', ['corner_slowdown', 'gun_wake', 'pose_lag'])
+def test_effects_of_motion_do_not_show(panel, name):
+    effect = EFFECTS[name].typical()
+    model = MODEL.model_copy(update={'effects': (effect,)})
+    passes = Forward(Campaign((panel,)), (effect,))
+    assert np.abs(passes.predict_um(model) - passes.predict_um(MODEL)).max() > 1e-4
+    one = stand(panel)
+    assert film_um(panel, one, model) == pytest.approx(film_um(panel, one), abs=1e-9)
+
+
+def test_effects_of_a_whole_job_do_not_suit_a_spot():
+    assert suits(MODEL, {'lateral shift', 'curvature'})
+    assert not suits(MODEL, {'lateral shift', 'order'})
+    fog = MODEL.model_copy(update={'effects': (EFFECTS['overspray_fog'].typical(),)})
+    assert not suits(fog, {'lateral shift'})
+
+
+@pytest.mark.slow
+def test_a_rolled_gun_on_one_spot_tells_the_air_from_the_tool(panel):
+    study = Study.of(Campaign((panel,)))
+    fit = study.fit(FreeParameters.of(MODEL), starts=3)
+    _, sprays = propose(
+        Rivals.of(study, fit, {n: EFFECTS[n] for n in ('air_drift', 'tcp_offset')})
+    )
+    spot = next(s for s in sprays if s.changes == ('standing', 'roll_180'))
+    assert spot.separation > 2.0 * spot.now
+    told = spot.to_dict()['stand']
+    assert told['dwell_s'] > 0.5
+    assert f'{told["dwell_s"]:.1f} s' in spot.what
+    assert told['peak_um'] <= study.measured_um.max()
+    at = np.array([told['x_m'], told['y_m'], told['z_m']])
+    (row,) = np.flatnonzero((panel.measured_points.positions_m == at).all(axis=1))
+    assert told['film_um'] == pytest.approx(panel.means.mean_um[row])
+
+
+def test_the_chance_is_that_of_the_evidence():
+    """Simulated: the law's size off by 30 %, then noise; 19 to 1 leaves one alone."""
+    rng = np.random.default_rng(0)
+    for apart in (1.5, 3.0, 5.0):
+        true = apart * (1.0 + 0.3 * rng.normal(size=200_000))
+        evidence = true * (0.5 * true + rng.normal(size=true.size))
+        found = np.mean(np.where(true > 0.0, evidence > np.log(19.0), False))
+        assert chance_of_settling(np.array(apart)) == pytest.approx(found, abs=0.03)
+    assert chance_of_settling(np.array(0.0)) < 1e-6
+    assert chance_of_settling(np.array([3.0]))[0] > norm.cdf(0.0)
+
+
+def test_a_film_that_may_sag_is_told():
+    thick = Spray('the same passes at twice the flow', ('a', 'b'), 4.0, 1.0, peak_um=60.0,
+                  peak_now_um=30.0)  # fmt: skip
+    assert thick.film_words == 'the film will reach 60 µm, now 30: see that it does not sag'
+    assert replace(thick, peak_um=33.0).film_words == ''

@@ -1,0 +1,277 @@
+"""Several brushes in one campaign: each has its pattern, the phase of the asymmetry is shared."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from brushes import two_brushes
+from inference.fitting.panels import column, painted_by, passes
+from paint_deposition.api.inference import calibrate, compare, diagnose
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.errors import ModelError, ReadingsError
+from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
+from paint_deposition.inference.fitting.least_squares import derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
+from paint_deposition.inference.fitting.posterior import of_brushes
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.model.brush import Brush
+from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.report.writers.calibration import write_calibration
+
+PHI_RAD = 0.1
+FIRST = PlanarPattern(
+    K1_cm3_per_s=1.6, K2=0.25, K3=0.25, phi_rad=PHI_RAD, r_m=0.2, sigma1_m=0.08, sigma2_m=0.14
+)
+SECOND = PlanarPattern(
+    K1_cm3_per_s=0.9, K2=0.4, K3=0.15, phi_rad=PHI_RAD, r_m=0.12, sigma1_m=0.06, sigma2_m=0.09
+)
+SETTINGS = {
+    1: {'flow_cm3_per_min': 300.0, 'solids': 0.45, 'bell_speed_rpm': 40e3},
+    4: {'flow_cm3_per_min': 200.0, 'solids': 0.45, 'bell_speed_rpm': 25e3},
+}
+TRUTH = DepositionModel.of_brushes(
+    [Brush(number=1, planar=FIRST, **SETTINGS[1]), Brush(number=4, planar=SECOND, **SETTINGS[4])]
+)
+VECTOR = PatternVector((1, 4))
+
+
+def painted(name: str, heights_m, brushes, seed=0) -> Experiment:
+    """A panel with a pass of each of these brushes, measured as far as they reach."""
+    motion = passes(heights_m, samples=300)
+    reached = column(min(heights_m) - 0.35, max(heights_m) + 0.35, 30)
+    numbered = replace(motion, trigger_brush=np.repeat(brushes, 2))
+    return replace(painted_by(TRUTH, numbered, reached, seed=seed), name=name)
+
+
+@pytest.fixture(scope='module')
+def campaign():
+    return Campaign((
+        painted('one', (1.577, 1.0, 0.423), (1, 1, 1)),
+        painted('four', (1.3, 1.0, 0.7), (4, 4, 4), seed=1),
+        painted('both', (1.3, 0.8), (1, 4), seed=2),
+    ))  # fmt: skip
+
+
+def same(found: PlanarPattern, truth: PlanarPattern, rel: float) -> bool:
+    return found.model_dump() == pytest.approx(truth.model_dump(), rel=rel)
+
+
+def test_patterns_survive_the_way_there_and_back():
+    vector = np.array(VECTOR.encode(TRUTH.patterns))
+    assert len(vector) == len(VECTOR) == 13
+    for again, before in zip(
+        VECTOR.patterns(VECTOR.values(vector[np.newaxis])[0]), TRUTH.patterns, strict=True
+    ):
+        assert same(again, before, 1e-12)
+    assert VECTOR.names[7:9] == ('brush_4.K1_cm3_per_s', 'brush_4.K2')
+    assert VECTOR.coordinates[9].name == 'brush_4.log_K3_ratio'
+
+
+def test_one_pattern_has_the_coordinates_of_the_pattern():
+    one = PatternVector()
+    assert one.coordinates == PATTERN
+    assert one.names == PATTERN_NAMES
+    assert PatternVector((5,)).coordinates == PATTERN
+
+
+@settings(max_examples=30)
+@given(st.lists(st.floats(-1.0, 1.0), min_size=13, max_size=13))
+def test_the_jacobian_is_that_of_the_coordinates(shifts):
+    """Also where the asymmetry is at its bound, K3 = 1."""
+    vector = np.array(VECTOR.encode(TRUTH.patterns)) + 0.5 * np.array(shifts)
+
+    def bounded(entries):
+        found = VECTOR.of_patterns(entries[np.newaxis])[0]
+        size = np.hypot(found[:, 2], found[:, 3])
+        found[:, 2:4] /= np.maximum(size, 1.0)[:, np.newaxis]
+        return found.ravel()
+
+    size = np.hypot(*VECTOR.of_patterns(vector[np.newaxis])[0][:, 2:4].T)
+    if np.any(np.abs(size - 1.0) < 1e-3) or np.any(size < 1e-3):
+        return  # a kink, or no phase
+    steps = 1e-6 * np.eye(13)
+    slopes = [(bounded(vector + s) - bounded(vector - s)) / 2e-6 for s in steps]
+    np.testing.assert_allclose(VECTOR.jacobian(vector), np.array(slopes).T, atol=1e-6)
+
+
+@pytest.mark.slow
+def test_derivatives_of_the_readings_are_those_of_the_film(campaign):
+    model = TRUTH.with_effect(AirDrift(shift_down_m=0.01))
+    study = Study.of(campaign, model.effects)
+    parameters = FreeParameters.of(model, *model.effects)
+    vector = parameters.encode(model)
+    found = derivatives(study.forward, parameters, vector, np.ones(len(study)))
+    for k in range(len(VECTOR)):
+        step = 1e-5 * np.eye(len(vector))[k]
+        up, down = (study.forward.predict_um(parameters.decode(vector + s)) for s in (step, -step))
+        np.testing.assert_allclose(found[:, k], (up - down) / 2e-5, atol=2e-4)
+
+
+@pytest.mark.slow
+def test_panels_of_two_brushes_give_both_patterns_back(campaign, tmp_path):
+    """From a plain start: nothing says what the brushes are but the recordings."""
+    found = calibrate(campaign)
+    assert found.chi_square_per_freedom < 1.5
+    for brush, truth in zip(found.model.brushes, TRUTH.brushes, strict=True):
+        assert brush.number == truth.number
+        assert brush.planar.K1_cm3_per_s == pytest.approx(truth.planar.K1_cm3_per_s, rel=0.02)
+        assert brush.planar.r_m == pytest.approx(truth.planar.r_m, abs=0.02)
+        shared = found.model.brushes[0].planar.phi_rad
+        assert brush.planar.phi_rad == pytest.approx(shared, abs=1e-12)
+    by_name = {value.name: value for value in found.parameters}
+    for brush in TRUTH.brushes:
+        for name in ('K1_cm3_per_s', 'r_m', 'sigma1_m'):
+            value = by_name[f'brush_{brush.number}.{name}']
+            assert abs(value.value - getattr(brush.planar, name)) < 4.0 * value.sigma
+    # Three parameters of eq. (3) start each brush from a panel of its own; one has no panel.
+    assert [panel is None for panel in found.panels] == [False, False, True]
+    start = ModelFile(TRUTH.model_copy(update={'effects': ()}))
+    write_calibration(tmp_path, found, start)
+    again = read_model_file(tmp_path / 'model.yaml')
+    assert [b.number for b in again.model.brushes] == [1, 4]
+    assert again.posterior is not None
+    assert again.uncertainty['brush_4']['r_m'] > 0.0
+
+
+@pytest.mark.slow
+def test_a_calibration_tells_transfer_efficiency_and_exponents(campaign, tmp_path):
+    found = calibrate(campaign, TRUTH)
+    figures = found.to_dict()['brushes']
+    for brush in TRUTH.brushes:
+        told = figures['by_number'][str(brush.number)]
+        share = brush.planar.K1_cm3_per_s * 60.0 / (brush.flow_cm3_per_min * brush.solids)
+        assert told['transfer_efficiency'] == pytest.approx(share, rel=0.02)
+        assert 0.0 < told['transfer_efficiency_sigma'] < 0.02
+    assert set(figures['exponents']['width']) == {'flow_cm3_per_min', 'bell_speed_rpm'}
+    third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
+    files = write_calibration(
+        tmp_path, found, ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
+    )
+    assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
+    # A brush that was not painted with stays as it was given.
+    kept = read_model_file(files[0])
+    assert kept.model.brushes[-1] == third
+    assert kept.posterior is None
+
+
+def test_the_start_of_a_campaign_has_its_brushes_and_what_recordings_tell(campaign):
+    told = [{'bell_speed_rpm': 4e4, 'voltage_kv': -70.0}, {'bell_speed_rpm': 2e4}, {}]
+    experiments = [replace(e, settings=s) for e, s in zip(campaign.experiments, told, strict=True)]
+    start = with_brushes_of(Campaign(tuple(experiments)), DepositionModel())
+    assert [(b.number, b.bell_speed_rpm, b.voltage_kv) for b in start.brushes] == [
+        (1, 4e4, 70.0), (4, 2e4, None)
+    ]  # fmt: skip
+    assert start.patterns == (DepositionModel().planar,) * 2
+    # A campaign of one brush needs of the model that one only.
+    of_four = Campaign(campaign.experiments[1:2])
+    assert with_brushes_of(of_four, TRUTH).patterns == (SECOND,)
+    assert with_brushes_of(of_four, DepositionModel()) == DepositionModel()
+
+
+def test_recordings_that_do_not_all_name_their_brush_are_refused(campaign):
+    unnamed = replace(
+        campaign.experiments[0], name='silent',
+        path=campaign.experiments[0].path.with_(
+            brush=np.zeros(len(campaign.experiments[0].path), np.int64)
+        ),
+    )  # fmt: skip
+    mixed = Campaign((unnamed, campaign.experiments[1], campaign.experiments[2]))
+    with pytest.raises(ReadingsError, match="'silent' names no brush, others name 1, 4: give it"):
+        with_brushes_of(mixed, DepositionModel())
+
+
+def test_models_without_the_brushes_of_a_campaign_are_refused(campaign):
+    with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
+        calibrate(campaign, two_brushes())
+    with pytest.raises(ModelError, match='brushes 1, 4 are used and the model has the pattern of'):
+        compare(campaign, DepositionModel())
+    with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
+        diagnose(campaign, two_brushes())
+
+
+# --- what is known of one job, for the next
+
+THREE = PatternVector((1, 4, 7))
+
+
+@settings(max_examples=30)
+@given(
+    st.lists(st.floats(-0.5, 0.5), min_size=19, max_size=19),
+    st.sampled_from([(1,), (4,), (7,), (1, 7), (4, 7), (1, 4, 7)]),
+)
+def test_some_brushes_out_of_all_keep_their_patterns(shifts, numbers):
+    kept = PatternVector(numbers)
+    centre = np.array(THREE.encode([FIRST, SECOND, FIRST]))
+
+    def patterns(vector: PatternVector, entries: np.ndarray) -> np.ndarray:
+        return vector.of_patterns(entries[np.newaxis])[0]
+
+    vector = centre + 0.3 * np.array(shifts)
+    entries, slope = kept.out_of(THREE, vector)
+    rows = [THREE.brushes.index(number) for number in numbers]
+    np.testing.assert_allclose(patterns(kept, entries), patterns(THREE, vector)[rows], rtol=1e-12)
+    steps = 1e-6 * np.eye(19)
+    found = [
+        (kept.out_of(THREE, vector + s)[0] - kept.out_of(THREE, vector - s)[0]) for s in steps
+    ]
+    np.testing.assert_allclose(slope, np.array(found).T / 2e-6, atol=1e-8)
+
+
+def known_of(model: DepositionModel, deviation: float = 0.02) -> Posterior:
+    """A calibration of these brushes, each entry known by itself."""
+    vector = PatternVector(tuple(brush.number for brush in model.brushes))
+    names = [c.name for c in vector.coordinates]
+    mean = dict(zip(names, map(float, vector.encode(model.patterns)), strict=True))
+    rows = (deviation**2 * np.eye(len(names))).tolist()
+    return Posterior(mean=mean, covariance=dict(zip(names, rows, strict=True)), readings=('a',))
+
+
+def spread(known: Posterior, model: DepositionModel, first: str, second: str) -> tuple[float, ...]:
+    """Prior deviations in a job of two coordinates, and of the difference of the two."""
+    parameters = FreeParameters.of(model, known=known)
+    factor = parameters.prior.factor
+    i, j = (parameters.coordinates.index(name) for name in (first, second))
+    covariance = factor @ factor.T
+    apart = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
+    return tuple(np.sqrt([covariance[i, i], covariance[j, j], apart]).tolist())
+
+
+def test_brushes_change_together_from_job_to_job():
+    """Level and widths go with the paint and the cup; the brushes' ratio hardly changes."""
+    known = of_brushes(known_of(TRUTH), TRUTH, TRUTH)
+    one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
+    assert one == other == pytest.approx(np.hypot(0.1, 0.02))
+    # The calibration's own uncertainty of each, and a tenth of the variance between jobs.
+    assert apart == pytest.approx(np.sqrt(2.0 * (0.02**2 + 0.1 * 0.1**2)))
+
+
+def test_a_model_without_a_calibration_tells_how_its_brushes_differ():
+    """Their level is open, and their ratio is known as well as jobs differ."""
+    known = of_brushes(None, TRUTH, TRUTH)
+    one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
+    assert one == other > 2.0
+    assert apart == pytest.approx(np.sqrt(2.0 * (0.1**2 + 0.1 * 0.1**2)), rel=1e-6)
+    assert of_brushes(None, DepositionModel(), TRUTH) is None
+
+
+def test_a_job_of_one_brush_rests_on_the_calibration_of_all():
+    second = TRUTH.of_numbers({4})
+    known = of_brushes(known_of(TRUTH), TRUTH, second)
+    assert known.names == tuple(c.name for c in PATTERN)
+    assert known.readings == ('a',)
+    np.testing.assert_allclose(known.centre, PatternVector((4,)).encode([SECOND]), rtol=1e-12)
+    # The size of its asymmetry is told beside the first's: both are uncertain.
+    size = np.hypot(known.matrix[2, 2], known.matrix[3, 3])
+    ratio = SECOND.K3 / FIRST.K3
+    assert size > 0.02**2 * ratio**2
+    assert of_brushes(None, TRUTH, second) is None

@@ -1,0 +1,229 @@
+"""The fit: a known pattern from readings without noise, and uncertainties as wide as they are."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inference.fitting.panels import PANEL, painted_by, passes
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.fitting.estimates import scaled_covariance
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.fitting.least_squares import derivatives, fit_readings
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM
+from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
+from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
+
+TRUTH = DepositionModel(
+    planar=PlanarPattern(
+        K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
+    )
+)
+SIGMA_UM = 0.15
+
+
+def grid_m(columns: int = 5, rows: int = 14) -> np.ndarray:
+    """(N, 3) points over the panel."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.1, 1.9, rows))
+    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+
+
+@pytest.fixture(scope='module')
+def spotted() -> Campaign:
+    """Two short strokes that do not meet, so that the whole pattern shows, not its collapse."""
+    path, _ = spray_path(passes([0.55, 1.35]))
+    path = path.with_(flow=np.where(np.abs(path.position_m[:, 0]) < 0.1, 8.0 * path.flow, 0.0))
+    bare = Readings.of(grid_m(), np.zeros(len(grid_m())))
+    return Campaign((Experiment.of('panel', PANEL, path, bare),))
+
+
+@pytest.fixture(scope='module')
+def forward(spotted):
+    return Forward(spotted, (OversprayFog(),))
+
+
+@pytest.fixture(scope='module')
+def exact(forward):
+    """What the true model predicts there."""
+    return forward.predict_um(TRUTH)
+
+
+def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
+    integrator = FilmIntegrator(PANEL.at(grid_m()), TRUTH, 'double')
+    integrator.add(spotted.experiments[0].path)
+    assert exact == pytest.approx(integrator.film_um, rel=1e-9)
+    assert 5.0 < exact.max() < 100.0
+
+
+def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
+    fit = fit_readings(
+        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(DepositionModel()), starts=6
+    )
+    assert fit.converged
+    assert fit.chi_square < 1.0
+    for name, value in TRUTH.planar:
+        assert getattr(fit.model.planar, name) == pytest.approx(value, rel=0.01), name
+
+
+def test_a_known_amplitude_comes_back_beside_the_pattern(forward):
+    fogged = TRUTH.with_effect(OversprayFog(fog_um=1.7))
+    measured = forward.predict_um(fogged)
+    parameters = FreeParameters.of(TRUTH, OversprayFog())
+    fit = fit_readings(forward, measured, np.full(len(measured), 0.01), parameters, starts=3)
+    assert fit.model.effect('overspray_fog').fog_um == pytest.approx(1.7, rel=0.01)
+    assert parameters.names[-1] == 'overspray_fog.fog_um'
+
+
+def test_derivatives_are_those_of_the_prediction(forward, exact):
+    parameters = FreeParameters.of(TRUTH, OversprayFog(fog_um=0.5))
+    vector = parameters.encode(parameters.start)
+    found = derivatives(forward, parameters, vector, np.full(len(exact), SIGMA_UM))
+    for k in range(len(vector)):
+        ends = []
+        for step in (-1e-4, 1e-4):
+            moved = vector.copy()
+            moved[k] += step
+            ends.append(forward.predict_um(parameters.decode(moved)))
+        slope = (ends[1] - ends[0]) / 2e-4 / SIGMA_UM
+        assert found[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max()), k
+
+
+def test_an_asymmetry_beyond_the_physical_moves_the_prediction_by_its_phase_alone(forward, exact):
+    parameters = FreeParameters.of(TRUTH)
+    vector = parameters.encode(TRUTH)
+    vector[2:4] = 0.9, 0.8
+    found = derivatives(forward, parameters, vector, np.ones(len(exact)))[:, 2:4]
+    for k in range(2):
+        ends = [
+            forward.predict_um(parameters.decode(vector + step * np.eye(7)[2 + k]))
+            for step in (-1e-4, 1e-4)
+        ]
+        slope = (ends[1] - ends[0]) / 2e-4
+        assert found[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max())
+    assert np.abs(found @ [0.9, 0.8]).max() < 1e-9 * np.abs(found).max()
+
+
+@pytest.mark.slow
+def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
+    random = np.random.default_rng(4)
+    parameters = FreeParameters.of(TRUTH)
+    sigma = np.full(len(exact), SIGMA_UM)
+    vectors = []
+    for _ in range(50):
+        measured = exact + SIGMA_UM * random.normal(size=len(exact))
+        vectors.append(fit_readings(forward, measured, sigma, parameters).vector)
+    reference = fit_readings(forward, exact, sigma, parameters)
+    # With fixed truth the estimates scatter by C J'J C, a little less than C for the priors.
+    covariance = scaled_covariance(reference)
+    information = reference.jacobian.T @ reference.jacobian
+    expected = np.sqrt(np.diag(covariance @ information @ covariance))
+    # The standard error of a deviation from 50 draws is 10 %.
+    assert np.std(vectors, axis=0, ddof=1) / expected == pytest.approx(np.ones(7), abs=0.35)
+    assert (np.sqrt(np.diag(covariance)) >= expected).all()
+    shift = np.mean(vectors, axis=0) - reference.vector
+    assert (np.abs(shift) < 4.0 * expected / np.sqrt(50.0)).all()
+
+
+def test_readings_that_say_nothing_leave_the_priors(forward, exact):
+    parameters = FreeParameters.of(DepositionModel())
+    fit = fit_readings(forward, exact, np.full(len(exact), 1e9), parameters)
+    prior = parameters.prior
+    assert fit.vector == pytest.approx(prior.centre, abs=1e-3)
+    assert np.sqrt(np.diag(scaled_covariance(fit))) == pytest.approx(prior.width, rel=1e-3)
+
+
+def test_nuisance_directions_are_allowed_for(forward, exact):
+    """A common error of all readings, allowed for, moves the fit by no more than it may."""
+    parameters = FreeParameters.of(TRUTH)
+    sigma = np.full(len(exact), SIGMA_UM)
+    wrong = exact + 1.5
+    nuisance = np.full((len(exact), 1), 2.0 / SIGMA_UM)
+    strict = fit_readings(forward, wrong, sigma, parameters)
+    lenient = fit_readings(forward, wrong, sigma, parameters, nuisance=nuisance)
+    truth = parameters.encode(TRUTH)
+    assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
+    assert lenient.marginal.chi_square < 0.2 * strict.chi_square
+
+
+def test_the_same_seed_gives_the_same_fit(forward, exact):
+    noisy = exact + SIGMA_UM * np.random.default_rng(2).normal(size=len(exact))
+    sigma = np.full(len(exact), SIGMA_UM)
+    first, second = (
+        fit_readings(forward, noisy, sigma, FreeParameters.of(DepositionModel()), starts=3, seed=5)
+        for _ in range(2)
+    )
+    assert np.array_equal(first.vector, second.vector)
+
+
+def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
+    experiment = painted_by(TRUTH, passes([0.55, 1.35]), grid_m(), repeats=4, noise_um=0.6)
+    study = Study.of(Campaign((experiment,)))
+    assert study.noise.source == 'repeats'
+    assert study.noise.degrees_of_freedom == 3 * len(study)
+    gauge = study.noise.sigma_um[: len(study)]
+    assert study.sigma_um == pytest.approx(
+        np.sqrt(gauge**2 / 4 + (TEXTURE_SHARE * study.measured_um) ** 2), rel=0.02
+    )
+    assert study.nuisance.shape == (len(study), 0)
+
+
+def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
+    parts = tuple(
+        replace(painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)), name=name)
+        for name, height in (('low', 0.4), ('high', 0.6))
+    )
+    study = Study.of(Campaign(parts))
+    sigma = study.sigma_um[:18]
+    level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
+    here = np.column_stack([level, -level, zero, -zero]) / 2.0
+    assert study.nuisance[:18] == pytest.approx(here)
+    film = study.measured_um * study.sigma_um
+    assert (film @ study.nuisance[:, :2]).sum() == pytest.approx(0.0)
+
+
+def test_points_are_left_out_in_six_folds_anywhere_on_the_part(spotted):
+    one = spotted.experiments[0]
+    readings = Readings.of(grid_m(7, 10), np.full(70, 20.0))
+    folds = Study.of(Campaign((Experiment.of('panel', PANEL, one.path, readings),))).folds()
+    counts = np.bincount(folds)
+    assert len(counts) == 6
+    assert np.ptp(counts) <= 1
+    assert np.count_nonzero(np.diff(folds)) > len(folds) / 2
+
+
+def test_points_at_one_place_are_left_out_together(spotted):
+    places = np.repeat(grid_m()[[3, 20, 41]], 10, axis=0)
+    one = spotted.experiments[0]
+    experiment = Experiment.of('panel', PANEL, one.path, Readings.of(places, np.full(30, 20.0)))
+    folds = Study.of(Campaign((experiment,))).folds().reshape(3, 10)
+    assert len(np.unique(folds)) == 3
+    assert (folds == folds[:, :1]).all()
+
+
+def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
+    """Films and prepared paths are kept, but for models of the same path and flux only."""
+    effects = [EFFECTS[name].typical() for name in ('tcp_tilt', 'overspray_fog', 'occlusion')]
+    models = [TRUTH.with_effect(effect) for effect in effects]
+    models += [TRUTH.with_effect(AirDrift(shift_down_m=0.002 * k)) for k in range(12)]
+    models += [TRUTH.model_copy(update={'projection': Projection(model_plane_m=0.3)}), TRUTH]
+    alone = [Forward(forward.campaign).predict_um(model) for model in models]
+    assert len({film.tobytes() for film in alone}) == len(models) - 2  # no drift; no shadow
+    for _ in range(2):
+        for model, expected in zip(models, alone, strict=True):
+            assert np.array_equal(forward.predict_um(model), expected)
+
+
+def test_absent_effects_change_no_prediction(forward, exact):
+    both = Forward(forward.campaign, (OversprayFog(), AirDrift()))
+    assert np.array_equal(both.predict_um(TRUTH), exact)
+    assert len(PATTERN) == 7

@@ -1,0 +1,135 @@
+"""The vector that a fit varies: there and back, bounds and priors."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.inference.fitting.parameters import SHAPE_DEVIATIONS, FreeParameters
+from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.pattern import PlanarPattern
+
+PATTERNS = st.builds(
+    PlanarPattern,
+    K1_cm3_per_s=st.floats(0.05, 20.0),
+    K2=st.floats(0.0, 1.0),
+    K3=st.floats(0.01, 0.98),
+    phi_rad=st.floats(-3.1, 3.1),
+    r_m=st.floats(0.0, 0.6),
+    sigma1_m=st.floats(0.01, 0.5),
+    sigma2_m=st.floats(0.01, 0.5),
+)
+
+
+@given(PATTERNS, st.floats(-0.1, 0.1), st.floats(0.0, 2.0))
+def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
+    model = DepositionModel(
+        planar=planar,
+        effects=(AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)),
+    )
+    parameters = FreeParameters.of(model, *model.effects)
+    again = parameters.decode(parameters.encode(model))
+    for name, value in planar:
+        assert getattr(again.planar, name) == pytest.approx(value, abs=1e-12), name
+    for before, after in zip(model.effects, again.effects, strict=True):
+        assert type(after) is type(before)
+        assert after.values() == pytest.approx(before.values(), abs=1e-12)
+    assert again.projection == model.projection
+
+
+def test_a_vector_survives_the_way_there_and_back():
+    parameters = FreeParameters.of(DepositionModel(), AirDrift())
+    vector = np.array([0.7, 0.3, -0.1, 0.2, 0.15, -2.5, -2.0, 0.4, -1.3])
+    assert len(parameters) == len(vector) == len(parameters.names)
+    assert parameters.encode(parameters.decode(vector)) == pytest.approx(vector)
+
+
+def test_amplitudes_count_in_their_typical_size():
+    parameters = FreeParameters.of(DepositionModel(), AirDrift())
+    vector = parameters.encode(parameters.start)
+    assert vector[len(PATTERN) :].tolist() == [0.0, 0.0]
+    vector[len(PATTERN)] = 2.0
+    typical = AirDrift.parameters()['shift_down_m']['typical']
+    assert parameters.decode(vector).effect('air_drift').shift_down_m == pytest.approx(2 * typical)
+    assert parameters.names[len(PATTERN) :] == (
+        'air_drift.shift_down_m',
+        'air_drift.shift_across_m',
+    )
+
+
+def test_shapes_are_varied_on_a_logarithmic_scale():
+    """Neutral is the centre; the whole physical range is a few widths of the prior."""
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
+    assert parameters.names[len(PATTERN) :] == (
+        'corner_slowdown.gain',
+        'corner_slowdown.length_m',
+    )
+    vector = parameters.encode(parameters.start)
+    info = CornerSlowdown.parameters()['length_m']
+    lengths = []
+    for entry in (-0.5, 0.0, 0.5):
+        vector[-1] = entry
+        effect = parameters.decode(vector).effect('corner_slowdown')
+        assert effect.gain == pytest.approx(0.5)
+        lengths.append(effect.length_m)
+    assert lengths[1] == pytest.approx(info['neutral'])
+    assert lengths[2] / lengths[1] == pytest.approx(lengths[1] / lengths[0])
+    assert lengths[2] > lengths[0]
+    low, high = parameters.bounds
+    assert high[-1] - low[-1] == pytest.approx(SHAPE_DEVIATIONS)
+    ends = [parameters.decode(end).effect('corner_slowdown').length_m for end in (low, high)]
+    assert ends == pytest.approx([info['low'], info['high']])
+
+
+def test_a_shape_beyond_its_bounds_is_kept_at_them():
+    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
+    vector = parameters.encode(parameters.start)
+    vector[-1] = 100.0
+    longest = CornerSlowdown.parameters()['length_m']['high']
+    assert parameters.decode(vector).effect('corner_slowdown').length_m == longest
+
+
+def test_effects_that_are_not_varied_stay():
+    start = DepositionModel(effects=(AirDrift(shift_down_m=0.03),))
+    corner = CornerSlowdown(length_m=0.3)
+    parameters = FreeParameters.of(start, corner)
+    assert parameters.varied == (('corner_slowdown', 'gain'), ('corner_slowdown', 'length_m'))
+    vector = parameters.encode(parameters.start)
+    vector[len(PATTERN)] = 1.0
+    model = parameters.decode(vector)
+    assert model.effect('air_drift') == AirDrift(shift_down_m=0.03)
+    assert model.effect('corner_slowdown').length_m == pytest.approx(0.3)
+    assert model.effect('corner_slowdown').gain > 0.0
+
+
+def test_a_learned_law_has_nothing_to_vary():
+    law = LEARNED['time_s'](low=0.0, high=9.0, learned=(0.1, 0.0, -0.1))
+    parameters = FreeParameters.of(DepositionModel(), law)
+    assert len(parameters) == len(PATTERN)
+    assert parameters.decode(parameters.encode(parameters.start)).effect(law.id) == law
+
+
+@pytest.mark.parametrize('effect', EFFECTS.values(), ids=EFFECTS.keys())
+def test_bounds_and_prior_suit_every_effect(effect):
+    parameters = FreeParameters.of(DepositionModel(), effect())
+    low, high = parameters.bounds
+    prior = parameters.prior
+    assert (low <= prior.centre).all()
+    assert (prior.centre <= high).all()
+    assert (prior.width > 0.0).all()
+    for end in (low, high):
+        decoded = parameters.decode(end)
+        assert parameters.encode(decoded)[len(PATTERN) :] == pytest.approx(end[len(PATTERN) :])
+
+
+def test_an_asymmetry_beyond_one_is_cut():
+    vector = FreeParameters.of(DepositionModel()).encode(DepositionModel())
+    vector[2:4] = 0.9
+    model = FreeParameters.of(DepositionModel()).decode(vector)
+    assert model.planar.K3 == 1.0
+    assert model.planar.phi_rad == pytest.approx(np.pi / 4)

@@ -1,0 +1,89 @@
+"""Levels of parts and zeros of gauge sessions, found back where they were put in."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inference.diagnosis.linear import fit_linear
+from inference.fitting.panels import painted_by, passes
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+
+
+def grid_m() -> np.ndarray:
+    """(40, 3) points from the middle of the pass to where hardly any paint arrives."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, 4), np.linspace(1.0, 1.5, 10))
+    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+
+
+def part(name: str, session: str = '') -> Experiment:
+    one = painted_by(DepositionModel(), passes([1.0]), grid_m())
+    readings = replace(one.readings, session=np.full(len(one.readings), session))
+    return Experiment.of(name, one.surface, one.path, readings)
+
+
+def estimated(study: Study, change_um: np.ndarray) -> dict:
+    """Amounts of the random effects where the readings deviate so from what is known for sure."""
+    nothing = np.zeros((len(study), len(PATTERN)))
+    fit = fit_linear(nothing, change_um / study.sigma_um)
+    fit = replace(fit, nuisance=study.nuisance)
+    return {(a.kind, a.of): a for a in amounts(fit, study.random_effects)}
+
+
+def test_a_level_and_a_zero_come_back_with_their_uncertainty():
+    study = Study.of(Campaign((part('left'), part('right'))))
+    left = study.campaign.experiment_of == 0
+    sign = np.where(left, 1.0, -1.0)
+    found = estimated(study, sign * (0.03 * study.measured_um + 0.4))
+    level, zero = found['part level', 'left'], found['gauge zero', 'right']
+    assert level.unit == '%'
+    assert level.value == pytest.approx(3.0, abs=2.0 * level.sd)
+    assert zero.value == pytest.approx(-0.4, abs=2.0 * zero.sd)
+    assert level.is_notable
+    assert found['part level', 'right'].value == pytest.approx(-level.value)
+    # The prior narrows both: half the difference between two draws.
+    assert 0.0 < level.sd < 100.0 * LEVEL_SHARE / np.sqrt(2.0)
+    assert 0.0 < zero.sd < SESSION_UM / np.sqrt(2.0)
+    assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
+
+
+def test_nothing_put_in_gives_nothing_notable():
+    study = Study.of(Campaign((part('left'), part('right'))))
+    found = estimated(study, np.zeros(len(study)))
+    assert len(found) == 4
+    assert all(amount.value == pytest.approx(0.0) for amount in found.values())
+    assert not any(amount.is_notable for amount in found.values())
+
+
+def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
+    study = Study.of(Campaign((part('left', 'Monday'), part('right', 'Monday'), part('roof'))))
+    level, zero = study.random_effects
+    assert level.names == ('left', 'right', 'roof')
+    assert zero.names == ('Monday', 'roof')
+    assert study.nuisance.shape == (len(study), 5)
+
+
+def test_two_sessions_on_one_part_differ_by_their_zero():
+    one = part('door')
+    evening = np.arange(len(one)) % 2 == 0
+    session = np.where(evening, 'evening', 'noon')[one.means.owner]
+    readings = replace(one.readings, session=session)
+    study = Study.of(Campaign((Experiment.of('door', one.surface, one.path, readings),)))
+    (zero,) = study.random_effects
+    assert zero.kind == 'gauge zero'
+    found = estimated(study, np.where(evening, 0.5, -0.5))
+    assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
+    assert found['gauge zero', 'noon'].is_notable
+
+
+def test_repeats_of_a_point_in_two_sessions_belong_half_to_each():
+    one = painted_by(DepositionModel(), passes([1.0]), grid_m(), repeats=2, noise_um=0.5)
+    session = np.empty(len(one.readings), dtype='<U7')
+    session[np.argsort(one.means.owner, kind='stable')] = ['noon', 'evening'] * len(one)
+    readings = replace(one.readings, session=session)
+    study = Study.of(Campaign((Experiment.of('door', one.surface, one.path, readings),)))
+    assert study.nuisance == pytest.approx(np.zeros((len(study), 2)))

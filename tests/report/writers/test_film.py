@@ -1,0 +1,77 @@
+"""Saved films: read back whole, or not written."""
+
+import json
+import math
+
+import numpy as np
+import pytest
+import trimesh
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.json_files import write_json
+from paint_deposition.film.statistics import film_statistics
+from paint_deposition.part.surface import Surface
+from paint_deposition.report.writers.film import write_film
+
+
+@pytest.fixture
+def painted():
+    """A square metre with a ramp of film, and its statistics."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [1, 0, 1], [0, 0, 1]], dtype=float)
+    surface = Surface.from_triangles(corners, np.array([[0, 1, 2], [0, 2, 3]]), 0.2)
+    film = 50.0 * surface.vertices_m[:, 0] / 3.0
+    stats = film_statistics(film, surface.vertex_areas_m2, 20.0)
+    return surface, film, stats
+
+
+def test_the_files_hold_the_film(painted, tmp_path):
+    surface, film, stats = painted
+    ply, csv, figures = write_film(
+        tmp_path / 'new', surface, film, stats, details={'poses': np.int64(7), 'rate': math.inf}
+    )
+    table = np.genfromtxt(csv, delimiter=',', names=True)
+    assert table.dtype.names == ('x_m', 'y_m', 'z_m', 'thickness_um')
+    assert np.allclose(table['thickness_um'], film, rtol=1e-8, atol=0)
+    assert np.allclose(table['x_m'], surface.vertices_m[:, 0], rtol=1e-8, atol=0)
+    mesh = trimesh.load_mesh(ply, process=False)
+    assert np.array_equal(mesh.faces, surface.faces)
+    vertices = mesh.metadata['_ply_raw']['vertex']['data']
+    assert np.allclose(np.ravel(vertices['thickness_um']), film, rtol=1e-6)
+    content = json.loads(figures.read_text())
+    assert content['mean_um'] == stats.mean_um
+    assert content['poses'] == 7
+    assert content['rate'] is None
+    assert sorted(p.name for p in ply.parent.iterdir()) == ['film.csv', 'film.ply', 'stats.json']
+
+
+def test_an_older_film_stays_unless_told(painted, tmp_path):
+    surface, film, stats = painted
+    csv = write_film(tmp_path, surface, film, stats)[1]
+    with pytest.raises(PaintError, match=r'film\.ply is there already'):
+        write_film(tmp_path, surface, 2 * film, stats)
+    assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(50 / 3)
+    write_film(tmp_path, surface, 2 * film, stats, overwrite=True)
+    assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(100 / 3)
+
+
+def test_a_folder_that_cannot_be_is_named(painted, tmp_path):
+    surface, film, stats = painted
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(PaintError, match='file'):
+        write_film(tmp_path / 'file' / 'folder', surface, film, stats)
+
+
+def test_json_fails_before_it_writes(tmp_path):
+    with pytest.raises(ValueError, match='cannot be written as JSON'):
+        write_json(tmp_path / 'x.json', {'object': object()})
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_table_is_as_numpy_writes_it(painted, tmp_path):
+    surface, film, stats = painted
+    film = film * np.geomspace(1e-9, 1e9, len(film))
+    csv = write_film(tmp_path, surface, film, stats)[1]
+    rows = np.column_stack([surface.vertices_m, film])
+    header = 'x_m,y_m,z_m,thickness_um'
+    np.savetxt(tmp_path / 'plain.csv', rows, '%.9g', ',', header=header, comments='')
+    assert csv.read_bytes() == (tmp_path / 'plain.csv').read_bytes()
