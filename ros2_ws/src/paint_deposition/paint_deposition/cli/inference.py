@@ -27,7 +27,6 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
@@ -68,13 +67,13 @@ def compare_command(
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
     report.html. With several models there is a table of residuals for each, and no meshes.
     """
-    with Progress('compare') as tell, DrawingProcess('profiles') as drawing:
+    with Progress('compare') as tell:
         if len(model_files) > 1:
             data, _ = read_inputs(campaign, None, tell, part_pose)
             models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
             beside = pd.compare_models(data, models, progress=tell)
             tell('writing the report')
-            files = write_results(beside, output, pictures=pictures, drawing=drawing)
+            files = write_results(beside, output, pictures=pictures)
             words = ', '.join(map(str, model_files))
             say_results(files, as_json, _side_by_side_lines(beside, output), model=words)
             return
@@ -82,7 +81,7 @@ def compare_command(
         data, start = read_inputs(campaign, model_file, tell, part_pose)
         comparison = pd.compare(data, start.model if start else None, progress=tell)
         tell('writing the report')
-        files = write_results(comparison, output, pictures=pictures, drawing=drawing)
+        files = write_results(comparison, output, pictures=pictures)
     say_all('note', data.understood)
     say_geometry(comparison)
     say_all('warning', comparison.warnings)
@@ -158,13 +157,13 @@ def diagnose_command(
     from paint_deposition.effects.user_effects import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
-    with Progress('diagnose') as tell, DrawingProcess('profiles') as drawing:
+    with Progress('diagnose') as tell:
         data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.diagnose(
             data, start.model if start else None, posterior=start.posterior if start else None,
             own_effects=own, seed=seed, progress=tell,
         )  # fmt: skip
-        files = _write(diagnosis, output, start, tell, pictures, drawing)
+        files = _write(diagnosis, output, start, tell, pictures)
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
@@ -207,13 +206,13 @@ def refit_command(
         added = None
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
-    with Progress('refit') as tell, DrawingProcess('profiles') as drawing:
+    with Progress('refit') as tell:
         data, start = read_inputs(campaign, model_file, tell, part_pose)
         diagnosis = pd.refit(
             data, added, start.model if start else None,
             posterior=start.posterior if start else None, seed=seed, progress=tell,
         )  # fmt: skip
-        files = _write(diagnosis, output, start, tell, pictures, drawing)
+        files = _write(diagnosis, output, start, tell, pictures)
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
@@ -227,14 +226,13 @@ def _write(
     start: ModelFile | None,
     tell: Progress,
     pictures: str,
-    drawing: DrawingProcess,
 ) -> list[Path]:
     tell('comparing before and after')
     _ = diagnosis.comparisons
     tell('looking for what to measure and spray next')
     _ = diagnosis.proposals
     tell('writing the report')
-    return write_results(diagnosis, output, start=start, pictures=pictures, drawing=drawing)
+    return write_results(diagnosis, output, start=start, pictures=pictures)
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
