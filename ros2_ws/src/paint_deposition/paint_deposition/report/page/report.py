@@ -16,14 +16,12 @@ from paint_deposition.film.statistics import CPK_MEANS
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page import figures as charts
-from paint_deposition.report.page import tables
-from paint_deposition.report.page.film import film_rows, point_rows, points_csv, shares_in_words
+from paint_deposition.report.page import charts, tables
+from paint_deposition.report.page.charts import profile_figure
 from paint_deposition.report.page.headline import headline, key_figures
-from paint_deposition.report.page.learned import learned_figure
-from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
-from paint_deposition.report.page.profiles import profile_figure
+from paint_deposition.report.page.learned import footprint_figure, learned_figure, map_figure
 from paint_deposition.report.page.scene import places_scene, scene_data, section_layout
+from paint_deposition.report.page.tables import film_rows, point_rows, points_csv, shares_in_words
 
 TEMPLATES = Path(__file__).parent / 'templates'
 SCRIPTS = ('report.js', 'part.js')
