@@ -13,6 +13,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from paint_deposition.errors import PaintError, PlanError, did_you_mean
 
 Verb = TypeVar('Verb', bound=Callable)
+# How bounds are said.
+BOUNDS = {
+    'greater than or equal to': 'at least',
+    'less than or equal to': 'at most',
+    'greater than': 'a number above',
+    'less than': 'a number below',
+}
 
 
 class Request(BaseModel):
@@ -38,6 +45,7 @@ def given(
     option: str | None = None,
     *,
     above: float | None = None,
+    below: float | None = None,
     least: float | None = None,
     most: float | None = None,
     metavar: str | None = None,
@@ -48,12 +56,12 @@ def given(
         default: its value where none is given; None: it may be left out.
         text: what it is, with its unit; the help of its option.
         option: of the command; default: the name of the field.
-        above, least, most: bounds, the first of them not included.
+        above, below: bounds that are not included; least, most: bounds that are.
         metavar: what stands for the value in the help.
     """
     extra = {'option': option, 'metavar': metavar}
     return Field(
-        default, description=text, gt=above, ge=least, le=most,
+        default, description=text, gt=above, lt=below, ge=least, le=most,
         json_schema_extra={name: value for name, value in extra.items() if value},
     )  # fmt: skip
 
@@ -67,8 +75,12 @@ def reason(error: ValidationError, kind: type[BaseModel]) -> str:
     if first['type'] == 'value_error':
         return f'{name}: {first["ctx"]["error"]}' if name else str(first['ctx']['error'])
     value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
+    for long, short in BOUNDS.items():
+        remedy = remedy.replace(long, short)
     shown = f'{value:g}' if isinstance(value, float) else repr(value)
-    return f'{name} is {shown}; give {remedy.replace("greater than", "a number above")}'
+    field = kind.model_fields.get(str(first['loc'][0]))
+    about = f': {field.description}' if field and field.description else ''
+    return f'{name} is {shown}; give {remedy}{about}'
 
 
 def takes(*kinds: type[BaseModel]) -> Callable[[Verb], Verb]:

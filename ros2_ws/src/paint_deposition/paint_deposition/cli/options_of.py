@@ -10,7 +10,7 @@ from types import NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
-from annotated_types import Ge, Gt, Le, MaxLen
+from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
@@ -109,6 +109,8 @@ def _type(
             bounds |= {'min': shown(one.gt), 'min_open': True}
         elif isinstance(one, Ge):
             bounds['min'] = shown(one.ge)
+        elif isinstance(one, Lt):
+            bounds |= {'max': shown(one.lt), 'max_open': True}
         elif isinstance(one, Le):
             bounds['max'] = shown(one.le)
     if annotation is int:
