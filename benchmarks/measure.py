@@ -31,7 +31,7 @@ from tests.virtual_paint_shop.gauge import GaugeNoise, measure  # noqa: E402
 from tests.virtual_paint_shop.jobs import record  # noqa: E402
 from tests.virtual_paint_shop.truths import choose as choose_truths  # noqa: E402
 
-from paint_deposition.api.geometry import look_at  # noqa: E402
+from paint_deposition.api.simulation import look_at  # noqa: E402
 from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
 from paint_deposition.inference.diagnosis.reading_choice import (  # noqa: E402
     ChosenReadings,

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brushes import NARROW, WIDE, switched, two_brushes
-from paint_deposition.api.geometry import require_brushes
+from paint_deposition.api.simulation import require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording

@@ -22,7 +22,7 @@ OBJECTS_BETWEEN_SEARCHES = 100_000
 # Modules are only loaded when their command is used, so that help comes at once.
 COMMANDS = {
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('calibrate', "Fit the bell's pattern to gauge readings."),
+    'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
     'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
@@ -30,11 +30,11 @@ COMMANDS = {
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
-    'sweep': ('sweep', 'Many variations of one job, on all cores or a cluster.'),
-    'line': ('line', 'Many parts over days: what they share and what changes.'),
+    'sweep': ('batch', 'Many variations of one job, on all cores or a cluster.'),
+    'line': ('batch', 'Many parts over days: what they share and what changes.'),
     'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'runs': ('runs', 'List what a cell has painted, part by part, with figures.'),
+    'runs': ('recordings', 'List what a cell has painted, part by part, with figures.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 

@@ -235,23 +235,20 @@ def max_edge_length_option(default_m: float) -> Callable:
 def read_inputs(
     campaign: Path,
     model_file: Path | None,
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
     part_pose: list[float] | None = None,
 ) -> tuple[pd.Campaign, ModelFile | None]:
     """Read a campaign and the model to start from: the one given, or else the campaign's, if any.
 
-    `tell` gets each line of progress, stderr each note on an experiment. `part_pose` is that of
-    experiments without one of their own.
+    Notes and warnings on the experiments go to stderr. ``part_pose`` is that of experiments
+    without one of their own.
     """
     from paint_deposition.files.model_file import read_model_file
 
-    def show(line: str) -> None:
-        if line.startswith('reading '):
-            tell(line)
-        else:
-            click.echo(line if line.startswith('warning: ') else f'note: {line}', err=True)
+    def remark(kind: str, experiment: str, line: str) -> None:
+        say_all(kind, [f'{experiment}: {line}'])
 
-    data = pd.read_campaign(campaign, show, part_pose)
+    data = pd.read_campaign(campaign, progress, part_pose, remark)
     chosen = model_file or data.model_file
     return data, read_model_file(chosen) if chosen else None
 

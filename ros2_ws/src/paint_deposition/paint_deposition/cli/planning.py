@@ -38,7 +38,6 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.trade_off import PAINT_WEIGHTS, Point
-from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     import numpy as np
@@ -215,7 +214,7 @@ def plan_command(
     wanted |= {'travel_rad': math.radians(travel_deg), 'lean_max_rad': math.radians(lean_max_deg)}
     chosen = chosen_model(model_file, brush=brush)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
-    with Progress('plan') as tell, DrawingProcess('film') as drawing:
+    with Progress('plan') as tell:
         tell('reading the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         result, contacts = lay(
@@ -239,7 +238,7 @@ def plan_command(
         tell('writing')
         files = write_results(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
-            pictures=pictures, trade_off=others, drawing=drawing,
+            pictures=pictures, trade_off=others,
         )  # fmt: skip
     say_all('note', surface.notes)
     say_all('warning', map(str, contacts))

@@ -32,7 +32,6 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import Progress
 from paint_deposition.files.parquet import require_libraries
-from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     import numpy as np
@@ -111,7 +110,7 @@ def simulate_command(
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     if parquet:
         require_libraries('--parquet')
-    with Progress('simulate') as tell, DrawingProcess('film') as drawing:
+    with Progress('simulate') as tell:
         tell('loading')
         from paint_deposition.files.gun_motions import read_gun_motions
         from paint_deposition.files.motion_source import MotionSource
@@ -141,7 +140,6 @@ def simulate_command(
             output,
             made_from=made_from,
             pictures=pictures,
-            drawing=drawing,
             parquet=parquet,
         )
     say_all('note', film.notes)

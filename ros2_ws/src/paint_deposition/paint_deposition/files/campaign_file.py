@@ -34,6 +34,8 @@ _QUANTITIES = ', '.join(get_args(Quantity))
 
 
 Name = Annotated[str, BeforeValidator(str)]
+# Called with 'note' or 'warning', the name of an experiment and a line on it.
+Remark = Callable[[Literal['note', 'warning'], str, str], None]
 # Keys that only tell the reader of the report what it is about.
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
@@ -130,14 +132,16 @@ def read_campaign(
     path: str | Path,
     progress: Callable[[str], None] = lambda line: None,
     part_pose: Sequence[float] | None = None,
+    remark: Remark = lambda kind, experiment, line: None,
 ) -> Campaign:
     """Read a campaign with all that it names.
 
     Args:
         path: YAML; paths in it are relative to it.
-        progress: called with a line for each experiment and each note on it.
+        progress: called with a line for each experiment.
         part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
             that has none of its own.
+        remark: called with 'note' or 'warning', the experiment's name and what is odd about it.
 
     Raises:
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
@@ -154,7 +158,7 @@ def read_campaign(
         if part_pose is not None and entry.part_pose is None:
             entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
-            experiments.append(_read_experiment(path.parent, name, entry, progress))
+            experiments.append(_read_experiment(path.parent, name, entry, remark))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     return Campaign(
@@ -183,9 +187,7 @@ def _start(path: Path, file: _File) -> str | None:
     return None if file.model is None else str(path.parent / file.model)
 
 
-def _read_experiment(
-    folder: Path, name: str, entry: _Entry, progress: Callable[[str], None]
-) -> Experiment:
+def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> Experiment:
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     motions = _motions(folder, entry)
     files |= _named([file for file, *_ in motions])
@@ -198,12 +200,12 @@ def _read_experiment(
         require_spraying(trajectory, path)
         paths.append(_with_brush(path, brush))
         if counts.rejected:
-            progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
+            remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
     for note in (*surface.notes, *(note for t in trajectories for note in t.notes)):
-        progress(f'{name}: {note}')
+        remark('note', name, note)
     for warning in (warning for t in trajectories for warning in t.warnings):
-        progress(f'warning: {name}: {warning}')
+        remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
     readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)

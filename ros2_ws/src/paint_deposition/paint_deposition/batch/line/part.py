@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -74,13 +74,15 @@ def _rows(
     run: Run, file: LineFile, folder: Path, model: DepositionModel, mesh: str
 ) -> Iterator[dict[str, Any]]:
     if run.is_campaign:
-        odd: list[str] = []
-        campaign = read_campaign(run.path, odd.append, file.part_pose)
+        odd: list[tuple[str, str, str]] = []
+        campaign = read_campaign(
+            run.path, part_pose=file.part_pose, remark=lambda *said: odd.append(said)
+        )
         time_s = _date(campaign.head.get('date', ''), run)
         for experiment in campaign.experiments:
             name = run.name if len(campaign.experiments) == 1 else f'{run.name}/{experiment.name}'
-            warning = f'warning: {experiment.name}: '
-            remarks = [line.removeprefix(warning) for line in odd if line.startswith(warning)]
+            mine = ('warning', experiment.name)
+            remarks = [line for *about, line in odd if tuple(about) == mine]
             pooled = sha256(experiment.files['mesh']) == mesh
             if not pooled:
                 other = Path(experiment.files['mesh']).name

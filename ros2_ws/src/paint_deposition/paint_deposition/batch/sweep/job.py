@@ -163,12 +163,11 @@ class Job:
         path = self._named('campaign', values)
         assert path is not None
         pose = values.get('part_pose', self.file.part_pose)
-        read = partial(read_campaign, path, self._say, pose)
+        read = partial(read_campaign, path, part_pose=pose, remark=self._note)
         return self._kept(str(pose), 'campaign', path, read)
 
-    def _say(self, line: str) -> None:
-        if not line.startswith('reading '):
-            self.notes[line] = None
+    def _note(self, kind: str, experiment: str, line: str) -> None:
+        self.notes[f'{experiment}: {line}'] = None
 
     def _of_a_film(self, values: Values) -> tuple[str, str, str]:
         mesh, motion = self._named('mesh', values), self._named('trajectory', values)

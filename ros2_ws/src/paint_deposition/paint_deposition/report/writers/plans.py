@@ -1,15 +1,13 @@
 """How plans and recommendations are written."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from paint_deposition.api.writers.provenance import input_files, provenance, with_provenance
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
+from paint_deposition.files.provenance import origin
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
@@ -18,73 +16,81 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.trade_off import Point
-from paint_deposition.report.drawing import HERE, DrawingProcess, Here
+from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.report.pictures.geometry import write_geometry_picture
+from paint_deposition.report.pictures.improvement import write_improvement_picture
+from paint_deposition.report.pictures.measuring_points import write_measuring_picture
+from paint_deposition.report.pictures.trade_off import write_trade_off
+from paint_deposition.report.pictures.uniformity import write_uniformity
 from paint_deposition.report.writers.improvement import write_improvement
 from paint_deposition.report.writers.measuring import write_chosen_readings
 from paint_deposition.report.writers.plan import write_plan
 from paint_deposition.report.writers.trade_off import write_trade_off_table
+from paint_deposition.report.writers.write import input_files, with_provenance, written
 
-PNG = 'png'
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
 ROBOT_FRAME = 'base_link'
 
 
-def recommendation(
+@written.register
+def _recommendation(
     result: Recommendation,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     model: DepositionModel | None = None,
-    pictures: str = PNG,
+    pictures: str = 'png',
 ) -> list[Path]:
     files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
-    write_json(files[0], result.to_dict() | provenance(model, input_files(made_from or {})))
-    HERE.start('uniformity:write_uniformity', files[1], result).result()
+    write_json(
+        files[0], result.to_dict() | {'provenance': origin(model, input_files(made_from or {}))}
+    )
+    write_uniformity(files[1], result)
     return files
 
 
-def plan(
+@written.register(Plan)
+@written.register(PartPlan)
+def _plan(
     result: Plan | PartPlan,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
-    pictures: str = PNG,
+    pictures: str = 'png',
     trade_off: Sequence[Point] = (),
-    drawing: DrawingProcess | Here = HERE,
 ) -> list[Path]:
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    film = drawing.start(
-        'film:write_film_picture', Path(folder) / f'film.{pictures}', result.surface,
-        result.film_um, result.path, result.statistics, 'Planned passes and their film',
-        result.sentence,
-    )  # fmt: skip
     files = write_plan(folder, result, result.surface, about, part)
+    film = write_film_picture(
+        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
+        result.statistics, 'Planned passes and their film', result.sentence,
+    )  # fmt: skip
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
         geometry = spray_geometry(result.surface, result.path, result.model, frame_id)
         geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
         files.append(Path(folder) / f'passes.{pictures}')
-        drawing.start(
-            'geometry:write_geometry_picture', files[-1], result.surface, result.path, geometry,
-            'Planned passes over the faces',
-        ).result()  # fmt: skip
-        return [*files, film.result()]
+        write_geometry_picture(
+            files[-1], result.surface, result.path, geometry, 'Planned passes over the faces'
+        )
+        return [*files, film]
     plain, weighed = result.plain or result, []
     if trade_off:
-        weighed = _write_trade_off(Path(folder), plain.point, trade_off, pictures, drawing)
-    return [*files, film.result(), *weighed]
+        weighed = _write_trade_off(Path(folder), plain.point, trade_off, pictures)
+    return [*files, film, *weighed]
 
 
-def improvement(
+@written.register
+def _improvement(
     result: Improvement,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
-    pictures: str = PNG,
+    pictures: str = 'png',
     trade_off: Sequence[Point] = (),
 ) -> list[Path]:
     notes = {'notes': (*result.surface.notes, *result.given.notes)}
@@ -92,10 +98,9 @@ def improvement(
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_improvement(folder, result, about, part)
     picture = Path(folder) / f'improvement.{pictures}'
-    # The result has the model in it, with effects that another process may not know.
-    files.append(HERE.start('improvement:write_improvement_picture', picture, result).result())
+    files.append(write_improvement_picture(picture, result))
     if trade_off:
-        files += _write_trade_off(Path(folder), result.points[0], trade_off, pictures, HERE)
+        files += _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
     return files
 
 
@@ -104,27 +109,24 @@ def _write_trade_off(
     given: Point,
     points: Sequence[Point],
     pictures: str,
-    drawing: DrawingProcess | Here,
 ) -> list[Path]:
     """Table and picture of other weights of the paint."""
     picture = folder / f'pareto.{pictures}'
-    drawn = drawing.start('trade_off:write_trade_off', picture, given, points)
-    return [write_trade_off_table(folder / 'pareto.csv', points), drawn.result()]
+    table = write_trade_off_table(folder / 'pareto.csv', points)
+    return [table, write_trade_off(picture, given, points)]
 
 
-def chosen_readings(
+@written.register
+def _chosen_readings(
     result: ChosenReadings,
     folder: str | Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
-    pictures: str = PNG,
+    pictures: str = 'png',
 ) -> list[Path]:
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
     files = write_chosen_readings(folder, result, about, part)
     picture = Path(folder) / f'points.{pictures}'
-    return [
-        *files,
-        HERE.start('measuring_points:write_measuring_picture', picture, result).result(),
-    ]
+    return [*files, write_measuring_picture(picture, result)]

@@ -7,7 +7,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-from paint_deposition.api.simulation import Film
+from paint_deposition.film.film import Film
 from paint_deposition.inference.comparison.comparison import Comparison
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
