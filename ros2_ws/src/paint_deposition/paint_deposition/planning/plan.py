@@ -120,6 +120,15 @@ class Plan:
             f'{self.cycle_time_s:.1f} s'
         )
 
+    @property
+    def comparison(self) -> str:
+        """What the part's shape makes of passes for a plane, in a sentence."""
+        return (
+            f'on a plane: sigma_n {100 * self.plane.sigma_n:.1f} % at '
+            f'{self.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
+            f'{100 * self.plane_on_part.sigma_n:.1f} %'
+        )
+
     def __repr__(self) -> str:
         return f'Plan({self.sentence})'
 

@@ -82,7 +82,8 @@ def improvement_picture(result: Improvement) -> Figure:
 def _scale(result: Improvement) -> ColourScale:
     target = result.target_um
     off = [
-        np.abs(one.film_um[result.judged] / target - 1.0) for one in (result.before, result.after)
+        np.abs(one.film_um[result.target_region] / target - 1.0)
+        for one in (result.before, result.after)
     ]
     reach = float(np.quantile(np.concatenate(off), SHOWN))
     reach = min(max(math.ceil(reach / STEP) * STEP, 2.0 * STEP), 0.95)

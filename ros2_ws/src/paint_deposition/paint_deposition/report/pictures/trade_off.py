@@ -3,12 +3,14 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from paint_deposition.planning.trade_off import Point
+from paint_deposition.planning.plan import TradeOffPoint
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 
 
-def write_trade_off(path: str | Path, given: Point, points: Sequence[Point]) -> Path:
+def write_trade_off(
+    path: str | Path, given: TradeOffPoint, points: Sequence[TradeOffPoint]
+) -> Path:
     """Draw unevenness over paint for a programme as given and for each weight."""
     figure = new_figure(7.0, 4.6)
     axes = figure.subplots()
