@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
+from paint_deposition.planning.requests import ImproveRequest
+
 Number = float | None
 Count = Annotated[int, Field(ge=0)]
 Share = Annotated[float, Field(ge=0.0, le=1.0)]
@@ -190,23 +192,19 @@ output(
 )  # fmt: skip
 output(
     'improvement',
-    'target_um tolerance judged_area_m2 area_m2 sigma_n_of_path program_difference',
+    'target_um tolerance target_region_m2 area_m2 sigma_n_of_path program_difference',
     **each(
         BeforeAfter,
         'mean_um sigma_n min_um max_um within paint_cm3 on_part_cm3 spraying_s cycle_s',
     ),
     sigma_n_interval=figures(before=Pair, after=Pair) | None,
-    held_back=list[figures('sigma_n', name=str)],
+    binding_limits=list[figures('sigma_n', name=str)],
     passes=list[
         figures('opens_earlier_m closes_later_m opens_earlier_s closes_later_s', number=int,
                 axis=Literal['x', 'y', 'z'], flow=Pair, sentence=str,
                 stretches=list[figures('begin_m end_m before_m_per_s after_m_per_s')])
     ],
-    limits=figures(
-        'speed_min_m_per_s speed_max_m_per_s acceleration_m_per_s2 jerk_m_per_s3 move_min_m '
-        'settings_per_s flow_min flow_max trigger_shift_m trigger_cut_m film_min_um film_max_um'
-    ),
-    wish=figures('target_um tolerance paint_weight time_weight smoothness beyond_tolerance'),
+    request=ImproveRequest,
     sentence=str, model_sha256=Sha256, notes=Words, warnings=Words,
 )  # fmt: skip
 Point = figures(

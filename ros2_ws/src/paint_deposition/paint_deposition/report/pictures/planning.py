@@ -14,8 +14,8 @@ from paint_deposition.film.colour_scales import OVER_RGB, TABLE, UNDER_RGB, Colo
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.planning.improvement.improvement import Improvement, LaidFilm
 from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
+from paint_deposition.planning.plan import TradeOffPoint
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.planning.trade_off import Point
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
@@ -100,7 +100,9 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
     legend(axes, loc='upper right', ncols=3)
 
 
-def write_trade_off(path: str | Path, given: Point, points: Sequence[Point]) -> Path:
+def write_trade_off(
+    path: str | Path, given: TradeOffPoint, points: Sequence[TradeOffPoint]
+) -> Path:
     """Draw unevenness over paint for a programme as given and for each weight."""
     figure = new_figure(7.0, 4.6)
     axes = figure.subplots()
@@ -178,7 +180,8 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
 def _scale(result: Improvement) -> ColourScale:
     target = result.target_um
     off = [
-        np.abs(one.film_um[result.judged] / target - 1.0) for one in (result.before, result.after)
+        np.abs(one.film_um[result.target_region] / target - 1.0)
+        for one in (result.before, result.after)
     ]
     reach = float(np.quantile(np.concatenate(off), SHOWN))
     reach = min(max(math.ceil(reach / STEP) * STEP, 2.0 * STEP), 0.95)

@@ -13,9 +13,8 @@ from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.plan import Plan, TradeOffPoint
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.planning.trade_off import Point
 from paint_deposition.report.pictures.film import write_film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
@@ -24,10 +23,12 @@ from paint_deposition.report.pictures.planning import (
     write_trade_off,
     write_uniformity,
 )
-from paint_deposition.report.writers.improvement import write_improvement
 from paint_deposition.report.writers.measuring import write_chosen_readings
-from paint_deposition.report.writers.plan import write_plan
-from paint_deposition.report.writers.trade_off import write_trade_off_table
+from paint_deposition.report.writers.passes import (
+    write_improvement,
+    write_plan,
+    write_trade_off_table,
+)
 from paint_deposition.report.writers.write import input_files, with_provenance, written
 
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
@@ -59,7 +60,7 @@ def _plan(
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
-    trade_off: Sequence[Point] = (),
+    trade_off: Sequence[TradeOffPoint] = (),
 ) -> list[Path]:
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
@@ -93,7 +94,7 @@ def _improvement(
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
-    trade_off: Sequence[Point] = (),
+    trade_off: Sequence[TradeOffPoint] = (),
 ) -> list[Path]:
     notes = {'notes': (*result.surface.notes, *result.given.notes)}
     about = with_provenance(notes | dict(made_from or {}), result.model)
@@ -108,8 +109,8 @@ def _improvement(
 
 def _write_trade_off(
     folder: Path,
-    given: Point,
-    points: Sequence[Point],
+    given: TradeOffPoint,
+    points: Sequence[TradeOffPoint],
     pictures: str,
 ) -> list[Path]:
     """Table and picture of other weights of the paint."""

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.pass_films import LineFilms
+from paint_deposition.planning.films import LineFilms
 
 INDICES, OFFSETS = 25, 25
 # One pass less is worth this much evenness: relative, and in sigma_n itself.
