@@ -1,6 +1,8 @@
 """Rows of the report's tables."""
 
+import csv
 from dataclasses import astuple
+from io import StringIO
 from itertools import product
 from typing import Any
 
@@ -9,6 +11,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.statistics import film_statistics
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.report.data import ReportData
@@ -18,7 +21,6 @@ from paint_deposition.report.words import (
     effect_meaning,
     effect_name,
     in_unit,
-    learned_range,
     learned_words,
     micrometres,
     number,
@@ -30,42 +32,30 @@ NEGLIGIBLE = 1e-4
 LOW, IN, HIGH = 'low', 'in', 'high'
 
 
-def painted_lines(data: ReportData) -> list[str]:
-    """How the gun ran over each part and what is odd about it, a line each."""
-    lines = []
-    for name, geometry in data.comparisons[-1].geometry.items():
-        lines.append(f'{name}: {geometry.sentence}')
-        lines += [f'{name}: {warning}' for warning in geometry.warnings]
-    return lines
-
-
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
     """Candidate causes with the effects they are confounded with, and parameters."""
     if data.diagnosis is None:
         return []
-    rows = []
-    for found in data.diagnosis.classes:
-        effect = data.effect_class(found.best)
-        rows.append(
-            {
-                'id': found.best,
-                'found': found,
-                'name': effect_name(found.best),
-                'like': [m for m in found.members if m != found.best],
-                'others': [effect_name(m) for m in found.members if m != found.best],
-                'accepted': found.best in data.diagnosis.accepted,
-                'meaning': effect_meaning(effect),
-                'signature': effect.signature if effect else '',
-                'parameters': [
-                    *(
-                        _parameter(effect, name, *astuple(value))
-                        for name, value in found.parameters.items()
-                    ),
-                    *_learned(data.model.effect(found.best)),
-                ],
-            }
-        )
-    return rows
+    return [_class_row(data, data.diagnosis, found) for found in data.diagnosis.classes]
+
+
+def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> dict[str, Any]:
+    effect = data.effect_class(found.best)
+    like = [member for member in found.members if member != found.best]
+    parameters = [
+        _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
+    ]
+    return {
+        'id': found.best,
+        'found': found,
+        'name': effect_name(found.best),
+        'like': like,
+        'others': [effect_name(member) for member in like],
+        'accepted': found.best in diagnosis.accepted,
+        'meaning': effect_meaning(effect),
+        'signature': effect.signature if effect else '',
+        'parameters': parameters + _learned(data.model.effect(found.best)),
+    }
 
 
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
@@ -105,11 +95,6 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     return rows
 
 
-def learned_rows(data: ReportData) -> list[str]:
-    """Where each learned law of the best model holds."""
-    return [learned_range(law) for law in data.model.effects if isinstance(law, LearnedLaw)]
-
-
 def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
     """What the readings scatter by: what, how much, and how that is known."""
     noise, texture = data.study.noise, data.study.texture
@@ -120,21 +105,6 @@ def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
             ('noise of the gauge, one reading', micrometres(noise.typical_um), noise.source),
             ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
         )
-    ]
-
-
-def level_rows(data: ReportData) -> list[dict[str, Any]]:
-    """By how much parts and gauge sessions differ."""
-    amounts = data.diagnosis.random_effects if data.diagnosis else ()
-    return [
-        {
-            'what': f'{amount.kind} of {amount.of}',
-            'value': f'{amount.value:+.2f}',
-            'sd': f'{amount.sd:.2f}',
-            'unit': amount.unit,
-            'notable': amount.is_notable,
-        }
-        for amount in amounts
     ]
 
 
@@ -191,20 +161,6 @@ def _size(value: float | None, unit: str) -> str:
     return f'{size} {shown_unit}'.strip()
 
 
-def model_rows(data: ReportData) -> list[dict[str, Any]]:
-    """Models side by side: error and bias of each on every part."""
-    return [
-        {
-            'name': name,
-            'effects': ', '.join(effect_name(e.id) for e in c.model.effects) or 'none',
-            'all': c.points,
-            'parts': [m.residuals for m in c.misfits if m.kind == 'experiment'],
-            'regions': len(c.regions),
-        }
-        for name, c in zip(data.names, data.comparisons, strict=False)
-    ]
-
-
 def misfit_rows(data: ReportData) -> list[dict[str, Any]]:
     """Experiments, their groups and passes: bias and RMSE before and after."""
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
@@ -218,8 +174,7 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     """For each part its readings, and its film as the best model predicts it."""
     rows = []
     for k, experiment in enumerate(data.experiments):
-        measured = data.study.measured_um[data.rows_of(k)]
-        painted = data.painted[k][-1]
+        measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
@@ -289,12 +244,9 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
 
 def points_csv(rows: list[dict[str, Any]]) -> str:
     """The same as a table for a spreadsheet."""
-    lines = [','.join(rows[0])]
-    lines += [','.join(_cell(value) for value in row.values()) for row in rows]
-    return '\n'.join(lines) + '\n'
-
-
-def _cell(value: Any) -> str:
-    if isinstance(value, str):
-        return f'"{value.replace(chr(34), 2 * chr(34))}"' if set(value) & set(',"\n') else value
-    return f'{value:.3f}'
+    text = StringIO()
+    table = csv.writer(text, lineterminator='\n')
+    table.writerow(rows[0])
+    for row in rows:
+        table.writerow(v if isinstance(v, str) else f'{v:.3f}' for v in row.values())
+    return text.getvalue()
