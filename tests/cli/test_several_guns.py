@@ -149,16 +149,21 @@ def test_what_does_not_go_together_is_refused(bags, tmp_path, words, message):
     assert_refused(done, message)
 
 
+def write_readings(path, surface, film_um):
+    """The film at some vertices in the middle of the panel, to the last bit."""
+    inside = np.flatnonzero(np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.2)[::5]
+    rows = np.column_stack([surface.vertices_m, film_um])[inside]
+    table = '\n'.join(','.join(map(repr, row.tolist())) for row in rows)
+    path.write_text(f'x_m,y_m,z_m,thickness_um\n{table}\n')
+
+
 def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path):
     """A law that counts a gun's own passes counts them so in a campaign, too."""
     model = DepositionModel().with_effect(FlowDrift(drift_per_pass=0.2))
     films = [pd.simulate(surface, motion, model).film_um for motion in (UPPER, LOWER)]
     film = pd.simulate(surface, [UPPER, LOWER], model)
     assert np.array_equal(film.film_um, films[0] + films[1])
-    inside = np.flatnonzero(np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.2)[::5]
-    rows = np.column_stack([surface.vertices_m, film.film_um])[inside]
-    table = '\n'.join(','.join(map(repr, row.tolist())) for row in rows)
-    (tmp_path / 'film.csv').write_text(f'x_m,y_m,z_m,thickness_um\n{table}\n')
+    write_readings(tmp_path / 'film.csv', surface, film.film_um)
     guns = [
         {'pose_topic': '/robot_1/atomizer/pose'},
         {'trajectory': str(bags['lower'])},
@@ -179,10 +184,7 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
 def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, tmp_path):
     bell = DepositionModel()
     film = pd.simulate(surface, [UPPER, LOWER], [bell, THIN]).film_um
-    inside = np.flatnonzero(np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.2)[::5]
-    rows = np.column_stack([surface.vertices_m, film])[inside]
-    table = '\n'.join(','.join(map(repr, row.tolist())) for row in rows)
-    (tmp_path / 'film.csv').write_text(f'x_m,y_m,z_m,thickness_um\n{table}\n')
+    write_readings(tmp_path / 'film.csv', surface, film)
     guns = [{'trajectory': str(bags['upper'])}, {'trajectory': str(bags['lower']), 'brush': 2}]
     entry = {'mesh': str(PANEL), 'measurements': 'film.csv', 'guns': guns, 'brush': 1}
     campaign = tmp_path / 'campaign.yaml'
