@@ -24,8 +24,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.files.measuring_points import MeasuringPoints
-from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.gauge_readings import MeasuringPoints
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.film import point_rows

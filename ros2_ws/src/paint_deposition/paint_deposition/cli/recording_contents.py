@@ -10,16 +10,11 @@ import click
 
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.pose_tables.reading import (
-    PoseLayout,
-    is_pose_table,
-    read_pose_table,
-)
 from paint_deposition.files.provenance import origin
-from paint_deposition.files.rapid.motion import is_rapid, program_as_text
-from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
 from paint_deposition.files.recordings.bag_summary import BagSummary, summarise
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, TF_TYPES
+from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.motion.trajectory import Trajectory
 
 

@@ -41,5 +41,5 @@ def film(
         files.append(write_film_table(table, result.surface, result.film_um))
     if result.readings is not None and result.predicted_um is not None:
         files.append(Path(folder) / 'predicted.csv')
-        write_predictions(files[-1], result.readings.source, result.predicted_um)
+        write_predictions(files[-1], result.readings, result.predicted_um)
     return [*files, picture.result()]
