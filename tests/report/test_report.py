@@ -17,8 +17,8 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.files.measuring_points import MeasuringPoints
-from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.gauge_readings import MeasuringPoints
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
