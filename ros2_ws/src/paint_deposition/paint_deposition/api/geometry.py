@@ -10,8 +10,11 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.surface import Surface

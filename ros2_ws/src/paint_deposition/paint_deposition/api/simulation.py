@@ -17,13 +17,13 @@ from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precis
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.readings import Readings
 
 Progress = Callable[[str, float], None]
 
