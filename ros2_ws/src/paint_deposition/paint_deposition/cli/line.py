@@ -44,20 +44,19 @@ def line_command(
     from paint_deposition.files.parquet import MANY, require_libraries
 
     require_libraries('paint line', MANY)
-    from paint_deposition.batch.cluster.finished import NAME, Finished
-    from paint_deposition.batch.cluster.run import finish
-    from paint_deposition.batch.cluster.workers import require_alone
-    from paint_deposition.batch.line.job import line_cases, shared_files
+    from paint_deposition.batch.cases import FOLDER, ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
+    from paint_deposition.batch.line.output import write_line
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
-    from paint_deposition.batch.line.writing import write_line
+    from paint_deposition.batch.line.runs import line_cases, shared_files
 
     require_alone(scheduler, count)
     with Progress('line') as tell:
         tell('reading')
         cases, file, model, strays = line_cases(folder)
-        finished, digests = Finished(output / NAME), [case.digest for case in cases]
-        done, told = finish(scheduler, count, computed, cases, {}, finished, tell)
+        finished, digests = ResultCache(output / FOLDER), [case.digest for case in cases]
+        done, told = compute(scheduler, count, computed, cases, {}, finished, tell)
         told = told or 'none: every run had been finished'
         say_all('note', [f'workers: {told}'])
         tell('pooling')

@@ -76,9 +76,8 @@ def sweep_command(
     from paint_deposition.files.parquet import MANY, require_libraries
 
     require_libraries('paint sweep', MANY)
-    from paint_deposition.batch.cluster.finished import NAME, Finished
-    from paint_deposition.batch.cluster.run import finish
-    from paint_deposition.batch.cluster.workers import require_alone
+    from paint_deposition.batch.cases import FOLDER, ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
     from paint_deposition.batch.sweep.case import computed
     from paint_deposition.batch.sweep.job import Job
     from paint_deposition.batch.sweep.result import Sweep, write_sweep
@@ -88,9 +87,9 @@ def sweep_command(
     with Progress('sweep') as tell:
         tell('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, tell)
-        finished = Finished(output / NAME)
+        finished = ResultCache(output / FOLDER)
         say_all('note', job.notes)
-        done, told = finish(scheduler, count, computed, job.cases, job.inputs, finished, tell)
+        done, told = compute(scheduler, count, computed, job.cases, job.inputs, finished, tell)
         told = told or 'none: every case had been finished'
         say_all('note', [f'workers: {told}'])
         tell('writing and drawing')
