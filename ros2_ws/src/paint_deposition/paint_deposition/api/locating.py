@@ -9,8 +9,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.gauge_readings import read_points
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.scan_registration import register
-from paint_deposition.motion.touched_points import PartPlace, locate
+from paint_deposition.motion.part_location import PartPlace, locate, register
 
 # For distances the surface need not be refined.
 UNREFINED_M = 10.0

@@ -1,8 +1,8 @@
 """Passes: the stretches along one line of the part on which the gun sprays.
 
-A pass goes on over openings and closings of the gun along its line, and the links between passes
-are none. The state machine runs over the sub-steps in order and is carried from call to call.
-Each sub-step raises these events in the order of the table.
+A pass continues over openings and closings of the gun along its line; links between passes are no
+passes. The state machine runs over the sub-steps in order and its state is carried from call to
+call. Each sub-step raises these events in the order of the table.
 
 =======  ======================================  =======  ====================================
 state    event                                   next     what happens
@@ -29,7 +29,7 @@ import numpy as np
 from numba import njit
 
 from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.motion.heading import (
+from paint_deposition.motion.strokes import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,
     carry,
@@ -69,7 +69,7 @@ def first_pass(flow_before: float) -> np.ndarray:
 
 
 @njit
-def _go_on(state, heading, step, after_gap):
+def _continue(state, heading, step, after_gap):
     """Follow a pass that runs to here, or end it."""
     if after_gap or (step > 0.0 and leaves(heading, state.mean, state.carried)):
         _end(state)
@@ -122,8 +122,7 @@ def follow_passes(states, position, normal, heading, step, flow, after_gap):
 
     Args:
         states: (1,) record of dtype PASS_STATE, updated in place.
-        position: (M, 3) TCP [m].
-        normal: (M, 3) tool axis z.
+        position, normal: (M, 3) TCP [m] and tool axis z.
         heading, step: (M, 3) and (M,) from ``follow_strokes``.
         flow: (M,) relative to the calibrated flow; 0 is gun off.
         after_gap: (M,) bool, whether poses are missing before the sub-step.
@@ -141,7 +140,7 @@ def follow_passes(states, position, normal, heading, step, flow, after_gap):
                 state.closed_at[k] = state.position[k]
             state.position[k] = position[i, k]
         if state.state == RUNS:
-            _go_on(state, heading[i], step[i], after_gap[i])
+            _continue(state, heading[i], step[i], after_gap[i])
         if after_gap[i]:
             state.flow = 0.0
         if flow[i] > 0.0:

@@ -1,25 +1,40 @@
-"""The report of a line: one HTML file that needs no network."""
+"""The files of a line: tables, figures, picture, and a report that needs no network."""
 
 from __future__ import annotations
 
 import json
+from collections import Counter
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
 from paint_deposition import __version__
+from paint_deposition.batch.line.changes import (
+    FEWEST,
+    RUN_LENGTH,
+    SECONDS_A_DAY,
+    Series,
+    date,
+)
+from paint_deposition.batch.line.result import DERIVATIVES, Line
 from paint_deposition.files.atomic import write_text
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.batch.line.change_points import date
-from paint_deposition.batch.line.result import Line
-from paint_deposition.batch.line.series import FEWEST, RUN_LENGTH, Series
 from paint_deposition.report.page.layout import axis, base_layout
 from paint_deposition.report.page.report import TEMPLATES as SHARED
+from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK
 from paint_deposition.report.words import unit_words
 
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+MOST_SHOWN = 6
 TEMPLATES = Path(__file__).parent / 'templates'
 HEIGHT = 240
 MARGIN = 0.03
@@ -32,10 +47,88 @@ LEGEND = (
 )  # fmt: skip
 
 
-def write_line_report(path: Path, line: Line) -> Path:
-    """Write the page, whole or not at all."""
-    write_text(path, line_html(line))
-    return path
+def write_line(line: Line, folder: Path, pictures: str = 'png') -> list[Path]:
+    """Write everything to a folder; returns the paths."""
+    table = line.table
+    own = [name for name in DERIVATIVES if name in table.column_names]
+    files = [
+        write_parquet(folder / 'points.parquet', _with_time(table.drop_columns(own))),
+        write_parquet(folder / 'parts.parquet', _with_time(_parts(line))),
+        folder / 'line.json',
+    ]
+    write_json(files[-1], line.to_dict())
+    if line.series:
+        files.append(folder / f'line.{pictures}')
+        _write_picture(files[-1], line)
+    files.append(folder / 'report.html')
+    write_text(files[-1], line_html(line))
+    return files
+
+
+def _parts(line: Line) -> pa.Table:
+    """A row for each part: when, its film as computed, and what its readings say."""
+    import pyarrow as pa
+
+    columns = line.table.to_pydict()
+    there = columns.get('measured_um', [])
+    measured = Counter(
+        p for p, value in zip(columns['part'], there, strict=False) if value is not None
+    )
+    place = {part.name: row for row, part in enumerate(line.parts)}
+    rows: list[dict[str, Any]] = []
+    for run in line.runs:
+        row = place.get(run['part'])
+        readings: dict[str, Any] = {'readings': measured[run['part']]}
+        for series in line.series:
+            name = {'level': 'level_percent'}.get(series.name, series.name)
+            readings[name] = None if row is None else float(series.values[row])
+            readings[f'{name}_sd'] = None if row is None else float(series.sd[row])
+        rows.append(run | readings)
+    return pa.Table.from_pylist(rows)
+
+
+def _with_time(table: pa.Table) -> pa.Table:
+    """With the column ``time_s``, seconds since 1970, also as date and time."""
+    import pyarrow as pa
+
+    microseconds = [None if s is None else round(1e6 * s) for s in table['time_s'].to_pylist()]
+    return table.append_column('time', pa.array(microseconds, pa.timestamp('us', 'UTC')))
+
+
+def _write_picture(path: Path, line: Line) -> None:
+    """Draw the charts of values; line has at least one series."""
+    causes = line.pooled.causes if line.pooled else ()
+    names = {f'{cause.effect}.{cause.parameter}' for cause in causes}
+    names |= {'level', 'misfit'} | {change.series for change in line.changes}
+    shown = [one for one in line.series if one.name in names][:MOST_SHOWN]
+    figure = new_figure(9.0, 2.4 * len(shown) + 0.4)
+    rows = figure.subplots(len(shown), 1, squeeze=False, sharex=True)[:, 0]
+    for axes, series in zip(rows, shown, strict=True):
+        unit = unit_words(series.unit)
+        quiet(axes, '', series.name.replace('.', '\n') + (f' [{unit}]' if unit else ''), size=9.0)
+        _draw_series(axes, line, series)
+    legend(rows[0], loc='upper left', bbox_to_anchor=(0.0, 1.16), ncols=4)
+    figure.suptitle(line.sentence, x=0.01, ha='left', fontsize=10, color=INK)
+    save_picture(figure, path)
+
+
+def _draw_series(axes: Axes, line: Line, series: Series) -> None:
+    times = line.times_s / SECONDS_A_DAY  # as matplotlib counts dates
+    axes.xaxis.set_major_locator(dates := AutoDateLocator())
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(dates, show_offset=False))
+    limit = series.charts.shewhart_limit * series.deviation
+    axes.fill_between(
+        times, series.centre - limit, series.centre + limit, color=BEFORE, alpha=0.2, linewidth=0,
+        label="Shewhart's limits",
+    )  # fmt: skip
+    axes.axhline(series.centre, color=BEFORE, linewidth=1.0, label='centre')
+    axes.plot(times, series.values, '.', color=ACCENT, markersize=4, label='part', zorder=3)
+    for change in (one for one in line.changes if one.series == series.name):
+        begin = change.time_s / SECONDS_A_DAY
+        first = change.before if change.kind == 'drift' else change.after
+        axes.plot([begin, times[-1]], [first, change.after], color=COMPONENTS[0], linewidth=2.0,
+                  label='change')  # fmt: skip
+        axes.axvline(begin, color=COMPONENTS[0], linewidth=1.0, linestyle=':')
 
 
 def title_of(line: Line) -> str:
