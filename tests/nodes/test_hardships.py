@@ -19,11 +19,11 @@ from nodes.cell import Onlooker, Robot, two_passes, write_panel
 from nodes.processes import NodeProcess
 from nodes.recording.runs import NUMBERED, UNCOUNTED
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 POSES = 1500
 MOTION = two_passes(poses=POSES, trigger=False)
-STATS = {'thickness/stats': (ThicknessStats, qos.LATCHED)}
+STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
 COARSE = {'max_edge_length_m': 0.05}
 
 

@@ -19,7 +19,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 SIMULATOR = 'deposition_simulator'
 COMPARISON = 'model_comparison'
@@ -83,7 +83,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     """The recorder is there at once, the simulator seconds later; both get every pose."""
     mesh = write_panel(tmp_path / 'panel.stl')
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
-    statistics = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    statistics = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
     with (
         NodeProcess(tmp_path / 'player', PLAYER, bag=bag, wait_for_subscribers=2) as player,
         NodeProcess(

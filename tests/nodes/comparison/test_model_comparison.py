@@ -24,7 +24,7 @@ from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
@@ -76,9 +76,9 @@ def viewer(ros_context, spin):
     node = Onlooker(
         ros_context,
         {
-            'comparison/stats': (ComparisonStats, qos.LATCHED),
-            'comparison/mesh': (Marker, qos.LATCHED),
-            'comparison/legend': (MarkerArray, qos.LATCHED),
+            'comparison/stats': (ComparisonStats, topics.LATCHED),
+            'comparison/mesh': (Marker, topics.LATCHED),
+            'comparison/legend': (MarkerArray, topics.LATCHED),
         },
     )
     spin(node)

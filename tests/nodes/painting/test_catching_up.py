@@ -17,12 +17,12 @@ from nodes.cell import Robot, offline_um, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 POSES = 900
 MOTION = two_passes(poses=POSES)
 KILLED_AT, AGAIN_AT = 350, 500
-STATS = {'thickness/stats': (ThicknessStats, qos.LATCHED)}
+STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
 
 
 def test_it_catches_up_from_the_running_recording(

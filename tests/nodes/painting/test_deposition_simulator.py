@@ -29,7 +29,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 from paint_deposition.part.facing import toward_the_gun
 
@@ -136,7 +136,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         pose_queue_depth=5000,
     )
     assert len(node.surface.faces) > 100_000
-    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+    viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
     motion = two_passes(poses=1500, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
     player = 'bag_player'

@@ -20,7 +20,7 @@ from nodes.cell import two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 CHANGES = 'thickness/changes'
@@ -62,7 +62,7 @@ class Viewer:
 @pytest.fixture
 def viewer(onlooker):
     def viewer() -> Viewer:
-        return Viewer(onlooker({CHANGES: (PointCloud2, qos.RESULTS)}))
+        return Viewer(onlooker({CHANGES: (PointCloud2, topics.RESULTS)}))
 
     return viewer
 
@@ -131,7 +131,7 @@ def test_nothing_large_is_made_for_nobody(simulator, robot, painted):
     robot(node).send(MOTION)
     painted(node)
     node.publish()
-    assert not {'mesh', 'cloud', 'field'} & set(vars(node.shown_as))
+    assert not {'mesh', 'cloud', 'field'} & set(vars(node.display.shown_as))
 
 
 def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooker, wait_until,
@@ -139,7 +139,7 @@ def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooke
     """Nobody is sent the next message before all have taken the last one, and none is lost."""
     node = simulator(publish_rate_hz=30.0)
     source = robot(node)
-    other = onlooker({'thickness/field': (ThicknessField, qos.RESULTS)})
+    other = onlooker({'thickness/field': (ThicknessField, topics.RESULTS)})
     with NodeProcess(tmp_path / 'listener', '', code=LISTENER) as listener:
         wait_until(lambda: 'heard' in listener.out, what='the listener')
         listener.stall()
@@ -196,11 +196,11 @@ def test_a_large_mesh_comes_in_parts_and_only_those_that_change(simulator, robot
     assert tiles > 5
 
     def viewer() -> MeshViewer:
-        return MeshViewer(onlooker({'thickness/mesh': (Marker, qos.LATCHED)}))
+        return MeshViewer(onlooker({'thickness/mesh': (Marker, topics.LATCHED)}))
 
     def expected(film: np.ndarray) -> np.ndarray:
         rgba = film_scale(film, 0.0, 40.0).rgba(film, film > 1.0)
-        corners = [node.shown_as.corners(tile) for tile in range(tiles)]
+        corners = [node.display.shown_as.corners(tile) for tile in range(tiles)]
         return rgba[np.concatenate(corners)] / np.float32(255.0)
 
     early = viewer()
@@ -221,3 +221,26 @@ def test_a_large_mesh_comes_in_parts_and_only_those_that_change(simulator, robot
         shown[number] = colours
     late = viewer()
     wait_until(lambda: late.shows(whole), what='the whole mesh')
+
+
+def test_parts_that_a_busy_listener_never_took_come_again(simulator, onlooker, executor,
+                                                          monkeypatch, wait_until):  # fmt: skip
+    """Its middleware has acknowledged them, and its queue of one has kept only the last."""
+    monkeypatch.setattr('paint_deposition.nodes.painting.film_messages.MOST_FACES', 300)
+    node = simulator()
+    viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
+    sent: list[int] = []
+    tile = node.display.shown_as.tile
+    monkeypatch.setattr(
+        node.display.shown_as, 'tile', lambda number: sent.append(number) or tile(number)
+    )
+    wait_until(lambda: viewer.heard['thickness/mesh'], what='the first part')
+    executor.remove_node(viewer)
+    wait_until(lambda: set(sent) == set(range(node.display.shown_as.tiles)), what='all parts sent')
+    heard = MeshViewer(viewer)
+    assert len(set(heard.look().numbers())) < node.display.shown_as.tiles
+    executor.add_node(viewer)
+    wait_until(
+        lambda: set(heard.look().numbers()) == set(range(node.display.shown_as.tiles)),
+        what='the rest',
+    )

@@ -21,14 +21,14 @@ from nodes.cell import (
     two_passes,
 )
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 
 
 def test_reset_bares_the_metal(simulator, robot, painted, onlooker, call, wait_until):
     node = simulator()
-    viewer = onlooker({'thickness/field': (ThicknessField, qos.RESULTS)})
+    viewer = onlooker({'thickness/field': (ThicknessField, topics.RESULTS)})
     source = robot(node)
     source.send(MOTION)
     first = painted(node)
@@ -58,7 +58,7 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     mesh = trimesh.load_mesh(folder / 'door_7.ply', process=False)
     assert np.array_equal(mesh.faces, node.surface.faces)
     figures = json.loads((folder / 'door_7.json').read_text())
-    assert figures['mesh_id'] == node.shown_as.mesh_id
+    assert figures['mesh_id'] == node.display.shown_as.mesh_id
     assert figures['poses']['received'] == len(MOTION)
     again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
     assert not again.success
@@ -117,8 +117,8 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     node = simulator()
     viewer = onlooker(
         {
-            'thickness/stats': (ThicknessStats, qos.LATCHED),
-            'thickness/legend': (MarkerArray, qos.LATCHED),
+            'thickness/stats': (ThicknessStats, topics.LATCHED),
+            'thickness/legend': (MarkerArray, topics.LATCHED),
         }
     )
     robot(node).send(MOTION)

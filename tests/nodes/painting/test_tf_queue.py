@@ -7,7 +7,7 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 
-from paint_deposition.nodes.painting.tf_queue import LONGEST, TIMEOUT_S, NoTransform, TfQueue
+from paint_deposition.nodes.painting.frames import LONGEST, TIMEOUT_S, NoTransform, TfQueue
 
 
 class Part:

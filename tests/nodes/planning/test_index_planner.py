@@ -30,7 +30,7 @@ from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
 
@@ -155,7 +155,7 @@ def test_passes_are_planned_on_a_mesh_and_latched(
 ):
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
-    late = Onlooker(ros_context, {'planned_path': (Path, qos.LATCHED)})
+    late = Onlooker(ros_context, {'planned_path': (Path, topics.LATCHED)})
     spin(late)
     wait_until(lambda: late.newest('planned_path'), what='the latched path')
     path = late.newest('planned_path')

@@ -9,7 +9,7 @@ from files.recorded import START_NS, Messages, straight_pass
 from paint_deposition.files.recordings.bags import POSE_TYPE, read_trajectory
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import standard
-from paint_deposition.nodes.recording.log_time import LogTime
+from paint_deposition.nodes.recording.recorded_topic import LogTime
 
 HOUR_NS = 3_600_000_000_000
 

@@ -13,7 +13,7 @@ from std_msgs.msg import String
 
 from files.recorded import START_NS
 from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 
 def test_gaps_and_missed_messages_are_counted(record, publisher, wait_until):
@@ -66,7 +66,7 @@ def test_losses_that_cannot_be_counted_are_not_called_none(record, publisher, wa
 def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
     record()
     got = []
-    cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
+    cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, topics.DIAGNOSTICS)
     poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS))
 

@@ -21,7 +21,7 @@ from paint_deposition.files.recordings.bags import read_trajectory, write_pose_b
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.replay.bag_player import BagPlayer
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -54,7 +54,7 @@ def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_unti
 
 def test_latched_messages_are_recorded_as_latched(record, cell, wait_until):
     """The mesh's statistics came before the recorder; their QoS survives into the bag."""
-    latched = cell.create_publisher(ThicknessStats, 'thickness/stats', qos.LATCHED)
+    latched = cell.create_publisher(ThicknessStats, 'thickness/stats', topics.LATCHED)
     latched.publish(ThicknessStats(mean_um=41.5))
     recorder = record()
     wait_until(
@@ -96,8 +96,8 @@ def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until
 
 def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, cell):
     recorder = record(topics=['chatter', '/cell/gun', 'never'])
-    chatter = publisher(String, 'chatter', qos.RESULTS)
-    gun = publisher(Bool, '/cell/gun', qos.RESULTS)
+    chatter = publisher(String, 'chatter', topics.RESULTS)
+    gun = publisher(Bool, '/cell/gun', topics.RESULTS)
     other = cell.create_publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     other.publish(pose(START_NS))
     chatter.publish(String(data='hello'))
@@ -128,7 +128,7 @@ def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_unti
 def test_the_recorder_reports_progress(record, publisher, wait_until, cell):
     record()
     reports = []
-    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, qos.PROGRESS)
+    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, topics.PROGRESS)
     poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS + 7))
     wait_until(lambda: reports and reports[-1].poses_received == 1, what='a report')

@@ -4,7 +4,7 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from paint_deposition.nodes.replay.pose_window import LOST_AFTER_S, UNHEARD_AFTER_S, PoseWindow
+from paint_deposition.nodes.replay.flow_control import LOST_AFTER_S, UNHEARD_AFTER_S, PoseWindow
 
 
 def published(window: PoseWindow, stamps, now_s: float = 0.0) -> PoseWindow:

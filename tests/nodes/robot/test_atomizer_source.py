@@ -172,7 +172,7 @@ def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
     def status(task):
         return viewer.status(f'atomizer_source: {task}')
 
-    wait_until(lambda: (s := status('robot')) and 'no joint state tells of all' in s.message)
+    wait_until(lambda: (s := status('robot')) and 'no joint state has all' in s.message)
     assert 'wrist_roll' in status('robot').message
     wait_until(lambda: '/io: UInt16 has no number or Bool at .level' in status('signals').message)
     assert status('signals').level == b'\x02'

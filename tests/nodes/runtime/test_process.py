@@ -13,7 +13,7 @@ from pathlib import Path
 import llvmlite.binding as llvm
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.process import run_node
 
 

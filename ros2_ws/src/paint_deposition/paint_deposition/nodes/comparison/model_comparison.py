@@ -11,24 +11,24 @@ from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
 from visualization_msgs.msg import Marker, MarkerArray
 
-from paint_deposition.inference.comparison.residual_field import reached, spreading
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
+from paint_deposition.inference.comparison.residual_field import reached, spreading
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.gauge_noise import gauge_noise
+from paint_deposition.inference.readings.residuals import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, Status, Task
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.node import OK, Status, Task
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.gauge_noise import gauge_noise
-from paint_deposition.inference.readings.residuals import Residuals
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25
@@ -68,7 +68,7 @@ class ModelComparison(PaintingNode):
     def _configure(self) -> None:
         super()._configure()
         self._outputs = {
-            topic: self.watch.publisher(message, topic, qos.LATCHED)
+            topic: self.watch.publisher(message, topic, topics.LATCHED)
             for topic, message in (
                 ('comparison/mesh', Marker),
                 ('comparison/stats', ComparisonStats),

@@ -9,12 +9,14 @@ from functools import cached_property
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
+from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
+from visualization_msgs.msg import Marker
 
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
 from paint_deposition.part.surface import Surface
 
 # Triangles of a marker, which takes 120 bytes for each.
@@ -22,21 +24,21 @@ MOST_FACES = 150_000
 
 
 class ShownFilm:
-    """A part as the simulator shows it: its messages, each made when it is first asked for."""
+    """A part as the simulator shows it: its messages, each made when it is first needed."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
-        self._surface, self._frame_id = surface, frame_id
+        self.surface, self._frame_id = surface, frame_id
         self._made: dict[int, ColouredMesh] = {}
 
     @cached_property
     def mesh_id(self) -> str:
         """Digest of the refined mesh."""
-        return self._surface.mesh_id
+        return self.surface.mesh_id
 
     @property
     def tiles(self) -> int:
         """How many markers the mesh takes."""
-        return -(-len(self._surface.faces) // MOST_FACES)
+        return -(-len(self.surface.faces) // MOST_FACES)
 
     def corners(self, tile: int) -> np.ndarray:
         """(3 F,) vertices at the corners of a marker's triangles."""
@@ -45,7 +47,7 @@ class ShownFilm:
     def tile(self, number: int) -> ColouredMesh:
         """A marker of the mesh."""
         if number not in self._made:
-            faces, vertices = self._faces_of(number), self._surface.vertices_m
+            faces, vertices = self._faces_of(number), self.surface.vertices_m
             self._made[number] = ColouredMesh(vertices, faces, self._frame_id, 'thickness', number)
         return self._made[number]
 
@@ -56,7 +58,7 @@ class ShownFilm:
     @cached_property
     def _faces(self) -> np.ndarray:
         """Those of the part; of a large one along its longest side, so that few markers change."""
-        vertices, faces = self._surface.vertices_m, self._surface.faces
+        vertices, faces = self.surface.vertices_m, self.surface.faces
         if self.tiles == 1:
             return faces
         along = vertices[:, np.ptp(vertices, axis=0).argmax()]
@@ -64,11 +66,60 @@ class ShownFilm:
 
     @cached_property
     def cloud(self) -> FilmCloud:
-        return FilmCloud(self._surface.vertices_m, self._frame_id)
+        return FilmCloud(self.surface.vertices_m, self._frame_id)
 
     @cached_property
     def field(self) -> FilmField:
-        return FilmField(len(self._surface.vertices_m), self.mesh_id, self._frame_id)
+        return FilmField(len(self.surface.vertices_m), self.mesh_id, self._frame_id)
+
+
+class MeshTiles:
+    """The coloured mesh: one marker, or several of a large part, each sent as its colours change.
+
+    To make and send a marker of a million triangles takes half a second, during which poses and
+    statistics wait. A large part therefore goes out in turns.
+
+    Args:
+        shown_as: the part, which has the markers.
+        clear: whether markers of another part are to be removed first.
+    """
+
+    def __init__(self, shown_as: ShownFilm, clear: bool = False) -> None:
+        self._shown_as = shown_as
+        self._clear = clear
+        self._sent: list[tuple[object, np.ndarray] | None] = [None] * shown_as.tiles
+        self._next = 0
+
+    def message(
+        self, edition: object, stamp_ns: int, palette: np.ndarray, rows: np.ndarray, whole: bool
+    ) -> bytes | None:
+        """The next marker, None if there is nothing to show.
+
+        A part of one marker is sent in every edition; of several, those whose colours changed.
+
+        Args:
+            edition: of the film. palette, rows: as for ``ColouredMesh.serialised``.
+            whole: send all of them, as to somebody who is new.
+        """
+        count = len(self._sent)
+        if whole:
+            self._sent = [None] * count
+        if self._clear:
+            self._clear = False
+            return serialize_message(
+                white_marker(Marker.TRIANGLE_LIST, '', 0, '', action=Marker.DELETEALL)
+            )
+        for tile in ((self._next + k) % count for k in range(count)):
+            sent = self._sent[tile]
+            if sent is not None and sent[0] == edition:
+                continue
+            now = rows[self._shown_as.corners(tile)]
+            if sent is not None and count > 1 and np.array_equal(sent[1], now):
+                continue
+            self._sent[tile] = edition, now
+            self._next = (tile + 1) % count
+            return self._shown_as.tile(tile).serialised(stamp_ns, palette, rows)
+        return None
 
 
 def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
@@ -129,7 +180,7 @@ class FilmChanges:
 
     def __init__(self, shown_as: ShownFilm) -> None:
         self._shown_as = shown_as
-        self._told_um: np.ndarray | None = None
+        self._sent_um: np.ndarray | None = None
 
     def message(
         self, stamp_ns: int, film_um: np.ndarray, whole: bool, exact: bool
@@ -138,15 +189,15 @@ class FilmChanges:
 
         Args:
             film_um: (V,) the film as it is now [um].
-            whole: tell all of it, as the first time.
-            exact: tell every change, also what no gauge would show.
+            whole: show all of it, as the first time.
+            exact: show every change, also what no gauge would show.
         """
         cloud = self._shown_as.cloud
-        if whole or self._told_um is None:
-            self._told_um = film_um.astype(np.float32)
+        if whole or self._sent_um is None:
+            self._sent_um = film_um.astype(np.float32)
             return cloud.message(stamp_ns, film_um)
         now_um = film_um.astype(np.float32)
-        change_um = np.abs(now_um - self._told_um)
+        change_um = np.abs(now_um - self._sent_um)
         vertices = np.flatnonzero(change_um > (0.0 if exact else NO_PAINT_UM))
         if not len(vertices):
             return None
@@ -154,7 +205,7 @@ class FilmChanges:
         message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         for name, column in zip('xyz', cloud.positions_m[vertices].T, strict=True):
             values[name] = column
-        values['thickness_um'] = self._told_um[vertices] = now_um[vertices]
+        values['thickness_um'] = self._sent_um[vertices] = now_um[vertices]
         values['vertex'] = vertices
         return message
 

@@ -9,12 +9,14 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 
-from paint_deposition.nodes.runtime.qos_watch import QosWatch
+from paint_deposition.nodes.runtime.topics import QosWatch
 
 # Of one core that making and sending such a message may take.
 SHARE = 0.2
 # A listener that acknowledges nothing for so long does not hold up the others.
 PATIENCE_S = 5.0
+# What is sent in pieces is sent again so long after the last one, then after twice as long, ...
+REPEAT_S = 1.0
 AT_ONCE = Duration(nanoseconds=0)
 
 
@@ -25,17 +27,33 @@ class LargeTopic:
     link gets fewer of them, never a queue. It also waits for as long as keeps the work within
     ``SHARE`` of a core.
 
+    A middleware acknowledges what it has received, before the listener takes it: the next
+    message then takes its place in a full queue. Where each message shows all there is, the
+    newest is enough. Where each shows a piece, all are sent again when the film rests, after
+    pauses that double, so that a listener that lost some has them in the end.
+
     Args:
         watch: makes the publisher.
         message: its type.
+        in_pieces: whether a message shows only a piece, or what changed.
     """
 
-    def __init__(self, watch: QosWatch, message: type, topic: str, profile: QoSProfile) -> None:
+    def __init__(
+        self,
+        watch: QosWatch,
+        message: type,
+        topic: str,
+        profile: QoSProfile,
+        in_pieces: bool = False,
+    ) -> None:
         self._watch = watch
         self._topic = topic
         self._publisher = watch.publisher(message, topic, profile)
-        self._sent: object = None
+        self.in_pieces = in_pieces
+        self._edition: object = None
+        self._complete = False
         self._greeted = 0
+        self._pause_s = REPEAT_S
         self._sent_s = self._rested_s = 0.0
 
     def offer(self, edition: object, make: Callable[[bool], Any]) -> None:
@@ -43,23 +61,32 @@ class LargeTopic:
 
         Args:
             edition: what the message would show; equal where it would show the same.
-            make: the message, None where there is nothing to say; it is told whether somebody
-                listens who has heard nothing yet.
+            make: the message, None where there is nothing left to show; its argument says whether
+                all is to be shown, to somebody who is new or once more.
         """
-        newcomers = self._watch.newcomers[self._topic]
-        # Not the publisher's own count: it grows before the newcomer is told of.
+        # Not the publisher's own count: it grows before the newcomer is counted.
         if not self._watch.listeners[self._topic]:
-            self._sent = None
+            self._edition = None
             return
-        if (edition == self._sent and newcomers == self._greeted) or not self._is_free():
+        newcomers = self._watch.newcomers[self._topic]
+        known = edition == self._edition and self._complete
+        rested = time.monotonic() - self._sent_s > self._pause_s
+        repeat = known and self.in_pieces and rested
+        whole = self._edition is None or newcomers > self._greeted or repeat
+        if (known and not whole) or not self._is_free():
             return
+        if repeat:
+            self._pause_s *= 2.0
+        elif edition != self._edition:
+            self._pause_s = REPEAT_S
         began_s = time.monotonic()
-        message = make(self._sent is None or newcomers > self._greeted)
+        message = make(whole)
         if message is not None:
             self._publisher.publish(message)
-        self._sent, self._greeted = edition, newcomers
-        self._sent_s = time.monotonic()
-        self._rested_s = began_s + (self._sent_s - began_s) / SHARE
+            self._sent_s = time.monotonic()
+            self._rested_s = began_s + (self._sent_s - began_s) / SHARE
+        self._edition, self._greeted = edition, newcomers
+        self._complete = message is None or not self.in_pieces
 
     def _is_free(self) -> bool:
         now_s = time.monotonic()

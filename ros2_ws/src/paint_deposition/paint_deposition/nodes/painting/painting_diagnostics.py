@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
-from paint_deposition.nodes.painting.atomizer_input import AtomizerInput, several_guns
+from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.messages import of_gun
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.topics import of_gun
 
 # Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
@@ -33,9 +33,9 @@ IN_WORDS = {
 }
 
 
-def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
+def poses_status(node: PaintingNode, number: int) -> Status:
     """A gun's motion since the last reset: what came and what was wrong with it."""
-    film = node.film.guns[source.number]
+    source, film = node.inputs[number], node.film.guns[number]
     counts = film.counts
     rhythm_ns = source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
@@ -110,7 +110,7 @@ def topics_status(node: PaintingNode) -> Status:
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """Part and model."""
     guns = node.film.guns
-    factor = sum(each.value for each in node.real_time_factors)
+    factor = node.real_time_factor
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
@@ -155,8 +155,8 @@ def painting_tasks(
 ) -> dict[str, Callable[[], Status]]:
     """The tasks by name; `film_values` are added to those of the film."""
     poses = {
-        of_gun(source.name, 'poses'): functools.partial(poses_status, node, source)
-        for source in node.inputs
+        of_gun(source.name, 'poses'): functools.partial(poses_status, node, number)
+        for number, source in enumerate(node.inputs)
     }
     return {
         **poses,

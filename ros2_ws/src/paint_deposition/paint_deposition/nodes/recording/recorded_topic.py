@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
-if TYPE_CHECKING:  # older distributions have no such name
-    from rclpy.subscription import MessageInfo
-
+# Messages of one topic come out of order by less.
+LEAST_STEP_NS = 1_000_000_000
 # (topic, serialised message, time received [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
 
@@ -78,14 +86,14 @@ class RecordedTopic:
             while taken := handle.take_message(self._message_class, True):
                 self._on_message(*taken)
 
-    def _on_message(self, cdr: bytes, info: MessageInfo) -> None:
+    def _on_message(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
         self._take(self.name, cdr, info['received_timestamp'], info['source_timestamp'])
 
-    def _count_missed(self, info: MessageInfo) -> None:
+    def _count_missed(self, info: Mapping[str, Any]) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
         if number is None or gid is None:
             self.unnumbered += 1
@@ -101,3 +109,51 @@ class RecordedTopic:
             self.gaps += 1
             self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         self.newest_stamp_ns = stamp_ns
+
+
+class LogTime:
+    """Turns times of reception into log times, which continue where the clock is set back.
+
+    Readers order messages by their log times: those from after a step back of the clock would come
+    before those from before it.
+
+    Attributes:
+        set_back_ns: by how much the clock has been set back in all.
+    """
+
+    def __init__(self) -> None:
+        self.set_back_ns = 0
+        self._newest_ns: dict[str, int] = {}
+
+    def of(self, received_ns: int, topic: str = '') -> int:
+        """The log time of a message of a topic, received at this time of the clock [ns].
+
+        On a busy machine some topics wait longer than others until they are taken, so only the
+        messages of one topic show that the clock was set back.
+        """
+        time_ns = received_ns + self.set_back_ns
+        newest_ns = self._newest_ns.get(topic, 0)
+        if time_ns < newest_ns - LEAST_STEP_NS:
+            self.set_back_ns += newest_ns - time_ns
+            time_ns = newest_ns
+        self._newest_ns[topic] = max(newest_ns, time_ns)
+        return time_ns
+
+
+def as_recorded(profile: QoSProfile) -> Qos:
+    """A publisher's profile, as the middleware reports it, the way bags store it."""
+    return Qos(
+        QosHistory[profile.history.name],
+        profile.depth,
+        QosReliability[profile.reliability.name],
+        QosDurability[profile.durability.name],
+        _as_time(profile.deadline),
+        _as_time(profile.lifespan),
+        QosLiveliness[profile.liveliness.name],
+        _as_time(profile.liveliness_lease_duration),
+        profile.avoid_ros_namespace_conventions,
+    )
+
+
+def _as_time(duration: Duration) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, 10**9))

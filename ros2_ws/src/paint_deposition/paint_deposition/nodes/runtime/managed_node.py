@@ -8,8 +8,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, Diagnostics, Status, Task
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import ERROR, OK, Diagnostics, PaintNode, Status, Task
 from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import gc
 import os
 import signal
 import sys
@@ -18,7 +17,7 @@ from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import PaintNode
 
 EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
@@ -26,36 +25,33 @@ EXIT_CRASH = 1
 AGAIN_S = 0.02
 
 
-def run_node(
-    make_node: Callable[[], PaintNode], told_to_stop: threading.Event | None = None
-) -> int:
+def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None = None) -> int:
     """Run one node until it finishes or the process is told to stop; return the exit code.
 
     Ctrl-C, twice as `ros2 launch` sends it, and SIGTERM are a request to stop (exit code 0),
     never an exception in the middle of a callback. A PaintError becomes one line on stderr and
     exit code 2, any other exception a traceback and exit code 1; both close the node first.
-    ``told_to_stop`` is set where a signal has come before.
+    ``stopped`` is set where a signal has come before.
     """
     node: PaintNode | None = None
-    told_to_stop = told_to_stop or threading.Event()
+    stopped = stopped or threading.Event()
 
     def stop(signum: int, frame: FrameType | None) -> None:
-        told_to_stop.set()
+        stopped.set()
         _break_off_loading(signum, frame)
 
     try:
         _on_signals(stop)
-        if told_to_stop.is_set():
+        if stopped.is_set():
             return 0
         _init()
         node = _made(make_node)
-        gc.enable()
-        exit_code = _spin(node, told_to_stop)
+        exit_code = _spin(node, stopped)
     except KeyboardInterrupt:
         exit_code = 0
     except Exception as error:
         # A library that swallows the interrupt of its loading fails in ways of its own.
-        broken_off = node is None and told_to_stop.is_set()
+        broken_off = node is None and stopped.is_set()
         exit_code = 0 if broken_off else _report(error)
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
@@ -113,11 +109,11 @@ def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
         raise PaintError(f'ROS cannot make the node: {reason}') from None
 
 
-def _spin(node: PaintNode, told_to_stop: threading.Event) -> int:
+def _spin(node: PaintNode, stopped: threading.Event) -> int:
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
     with _signals_finish(node.finished):
-        if told_to_stop.is_set():  # while the node was being made
+        if stopped.is_set():  # while the node was being made
             node.finish()
         else:
             node.get_logger().info('ready')
