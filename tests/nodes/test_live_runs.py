@@ -140,19 +140,3 @@ def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
         assert answer.results[0].successful, answer.results[0].reason
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
-
-
-@pytest.mark.parametrize(
-    ('module', 'values', 'words'),
-    [
-        (SIMULATOR, {}, 'mesh_file is empty'),
-        (SIMULATOR, {'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        (COMPARISON, {'mesh_file': 'nowhere.stl'}, 'measurements_file is empty'),
-    ],
-)
-def test_bad_input_ends_the_process_with_one_line(ros_domain, tmp_path, module, values, words):
-    with NodeProcess(tmp_path / 'node', module, **values) as node:
-        assert node.wait() == 2
-        lines = node.err.splitlines()
-    assert len(lines) == 1
-    assert words in lines[0]

@@ -1,4 +1,4 @@
-"""A simulator that dies in a run and is started again has the whole film in the end."""
+"""A simulator that ends in a run and is started again has the whole film in the end."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from paint_deposition.nodes.runtime import topics
 
 POSES = 900
 MOTION = two_passes(poses=POSES)
-KILLED_AT, AGAIN_AT = 350, 500
+ENDED_AT, AGAIN_AT = 350, 500
 STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
 
 
@@ -38,12 +38,15 @@ def test_it_catches_up_from_the_running_recording(
         )
         with first:
             wait_until(lambda: robot.has_listeners(2), what='both')
-            robot.send(MOTION, slice(0, KILLED_AT))
+            robot.send(MOTION, slice(0, ENDED_AT))
             wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
-        # Killed; the gun goes on.
-        robot.send(MOTION, slice(KILLED_AT, AGAIN_AT))
+            first.terminate()
+            first.wait()
+        wait_until(lambda: not robot.has_listeners(2), what='the recorder alone')
+        # The gun paints on meanwhile.
+        robot.send(MOTION, slice(ENDED_AT, AGAIN_AT))
         node = simulator(catch_up=str(tmp_path / 'run'), pose_queue_depth=2000)
-        wait_until(lambda: robot.is_heard_by(node), what='the new simulator')
+        wait_until(lambda: robot.is_heard_by(node) and robot.has_listeners(2), what='both')
         robot.send(MOTION, slice(AGAIN_AT, POSES))
         film, expected = painted(node, POSES), offline_um(node, MOTION)
     assert expected.max() > 5.0

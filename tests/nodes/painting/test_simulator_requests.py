@@ -20,7 +20,6 @@ from nodes.cell import (
     parameters,
     two_passes,
 )
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
@@ -99,17 +98,6 @@ def test_changes_that_cannot_be_are_refused_with_the_reason(simulator, values, r
     assert reason in result.reason
     assert '\n' not in result.reason
     assert {name: node.get_parameter(name).value for name in values} == before
-
-
-def test_every_parameter_says_what_it_is_and_whether_it_can_change(simulator):
-    node = simulator()
-    for name, row in DepositionSimulator.PARAMETERS.items():
-        descriptor = node.describe_parameter(name)
-        assert len(descriptor.description) > 10, name
-        assert '[' in descriptor.description, name
-        assert descriptor.read_only == row.is_read_only, name
-        if descriptor.read_only:
-            assert 'cannot change' in descriptor.additional_constraints
 
 
 def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, onlooker,

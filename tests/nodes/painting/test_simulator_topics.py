@@ -23,13 +23,10 @@ from nodes.cell import (
     Onlooker,
     Robot,
     offline_um,
-    parameters,
     two_passes,
     values_of,
-    write_panel,
 )
-from paint_deposition.film.colour_scales import BARE_RGB, FILM_PALETTE
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.film.colour_scales import FILM_PALETTE
 from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
@@ -87,15 +84,6 @@ def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, ex
     wait_until(lambda: second.heard['thickness/field'], what='the field')
 
 
-def test_bare_metal_is_grey_before_the_first_pose(simulator, onlooker, wait_until):
-    simulator()
-    viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
-    wait_until(lambda: viewer.newest('thickness/mesh'))
-    colours = {(c.r, c.g, c.b) for c in viewer.newest('thickness/mesh').colors}
-    assert len(colours) == 1
-    assert np.allclose(colours.pop(), np.array(BARE_RGB) / 255.0, atol=1e-6)
-
-
 def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, wait_until):
     node = simulator(target_um=10.0, target_tolerance_um=5.0)
     viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
@@ -140,15 +128,6 @@ def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted,
     assert values['gaps'] == '2'
     assert values['intervals over 1.5 times the usual one'] == '3'
     assert values['usual rate [Hz]'] == '250.0'
-
-
-def test_stamps_before_any_pose_are_zero(simulator, onlooker, wait_until):
-    simulator()
-    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
-    wait_until(lambda: viewer.newest('thickness/stats'))
-    stats = viewer.newest('thickness/stats')
-    assert stats.header.stamp.sec == 0
-    assert math.isnan(stats.capture_fraction)
 
 
 def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,
@@ -301,17 +280,3 @@ def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, executor, 
     executor.remove_node(guns[1])
     guns[1].destroy_node()
     wait_until(lambda: 'publishers' not in status().message)
-
-
-def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):
-    node = DepositionSimulator(
-        context=ros_context,
-        namespace='cell1',
-        parameter_overrides=parameters(mesh_file=str(write_panel(tmp_path / 'p.stl'))),
-    )
-    spin(node)
-    source = Robot(ros_context, namespace='cell1')
-    spin(source)
-    wait_until(lambda: source.is_heard_by(node))
-    names = {name for name, _ in node.get_topic_names_and_types()}
-    assert {'/cell1/thickness/mesh', '/cell1/atomizer/pose', '/diagnostics'} <= names

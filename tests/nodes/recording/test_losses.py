@@ -8,7 +8,6 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
-from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
 from files.recorded import START_NS
@@ -45,22 +44,6 @@ def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_un
     assert lost > 0
     missed = f', {lost} missed' if NUMBERED else UNCOUNTED
     assert f'{recorder.run.message_count} messages{missed}' in recorder.summary()
-
-
-@pytest.mark.skipif(not NUMBERED, reason='no message has a number here')
-def test_losses_that_cannot_be_counted_are_not_called_none(record, publisher, wait_until):
-    """Some middlewares number no messages; the second one comes as from them."""
-    recorder = record(topics=['chatter'])
-    sender = publisher(String, 'chatter', QoSProfile(depth=10))
-    sender.publish(String(data='numbered'))
-    topic = recorder.resolve_topic_name('chatter')
-    wait_until(lambda: recorder._topics[topic].messages == 1, what='the message')
-    assert 'cannot be counted' not in recorder.summary()
-    times = {'received_timestamp': 1, 'source_timestamp': 1}
-    cdr = serialize_message(String(data='without a number'))
-    recorder._topics[topic]._on_message(cdr, times | {'publication_sequence_number': None})
-    assert '2 messages (losses cannot be counted: ' in recorder.summary()
-    recorder.close()
 
 
 def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):

@@ -15,7 +15,7 @@ from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, straight_pass
 from nodes.recording.runs import counts, finish, messages, offered, pose
-from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.headers import stamp_ns
@@ -69,18 +69,6 @@ def test_latched_messages_are_recorded_as_latched(record, cell, wait_until):
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
 
 
-@pytest.mark.parametrize('profile', [BEST_EFFORT, QoSProfile(depth=50)])
-def test_both_reliabilities_connect(record, publisher, wait_until, profile):
-    recorder = record()
-    poses = publisher(PoseStamped, 'atomizer/pose', profile)
-    for k in range(20):
-        poses.publish(pose(START_NS + k * 4_000_000))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 20, what='the poses')
-    information = finish(recorder)
-    (recorded,) = offered(information, '/atomizer/pose')
-    assert recorded['reliability'] == profile.reliability.name.lower()
-
-
 def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until, cell):
     recorder = record()
     first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=50))
@@ -104,14 +92,6 @@ def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, 
     gun.publish(Bool(data=True))
     wait_until(lambda: recorder.run.message_count == 2, what='both messages')
     assert counts(finish(recorder)) == {'/chatter': 1, '/cell/gun': 1}
-
-
-def test_relative_topics_follow_the_namespace(record, publisher, wait_until):
-    recorder = record(namespace='/cell1')
-    poses = publisher(PoseStamped, '/cell1/atomizer/pose', QoSProfile(depth=500))
-    poses.publish(pose(START_NS))
-    wait_until(lambda: recorder.run.message_count == 1, what='the pose')
-    assert counts(finish(recorder)) == {'/cell1/atomizer/pose': 1}
 
 
 def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_until):
@@ -191,9 +171,3 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
 def test_bad_input_is_told_at_the_start(record, parameters, says):
     with pytest.raises(PaintError, match=says):
         record(**parameters)
-
-
-def test_an_existing_run_is_not_overwritten(record, tmp_path):
-    (tmp_path / 'run').mkdir()
-    with pytest.raises(RecordingError, match='run already exists'):
-        record()

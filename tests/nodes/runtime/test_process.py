@@ -122,20 +122,6 @@ def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
     assert complaints(process.err) == []
 
 
-def test_a_signal_that_the_compiler_would_swallow_ends_cleanly(worker):
-    process = worker('compile')
-    assert process.wait() == 0
-    assert complaints(process.err) == []
-
-
-def test_terminate_ends_cleanly(worker, wait_until):
-    process = worker('run')
-    wait_until(lambda: 'ready' in process.out, what='the node')
-    process.terminate()
-    assert process.wait() == 0
-    assert process.out.split() == ['ready', 'closed']
-
-
 def test_a_callback_is_completed_first(worker, wait_until, tmp_path):
     process = worker('work')
     wait_until(lambda: 'working' in process.out, what='the callback')
@@ -166,12 +152,6 @@ def test_bad_input_is_one_line_and_exit_code_2(worker):
     assert one_line(process.err) == 'error: mesh none.stl does not exist; give a mesh'
 
 
-def test_a_bad_parameter_is_one_line_and_exit_code_2(worker):
-    process = worker('run', rate_hz='0.0')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: worker: rate_hz is 0.0: must be at least 0.1'
-
-
 def test_bad_ros_arguments_are_exit_code_2(ros_domain, tmp_path):
     with NodeProcess(tmp_path / 'bad', '', code=NODE, ros_arguments=('-p', 'does')) as process:
         assert process.wait() == 2
@@ -186,26 +166,11 @@ def test_an_error_in_a_callback_closes_the_node(worker):
     assert process.out.split() == ['ready', 'closed']
 
 
-def test_an_error_from_elsewhere_closes_the_node(worker):
-    process = worker('fail_later')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: the bag is damaged; recover it'
-    assert process.out.split() == ['ready', 'closed']
-
-
 def test_a_defect_shows_its_traceback(worker):
     process = worker('crash')
     assert process.wait() == 1
     assert 'ZeroDivisionError: never mind' in process.err
     assert process.out.split() == ['ready', 'closed']
-
-
-def test_a_node_may_finish_by_itself(worker):
-    process = worker('finish')
-    assert process.wait() == 3
-    assert process.out.split() == ['ready', 'closed']
-    assert process.err.strip().endswith('[worker]: ready')
-    assert complaints(process.err) == []
 
 
 INTERRUPTED_IMPORT = """

@@ -290,8 +290,7 @@ class PaintingNode(ManagedNode, ABC):
         except PaintError as error:
             self.get_logger().error(f'not caught up: {error}')
         else:
-            told = f'caught up from {catching_up.folder}: {catching_up.summary}'
-            self.get_logger().info(told)
+            self.get_logger().info(f'caught up from {catching_up.folder}: {catching_up.summary}')
             if any(gun.model != now for gun, now in zip(self.film.guns, self.models, strict=True)):
                 self._repaint()
         self.release()

@@ -21,9 +21,7 @@ from rosbags.interfaces import (
 
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
-# Messages of one topic come out of order by less.
-LEAST_STEP_NS = 1_000_000_000
-# (topic, serialised message, time received [ns], time sent [ns])
+# (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
 
 
@@ -48,6 +46,7 @@ class RecordedTopic:
         self.messages = self.messages_before = 0
         self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
+        self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
         package, kind, message = type_name.split('/')
@@ -91,7 +90,9 @@ class RecordedTopic:
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
-        self._take(self.name, cdr, info['received_timestamp'], info['source_timestamp'])
+        # Readers order by log time: where the machine's clock is set back it stands still.
+        self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
+        self._take(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
     def _count_missed(self, info: Mapping[str, Any]) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
@@ -109,35 +110,6 @@ class RecordedTopic:
             self.gaps += 1
             self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         self.newest_stamp_ns = stamp_ns
-
-
-class LogTime:
-    """Turns times of reception into log times, which continue where the clock is set back.
-
-    Readers order messages by their log times: those from after a step back of the clock would come
-    before those from before it.
-
-    Attributes:
-        set_back_ns: by how much the clock has been set back in all.
-    """
-
-    def __init__(self) -> None:
-        self.set_back_ns = 0
-        self._newest_ns: dict[str, int] = {}
-
-    def of(self, received_ns: int, topic: str = '') -> int:
-        """The log time of a message of a topic, received at this time of the clock [ns].
-
-        On a busy machine some topics wait longer than others until they are taken, so only the
-        messages of one topic show that the clock was set back.
-        """
-        time_ns = received_ns + self.set_back_ns
-        newest_ns = self._newest_ns.get(topic, 0)
-        if time_ns < newest_ns - LEAST_STEP_NS:
-            self.set_back_ns += newest_ns - time_ns
-            time_ns = newest_ns
-        self._newest_ns[topic] = max(newest_ns, time_ns)
-        return time_ns
 
 
 def as_recorded(profile: QoSProfile) -> Qos:

@@ -19,7 +19,7 @@ from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
-from paint_deposition.nodes.recording.recorded_topic import LogTime, RecordedTopic, as_recorded
+from paint_deposition.nodes.recording.recorded_topic import RecordedTopic, as_recorded
 from paint_deposition.nodes.runtime.managed_node import MANAGED, ManagedNode
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, Task
@@ -148,7 +148,6 @@ class RunRecorder(ManagedNode):
         self._topics: dict[str, RecordedTopic] = {}
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
-        self._log_time = LogTime()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -160,7 +159,7 @@ class RunRecorder(ManagedNode):
             require_file_name('name', self.values['name'])
 
     def _next_name(self) -> str:
-        """The run's name; one that this node has recorded by itself is not told from another."""
+        """The run's name; one that this node has recorded by itself gets a date behind it."""
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
         if not self.runs:
             return name
@@ -209,25 +208,13 @@ class RunRecorder(ManagedNode):
 
     # --- writing
 
-    def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
-        log_time_ns = self._log_time_ns(name, received_ns)
+    def _write(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
         if name == self._part_topic:
             self._follow_part(deserialize_message(cdr, Part), log_time_ns)
         self._note_in_force(name, cdr, sent_ns)
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
-
-    def _log_time_ns(self, name: str, received_ns: int) -> int:
-        """When a message is logged: as received, but never before the one before."""
-        set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns, name)
-        if self._log_time.set_back_ns > set_back_ns:
-            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
-            self.get_logger().warning(
-                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
-            )
-        return log_time_ns
 
     def _note_in_force(self, name: str, cdr: bytes, sent_ns: int) -> None:
         """Keep a message that holds for later runs: newest state, place, parameters, frames."""

@@ -25,7 +25,7 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 # A subscriber that has reported the same pose for so long while none was sent has got all that
 # will ever reach it.
 LOST_AFTER_S = 5.0
-# One that has never reported is given up after so long; nodes report once their mesh is read.
+# One that has never reported is not waited for after so long; nodes report as soon as they run.
 UNHEARD_AFTER_S = 20.0
 
 
@@ -53,7 +53,6 @@ class PoseWindow:
         self._published_s = 0.0
         self._stamps: deque[int] = deque()  # of the poses that somebody has not taken yet
         self._subscribers: dict[str, _Subscriber] = {}
-        self._unheard: list[str] = []
 
     def publish(self, stamp_ns: int, now_s: float) -> None:
         """Note that the pose of this stamp was sent."""
@@ -64,20 +63,17 @@ class PoseWindow:
                 self._stamps.append(stamp_ns)
 
     def present(self, names: Iterable[str], now_s: float) -> None:
-        """Say which subscribers report progress now: others are no longer waited for."""
+        """Note which subscribers are there now: others are no longer waited for."""
         with self._lock:
-            names = set(names)
-            for name in names - self._subscribers.keys():
-                self._subscribers[name] = _Subscriber(self._published, now_s)
-            for name in self._subscribers.keys() - names:
-                del self._subscribers[name]
+            known = self._subscribers
+            self._subscribers = {
+                name: known.get(name) or _Subscriber(self._published, now_s)
+                for name in sorted(names)
+            }
             self._forget_taken()
 
     def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
-        """Note that the pose of this stamp is the newest that a subscriber has taken.
-
-        Without a name this is noted for every subscriber.
-        """
+        """Note the newest pose that a subscriber has taken; without a name, all of them."""
         with self._lock:
             taken = self._number_of(stamp_ns)
             for known, subscriber in self._subscribers.items():
@@ -95,9 +91,9 @@ class PoseWindow:
     def ahead(self, now_s: float) -> int:
         """Poses that the slowest subscriber has not taken yet."""
         with self._lock:
-            for name, subscriber in self._subscribers.items():
-                self._drop_unheard(name, subscriber, now_s)
-                self._drop_lost(subscriber, now_s)
+            for subscriber in self._subscribers.values():
+                if subscriber.taken < self._published:
+                    self._drop_hopeless(subscriber, now_s)
             self._forget_taken()
             return len(self._stamps)
 
@@ -105,23 +101,18 @@ class PoseWindow:
         """The subscribers that are furthest behind."""
         with self._lock:
             least = self._least_taken()
-            if least == self._published:
-                return []
-            return [name for name, s in self._subscribers.items() if s.taken == least]
+            behind = least < self._published
+            return [name for name, s in self._subscribers.items() if behind and s.taken == least]
 
-    def take_unheard(self) -> list[str]:
-        """Subscribers dropped since the last call because they have never reported."""
+    def unheard(self) -> list[str]:
+        """Subscribers that are not waited for because they have never reported."""
         with self._lock:
-            unheard, self._unheard = self._unheard, []
-            return unheard
+            return [name for name, s in self._subscribers.items() if s.unheard]
 
-    def take_lost(self) -> dict[str, int]:
-        """Poses that never reached a subscriber, by its name; counted from zero again."""
+    def lost(self) -> dict[str, int]:
+        """Poses that never reached a subscriber, by its name."""
         with self._lock:
-            lost = {name: s.lost for name, s in self._subscribers.items() if s.lost}
-            for subscriber in self._subscribers.values():
-                subscriber.lost = 0
-            return lost
+            return {name: s.lost for name, s in self._subscribers.items() if s.lost}
 
     def _number_of(self, stamp_ns: int) -> int:
         """How many poses were published up to the newest one of this stamp; 0: not among them."""
@@ -130,27 +121,21 @@ class PoseWindow:
                 return self._published - back
         return 0
 
-    def _drop_unheard(self, name: str, subscriber: _Subscriber, now_s: float) -> None:
-        if subscriber.reported_s is not None or subscriber.unheard:
-            return
+    def _drop_hopeless(self, subscriber: _Subscriber, now_s: float) -> None:
         quiet_since_s = max(self._published_s, subscriber.advanced_s)
-        waited_for = subscriber.taken < self._published
-        if waited_for and now_s - quiet_since_s > UNHEARD_AFTER_S:
-            subscriber.unheard = True
-            self._unheard.append(name)
+        if subscriber.reported_s is None:
+            subscriber.unheard |= now_s - quiet_since_s > UNHEARD_AFTER_S
+        elif (
+            now_s - quiet_since_s > LOST_AFTER_S
+            # It still reports; one that is silent may be busy.
+            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_AFTER_S
+        ):
+            subscriber.lost += self._published - subscriber.taken
+            subscriber.taken = self._published
 
     def _least_taken(self) -> int:
         heard = (s.taken for s in self._subscribers.values() if not s.unheard)
         return min(heard, default=self._published)
-
-    def _drop_lost(self, subscriber: _Subscriber, now_s: float) -> None:
-        if subscriber.taken == self._published or subscriber.reported_s is None:
-            return
-        quiet_since_s = max(self._published_s, subscriber.advanced_s)
-        still_reports = subscriber.reported_s > quiet_since_s + 0.5 * LOST_AFTER_S
-        if still_reports and now_s - quiet_since_s > LOST_AFTER_S:
-            subscriber.lost += self._published - subscriber.taken
-            subscriber.taken = self._published
 
     def _forget_taken(self) -> None:
         least = self._least_taken()
@@ -175,6 +160,7 @@ class FlowControl:
         self._window = PoseWindow()
         self._sent = 0
         self._looked_s = -math.inf
+        self._unheard: set[str] = set()
         self.doing = 'starting'
         node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
 
@@ -219,8 +205,8 @@ class FlowControl:
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
-        for name, count in self._window.take_lost().items():
-            self._node.get_logger().warning(f'{name} never got the last {count} poses')
+        for name, count in self._window.lost().items():
+            self._node.get_logger().warning(f'{name} never got {count} poses')
 
     def _wait_until_ahead_is_less_than(self, limit: int) -> None:
         notice_s = time.monotonic()
@@ -228,14 +214,15 @@ class FlowControl:
             now_s = time.monotonic()
             if now_s - self._looked_s > GRAPH_PERIOD_S:
                 self._look_around()
-            ahead = self.poses_ahead
-            for name in self._window.take_unheard():
+            if self.poses_ahead < limit:
+                break
+            unheard = set(self._window.unheard())
+            for name in unheard - self._unheard:
                 self._node.get_logger().warning(
                     f'{name} has never reported its progress: it is no longer waited for, and '
                     'may lose what its queue does not hold'
                 )
-            if ahead < limit:
-                break
+            self._unheard = unheard
             if now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
                 slowest = ' '.join(self._window.slowest())
@@ -252,15 +239,12 @@ class FlowControl:
         self._window.report(progress.reporter or None, stamp, time.monotonic())
 
     def _look_around(self) -> frozenset[str]:
-        self._looked_s = time.monotonic()
-        names = self._reporters()
-        self._window.present(names, time.monotonic())
-        return names
-
-    def _reporters(self) -> frozenset[str]:
         """Full names of the nodes that take the poses and can report progress."""
-        progress_topic = self._node.resolve_topic_name(PROGRESS_TOPIC)
-        node = self._node
-        takers = node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        reporters = node.get_publishers_info_by_topic(progress_topic)
-        return frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, reporters))
+        self._looked_s = time.monotonic()
+        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        reporters = self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name(PROGRESS_TOPIC)
+        )
+        names = frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, reporters))
+        self._window.present(names, self._looked_s)
+        return names

@@ -9,7 +9,6 @@ import sys
 import threading
 import traceback
 from collections.abc import Callable, Iterator
-from types import FrameType
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
@@ -21,8 +20,6 @@ from paint_deposition.nodes.runtime.node import PaintNode
 
 EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
-# After so long a signal is tried again that came at a bad moment.
-AGAIN_S = 0.02
 
 
 def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None = None) -> int:
@@ -36,9 +33,9 @@ def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None
     node: PaintNode | None = None
     stopped = stopped or threading.Event()
 
-    def stop(signum: int, frame: FrameType | None) -> None:
+    def stop(*_: object) -> None:
         stopped.set()
-        _break_off_loading(signum, frame)
+        _break_off_loading()
 
     try:
         _on_signals(stop)
@@ -47,17 +44,12 @@ def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None
         _init()
         node = _made(make_node)
         exit_code = _spin(node, stopped)
-    except KeyboardInterrupt:
-        exit_code = 0
     except Exception as error:
-        # A library that swallows the interrupt of its loading fails in ways of its own.
-        broken_off = node is None and stopped.is_set()
-        exit_code = 0 if broken_off else _report(error)
+        exit_code = _report(error)
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
         _on_signals(signal.SIG_IGN)
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
     try:
         if node is not None:
             exit_code = max(exit_code, _closed(node))
@@ -66,28 +58,16 @@ def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None
     return exit_code
 
 
-def _on_signals(action: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+def _on_signals(action: Callable[..., None] | signal.Handlers) -> None:
     signal.signal(signal.SIGINT, action)
     signal.signal(signal.SIGTERM, action)
 
 
-def _break_off_loading(_signum: int, frame: FrameType | None) -> None:
-    # Loading a mesh takes a while and can be broken off without harm.
-    if not PaintNode.loading:
-        return
-    if not _in_the_compiler(frame):
-        raise KeyboardInterrupt
-    # It calls back into Python from C, where an exception is printed and lost: try again soon.
-    signal.signal(signal.SIGALRM, _break_off_loading)
-    signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
-
-
-def _in_the_compiler(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if str(frame.f_globals.get('__name__')).startswith('llvmlite.'):
-            return True
-        frame = frame.f_back
-    return False
+def _break_off_loading(*_: object) -> None:
+    # Reading files can be broken off without harm; an exception could be lost in a library.
+    if PaintNode.loading:
+        sys.stderr.flush()
+        os._exit(0)
 
 
 def _init() -> None:
