@@ -108,14 +108,6 @@ def test_another_part_begins_with_the_whole_film(simulator, robot, painted, view
     assert seen.whole == wholes + 1
 
 
-def test_nothing_large_is_made_for_nobody(simulator, robot, painted):
-    node = simulator()
-    robot(node).send(MOTION)
-    painted(node)
-    node.publish()
-    assert not {'mesh', 'cloud', 'field'} & set(vars(node.display.shown_as))
-
-
 def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooker, wait_until,
                                               tmp_path):  # fmt: skip
     """Nobody is sent the next message before all have taken the last one, and none is lost."""

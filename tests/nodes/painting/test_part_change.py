@@ -17,14 +17,11 @@ from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 
 from brushes import two_brushes
-from cli.command import paint
 from nodes.cell import (
-    DIAGNOSTICS,
     PANEL_M,
     offline_um,
     parameters,
     two_passes,
-    values_of,
     write_panel,
 )
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -165,38 +162,25 @@ def test_poses_that_come_while_a_mesh_is_read_wait_for_it(simulator, robot, pain
     assert np.array_equal(film, offline_um(node, MOTION))
 
 
-def test_a_mesh_that_was_read_ahead_makes_no_gap(simulator, robot, painted, change, onlooker,
-                                                 wider, wait_until):  # fmt: skip
-    node = simulator(max_edge_length_m=0.015)
-    viewer = onlooker(DIAGNOSTICS)
-    first = node.mesh_file
-    unprepared = change(serial='1', mesh_file=wider)
-    assert unprepared.success, unprepared.message
-    # The one that has left is prepared, and so is what was read ahead.
-    back = change(serial='2', mesh_file=first)
-    again = change(serial='3', mesh_file=wider)
-    assert max(back.gap_s, again.gap_s) < 0.2 * unprepared.gap_s
-    third = write_panel(node_folder(node) / 'third.stl', reverse=True)
-    prepared = change(mesh_file=str(third), prepare=True)
+def test_a_mesh_that_was_read_ahead_is_there_at_once(simulator, change, wider, tmp_path):
+    """And so is the one of the part that has left."""
+    node = simulator()
+    first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
+    prepared = change(mesh_file=third, prepare=True)
     assert prepared.success
     assert 'third.stl is prepared: Surface(' in prepared.message
-    assert node.mesh_file == wider
-    ahead = change(serial='4', mesh_file=str(third))
-    assert ahead.gap_s < 0.2 * unprepared.gap_s
-    robot(node).send(MOTION)
-    film = painted(node, len(MOTION))
-    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the gun')
-    assert node.film.up_to_date().film_um.max() > 1.0, film.max()
+    assert node.mesh_file == first
 
-    def gap():
-        status = viewer.status('deposition_simulator: part')
-        return status and values_of(status)['gap of the last change [ms]']
+    def ready() -> str:
+        return node.parts.status().values['meshes prepared']
 
-    wait_until(lambda: gap() == f'{ahead.gap_s * 1e3:.1f}', what='the gap in the diagnostics')
-
-
-def node_folder(node):
-    return Path(node.mesh_file).parent
+    assert ready() == third
+    assert change(serial='1', mesh_file=third).success
+    assert ready() == first
+    assert change(serial='2', mesh_file=wider).success
+    assert ready() == f'{first} {third}'
+    assert change(serial='3', mesh_file=first).success
+    assert ready() == f'{third} {wider}'
 
 
 def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change, wider,
@@ -285,20 +269,6 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
         assert f'serial: 47-{number}' in told
         saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
         assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
-    table = paint('runs', folder)
-    assert table.returncode == 0, table.stderr
-    heading, *rows = table.stdout.splitlines()
-    assert heading.split()[:3] == ['run', 'type', 'coat']
-    # The run before the first part has no film.
-    assert [row.split()[0] for row in rows] == ['47-1', '47-2', 'before']
-    assert rows[0].split()[1:3] == ['door', '1']
-    told = json.loads(paint('runs', folder, '--json').stdout)['runs']
-    assert [(run['serial'], run['poses'], run['recording']) for run in told] == [
-        ('47-1', len(MOTION), 'complete'),
-        ('47-2', len(MOTION), 'complete'),
-        ('', None, 'complete'),
-    ]
-    assert told[0]['film']['max_um'] == pytest.approx(saved.max(), rel=1e-3)
 
 
 def test_a_mesh_exported_anew_is_painted_in_its_new_shape(simulator, robot, painted, change,

@@ -128,6 +128,16 @@ def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted,
     assert values['gaps'] == '2'
     assert values['intervals over 1.5 times the usual one'] == '3'
     assert values['usual rate [Hz]'] == '250.0'
+    # Across 1 m in 45 % of 600 poses.
+    assert values['speed [m/s]'] == f'{1.0 / (0.45 * 599 * 0.004):.3f}'
+    assert values['programmed speed [m/s]'] == 'unknown'
+    stamp_ns = MOTION.stamps_ns[-1] + 1
+    source.send_fields(stamp_ns, spraying=True, programmed_speed_m_per_s=1.2)
+
+    def programmed() -> str:
+        return values_of(viewer.status(POSES))['programmed speed [m/s]']
+
+    wait_until(lambda: programmed() == '1.200', what='the programmed speed')
 
 
 def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,

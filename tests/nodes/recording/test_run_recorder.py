@@ -6,19 +6,17 @@ pytest.importorskip('rclpy')
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import PoseProgress, ThicknessStats
+from paint_msgs.msg import ThicknessStats
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
-from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, straight_pass
 from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
-from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import topics
@@ -103,31 +101,6 @@ def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_unti
         poses.publish(pose(START_NS + k))
     poses.wait_for_all_acked()
     assert counts(finish(recorder)) == {'/atomizer/pose': 500}
-
-
-def test_the_recorder_reports_progress(record, publisher, wait_until, cell):
-    record()
-    reports = []
-    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, topics.PROGRESS)
-    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
-    poses.publish(pose(START_NS + 7))
-    wait_until(lambda: reports and reports[-1].poses_received == 1, what='a report')
-    assert stamp_ns(reports[-1].header) == START_NS + 7
-
-
-def test_stop_finishes_the_run(record, publisher, wait_until, cell):
-    recorder = record()
-    poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
-    poses.publish(pose(START_NS))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the pose')
-    client = cell.create_client(Trigger, 'run_recorder/stop')
-    wait_until(client.service_is_ready, what='the service')
-    future = client.call_async(Trigger.Request())
-    wait_until(future.done, what='the answer')
-    assert future.result().success
-    assert future.result().message.endswith(f'file complete: {recorder.run.folder}')
-    assert recorder.finished.result() == 0
-    assert (recorder.run.folder / 'metadata.yaml').exists()
 
 
 def test_what_the_run_was_made_with_is_kept(record, tmp_path):

@@ -37,23 +37,6 @@ def test_the_last_of_equal_stamps_is_meant():
     assert window.ahead(0.0) == 0
 
 
-def test_without_a_name_everybody_is_meant():
-    window = PoseWindow()
-    window.present(['a', 'b'], 0.0)
-    published(window, range(4))
-    window.report(None, 3, 0.0)
-    assert window.ahead(0.0) == 0
-
-
-def test_the_same_stamps_again_in_the_next_round():
-    window = PoseWindow()
-    window.present(['simulator'], 0.0)
-    for _ in range(3):
-        published(window, range(5))
-        window.report('simulator', 4, 0.0)
-        assert window.ahead(0.0) == 0
-
-
 def test_what_never_arrives_is_given_up_while_reports_come():
     window = PoseWindow()
     window.present(['simulator'], 0.0)

@@ -4,7 +4,6 @@ import importlib
 import os
 import signal
 import sys
-import threading
 from functools import partial
 from importlib.util import find_spec
 
@@ -20,16 +19,16 @@ REMEDIES = {
 def _run(name: str, folder: str, node_class: str) -> int:
     """Load a node's module and run it; returns the process's exit code."""
     # Libraries catch what is raised while they are imported, so a signal is only noted.
-    stopped = threading.Event()
+    signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: stopped.set())
+        signal.signal(number, lambda number, _: signals.append(number))
     for needed, remedy in REMEDIES.items():
         if find_spec(needed) is None:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
     module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
     process = importlib.import_module('paint_deposition.nodes.runtime.process')
-    return process.run_node(getattr(module, node_class), stopped)
+    return process.run_node(getattr(module, node_class), signals)
 
 
 atomizer_source = partial(_run, 'atomizer_source', 'robot', 'AtomizerSource')

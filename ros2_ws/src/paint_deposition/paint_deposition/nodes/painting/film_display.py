@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import time
-from functools import partial
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
+from rclpy.duration import Duration
+from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -19,12 +22,94 @@ from paint_deposition.nodes.painting.film_messages import (
     ShownFilm,
     stats_message,
 )
-from paint_deposition.nodes.painting.large_topic import LargeTopic
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import of_gun
+from paint_deposition.nodes.runtime.topics import QosWatch, of_gun
 from paint_deposition.part.surface import Surface
+
+# Of one core that making and sending such a message may take.
+SHARE = 0.2
+# A listener that acknowledges nothing for so long does not hold up the others.
+PATIENCE_S = 5.0
+# What is sent in pieces is sent again so long after the last one, then after twice as long, ...
+REPEAT_S = 1.0
+AT_ONCE = Duration(nanoseconds=0)
+
+
+class LargeTopic:
+    """Publishes when somebody listens who does not have the newest edition yet.
+
+    The next message waits until all reliable subscribers have acknowledged the last one: a slow
+    link gets fewer of them, never a queue. It also waits for as long as keeps the work within
+    ``SHARE`` of a core.
+
+    A middleware acknowledges what it has received, before the listener takes it: the next
+    message then takes its place in a full queue. Where each message shows all there is, the
+    newest is enough. Where each shows a piece, all are sent again when the film rests, after
+    pauses that double, so that a listener that lost some has them in the end.
+
+    Args:
+        watch: makes the publisher.
+        message: its type.
+        in_pieces: whether a message shows only a piece, or what changed.
+    """
+
+    def __init__(
+        self,
+        watch: QosWatch,
+        message: type,
+        topic: str,
+        profile: QoSProfile,
+        in_pieces: bool = False,
+    ) -> None:
+        self._watch = watch
+        self._topic = topic
+        self._publisher = watch.publisher(message, topic, profile)
+        self.in_pieces = in_pieces
+        self._edition: object = None
+        self._complete = False
+        self._greeted = 0
+        self._pause_s = REPEAT_S
+        self._sent_s = self._rested_s = 0.0
+
+    def offer(self, edition: object, make: Callable[[bool], Any]) -> None:
+        """Publish an edition, if it is wanted and the link is free; otherwise offer it again.
+
+        Args:
+            edition: what the message would show; equal where it would show the same.
+            make: the message, None where there is nothing left to show; its argument says whether
+                all is to be shown, to somebody who is new or once more.
+        """
+        # Not the publisher's own count: it grows before the newcomer is counted.
+        if not self._watch.listeners[self._topic]:
+            self._edition = None
+            return
+        newcomers = self._watch.newcomers[self._topic]
+        known = edition == self._edition and self._complete
+        rested = time.monotonic() - self._sent_s > self._pause_s
+        repeat = known and self.in_pieces and rested
+        whole = self._edition is None or newcomers > self._greeted or repeat
+        if (known and not whole) or not self._is_free():
+            return
+        if repeat:
+            self._pause_s *= 2.0
+        elif edition != self._edition:
+            self._pause_s = REPEAT_S
+        began_s = time.monotonic()
+        message = make(whole)
+        if message is not None:
+            self._publisher.publish(message)
+            self._sent_s = time.monotonic()
+            self._rested_s = began_s + (self._sent_s - began_s) / SHARE
+        self._edition, self._greeted = edition, newcomers
+        self._complete = message is None or not self.in_pieces
+
+    def _is_free(self) -> bool:
+        now_s = time.monotonic()
+        if now_s < self._rested_s:
+            return False
+        return self._publisher.wait_for_all_acked(AT_ONCE) or now_s > self._sent_s + PATIENCE_S
 
 
 class FilmDisplay:
@@ -123,25 +208,21 @@ class FilmDisplay:
             rows = scale.rows(film_um, film_um > values['painted_above_um'])
             return self._mesh.message(self._edition, stamp_ns, scale.palette, rows, whole)
 
-        def cloud(_: bool) -> PointCloud2:
-            return shown_as.cloud.message(stamp_ns, film_um)
-
         def changes(whole: bool) -> PointCloud2 | None:
             return self._changes.message(stamp_ns, film_um, whole, exact=at_rest)
 
-        def field(_: bool) -> ThicknessField:
-            return shown_as.field.message(stamp_ns, film_um)
-
-        def share(_: bool, gun: int) -> ThicknessField:
-            return shown_as.field.message(stamp_ns, film.shares_um[gun])
-
         if values['publish_mesh']:
             self._large['thickness/mesh'].offer(self._edition, mesh)
-        self._large['thickness/cloud'].offer(self._edition, cloud)
         self._large['thickness/changes'].offer((self._edition, at_rest), changes)
-        self._large['thickness/field'].offer(self._edition, field)
-        for gun, topic in enumerate(self._share_topics):
-            self._large[topic].offer(self._edition, partial(share, gun=gun))
+        whole_films = {
+            'thickness/cloud': lambda _: shown_as.cloud(stamp_ns, film_um),
+            'thickness/field': lambda _: shown_as.field(stamp_ns, film_um),
+        } | {
+            topic: lambda _, gun=gun: shown_as.field(stamp_ns, film.shares_um[gun])
+            for gun, topic in enumerate(self._share_topics)
+        }
+        for topic, make in whole_films.items():
+            self._large[topic].offer(self._edition, make)
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""

@@ -1,4 +1,4 @@
-"""The simulator's film as messages, whose arrays are filled in place."""
+"""The simulator's film as messages."""
 
 from __future__ import annotations
 
@@ -10,7 +10,6 @@ from functools import cached_property
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.serialization import serialize_message
-from rclpy.time import Time
 from sensor_msgs.msg import PointCloud2, PointField
 from visualization_msgs.msg import Marker
 
@@ -21,10 +20,13 @@ from paint_deposition.part.surface import Surface
 
 # Triangles of a marker, which takes 120 bytes for each.
 MOST_FACES = 150_000
+KINDS = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
+POINT = np.dtype([(name, np.float32) for name in ('x', 'y', 'z', 'thickness_um')])
+CHANGED_POINT = np.dtype([*POINT.descr, ('vertex', np.uint32)])
 
 
 class ShownFilm:
-    """A part as the simulator shows it: its messages, each made when it is first needed."""
+    """A part as the simulator shows it: its messages."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
         self.surface, self._frame_id = surface, frame_id
@@ -45,7 +47,7 @@ class ShownFilm:
         return self._faces_of(tile).ravel()
 
     def tile(self, number: int) -> ColouredMesh:
-        """A marker of the mesh."""
+        """A marker of the mesh, made when it is first needed."""
         if number not in self._made:
             faces, vertices = self._faces_of(number), self.surface.vertices_m
             self._made[number] = ColouredMesh(vertices, faces, self._frame_id, 'thickness', number)
@@ -64,13 +66,77 @@ class ShownFilm:
         along = vertices[:, np.ptp(vertices, axis=0).argmax()]
         return faces[np.argsort(along[faces].sum(axis=1), kind='stable')]
 
-    @cached_property
-    def cloud(self) -> FilmCloud:
-        return FilmCloud(self.surface.vertices_m, self._frame_id)
+    def cloud(
+        self, stamp_ns: int, film_um: np.ndarray, vertices: np.ndarray | None = None
+    ) -> PointCloud2:
+        """x, y, z [m] and thickness_um of all vertices, or of these with their numbers.
 
-    @cached_property
-    def field(self) -> FilmField:
-        return FilmField(len(self.surface.vertices_m), self.mesh_id, self._frame_id)
+        Args:
+            film_um: (V,) film [um]. vertices: (N,) their numbers.
+        """
+        layout = POINT if vertices is None else CHANGED_POINT
+        rows = slice(None) if vertices is None else vertices
+        points = np.empty(len(film_um[rows]), layout)
+        for name, column in zip('xyz', self.surface.vertices_m.T, strict=True):
+            points[name] = column[rows]
+        points['thickness_um'] = film_um[rows]
+        if vertices is not None:
+            points['vertex'] = vertices
+        return PointCloud2(
+            height=1,
+            width=len(points),
+            fields=[
+                PointField(name=name, offset=4 * k, datatype=KINDS[layout[name].kind], count=1)
+                for k, name in enumerate(layout.names or ())
+            ],
+            is_bigendian=sys.byteorder == 'big',
+            point_step=layout.itemsize,
+            row_step=points.nbytes,
+            data=array('B', points.tobytes()),
+            is_dense=True,
+            header=header(self._frame_id, stamp_ns),
+        )
+
+    def field(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
+        """(V,) film [um] in the order of the vertices."""
+        return ThicknessField(
+            header=header(self._frame_id, stamp_ns),
+            mesh_id=self.mesh_id,
+            thickness_um=array('f', film_um.astype(np.float32).tobytes()),
+        )
+
+
+class FilmChanges:
+    """Clouds of the points whose film has changed since they were last in one.
+
+    The first holds the whole film, a point for each vertex in their order. The others have one
+    more field, the number of the vertex.
+    """
+
+    def __init__(self, shown_as: ShownFilm) -> None:
+        self._shown_as = shown_as
+        self._sent_um: np.ndarray | None = None
+
+    def message(
+        self, stamp_ns: int, film_um: np.ndarray, whole: bool, exact: bool
+    ) -> PointCloud2 | None:
+        """What has changed, None if nothing has.
+
+        Args:
+            film_um: (V,) the film as it is now [um].
+            whole: show all of it, as the first time.
+            exact: show every change, also what no gauge would show.
+        """
+        now_um = film_um.astype(np.float32)
+        if whole or self._sent_um is None:
+            self._sent_um = now_um
+            return self._shown_as.cloud(stamp_ns, now_um)
+        change_um = np.abs(now_um - self._sent_um)
+        vertices = np.flatnonzero(change_um > (0.0 if exact else NO_PAINT_UM))
+        if not len(vertices):
+            return None
+        self._sent_um[vertices] = now_um[vertices]
+        return self._shown_as.cloud(stamp_ns, now_um, vertices)
 
 
 class MeshTiles:
@@ -126,106 +192,6 @@ def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
     """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
     total = sum(laid_cm3.values())
     return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
-
-
-def _cloud(frame_id: str, layout: np.dtype, points: int) -> tuple[PointCloud2, np.ndarray]:
-    """A cloud of so many points, and its (points,) values to fill; four bytes each field."""
-    kinds = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
-    message = PointCloud2(
-        height=1,
-        width=points,
-        fields=[
-            PointField(name=name, offset=4 * k, datatype=kinds[layout[name].kind], count=1)
-            for k, name in enumerate(layout.names or ())
-        ],
-        is_bigendian=sys.byteorder == 'big',
-        point_step=layout.itemsize,
-        row_step=layout.itemsize * points,
-        data=array('B', bytes(layout.itemsize * points)),
-        is_dense=True,
-        header=header(frame_id, 0),
-    )
-    return message, np.frombuffer(message.data, layout)
-
-
-class FilmCloud:
-    """A PointCloud2 with x, y, z [m] and thickness_um, filled in place."""
-
-    LAYOUT = np.dtype([(name, np.float32) for name in ('x', 'y', 'z', 'thickness_um')])
-
-    def __init__(self, positions_m: np.ndarray, frame_id: str) -> None:
-        self.frame_id, self.positions_m = frame_id, positions_m
-        self._message, self._values = _cloud(frame_id, self.LAYOUT, len(positions_m))
-        for name, column in zip('xyz', positions_m.T, strict=True):
-            self._values[name] = column
-
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> PointCloud2:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self._values['thickness_um'] = film_um
-        return self._message
-
-
-class FilmChanges:
-    """Clouds of the points whose film has changed since they were last in one.
-
-    The first holds the whole film, a point for each vertex in their order. The others have one
-    more field, the number of the vertex.
-
-    Args:
-        shown_as: the part, its cloud used for the whole film.
-    """
-
-    LAYOUT = np.dtype([*FilmCloud.LAYOUT.descr, ('vertex', np.uint32)])
-
-    def __init__(self, shown_as: ShownFilm) -> None:
-        self._shown_as = shown_as
-        self._sent_um: np.ndarray | None = None
-
-    def message(
-        self, stamp_ns: int, film_um: np.ndarray, whole: bool, exact: bool
-    ) -> PointCloud2 | None:
-        """What has changed, None if nothing has; publish it before the next call.
-
-        Args:
-            film_um: (V,) the film as it is now [um].
-            whole: show all of it, as the first time.
-            exact: show every change, also what no gauge would show.
-        """
-        cloud = self._shown_as.cloud
-        if whole or self._sent_um is None:
-            self._sent_um = film_um.astype(np.float32)
-            return cloud.message(stamp_ns, film_um)
-        now_um = film_um.astype(np.float32)
-        change_um = np.abs(now_um - self._sent_um)
-        vertices = np.flatnonzero(change_um > (0.0 if exact else NO_PAINT_UM))
-        if not len(vertices):
-            return None
-        message, values = _cloud(cloud.frame_id, self.LAYOUT, len(vertices))
-        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        for name, column in zip('xyz', cloud.positions_m[vertices].T, strict=True):
-            values[name] = column
-        values['thickness_um'] = self._sent_um[vertices] = now_um[vertices]
-        values['vertex'] = vertices
-        return message
-
-
-class FilmField:
-    """A ThicknessField, filled in place."""
-
-    def __init__(self, vertex_count: int, mesh_id: str, frame_id: str) -> None:
-        self._message = ThicknessField(
-            header=header(frame_id, 0),
-            mesh_id=mesh_id,
-            thickness_um=array('f', bytes(4 * vertex_count)),
-        )
-        self._values = np.frombuffer(self._message.thickness_um, np.float32)
-
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self._values[:] = film_um
-        return self._message
 
 
 def stats_message(

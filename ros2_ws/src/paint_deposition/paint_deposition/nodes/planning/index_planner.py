@@ -61,8 +61,8 @@ PLANNER = dict(
     ),
     gun_turns=NodeParameter(
         False,
-        'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
-        'orientation and lays the same profile both ways [-]',
+        'Turn the gun by 180 deg for every return pass; else it keeps its orientation and '
+        'lays the same profile both ways [true/false]',
     ),
     output_directory=NodeParameter('runs', 'Where the action `diagnose` writes [path]'),
     **fixed(
@@ -230,19 +230,16 @@ def _or_nan(value: float | None) -> float:
 def _fill(response: RecommendIndex.Response, answer: Recommendation) -> RecommendIndex.Response:
     response.success = True
     response.message = '; '.join([answer.sentence, *answer.notes])
-    response.index_m = answer.index_m
-    response.sigma_n = answer.sigma_n
+    for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
+        setattr(response, name, getattr(answer, name))
     response.index_range_m = list(answer.index_range_m)
     response.tolerance = _or_nan(answer.tolerance)
     response.window_low_m = [low for low, _ in answer.windows_m]
     response.window_high_m = [high for _, high in answer.windows_m]
     response.minima_index_m = [minimum.index_m for minimum in answer.minima]
     response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
-    response.mean_um = answer.mean_um
-    response.speed_m_per_s = answer.speed_m_per_s
     response.passes = answer.passes or 0
     response.cycle_time_s = _or_nan(answer.cycle_time_s)
-    response.travel = answer.travel
     response.curve_index_m = answer.curve.index_m.tolist()
     response.curve_sigma_n = answer.curve.sigma_n.tolist()
     index_drift = answer.index_drift_m or (math.nan, math.nan)

@@ -254,7 +254,7 @@ class RunRecorder(ManagedNode):
         except RecordingError as error:
             self._record_failure(error)
         except PaintError as error:
-            self.get_logger().error(f'{self._part_topic}: {error}; the run goes on')
+            self.get_logger().error(f'{self._part_topic}: {error}; the run continues')
 
     def _flush(self) -> None:
         if not self.run.complete:

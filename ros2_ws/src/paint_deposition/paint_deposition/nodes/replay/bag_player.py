@@ -73,7 +73,7 @@ class BagPlayer(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
-        # Reliable, so that acknowledgement can be asked.
+        # Reliable, so that it knows of acknowledgements.
         profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)

@@ -137,7 +137,7 @@ class ReplayedTransforms:
 
 
 def _instead(bag: Bag) -> str:
-    """The parameters of the simulator that stand for what the bag tells of the part."""
+    """The parameters of the simulator that stand for what the bag says of the part."""
     for parent, child, place in StaticFrames.in_bag(bag).places:
         if child == 'part':
             values = ', '.join(f'{value:.9g}' for value in place.values)

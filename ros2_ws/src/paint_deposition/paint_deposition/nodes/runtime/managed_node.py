@@ -15,8 +15,8 @@ MANAGED = fixed(
     'it counts when the node starts',
     autostart=NodeParameter(
         True,
-        'Whether the node configures and activates itself when it starts; false: a lifecycle '
-        'manager does [true/false]',
+        'Configure and activate the node when it starts; false: a lifecycle manager does '
+        '[true/false]',
     ),
 )
 ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
@@ -74,7 +74,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         """End threads and the like; what was made on the node goes by itself."""
 
     def _tasks(self) -> Mapping[str, Task]:
-        """What tells of the health of the configured node, by name."""
+        """The health of the configured node by task, by name."""
         return {}
 
     # --- for everybody

@@ -25,7 +25,7 @@ def model_parameters(use: str) -> ParameterTable:
         ),
         'allow_user_effects': NodeParameter(
             False,
-            'Whether a model may name effect files, whose Python code this node then runs '
+            'Allow a model to name effect files, whose Python code this node then runs '
             '[true/false]',
             fixed_because='whoever can set parameters could otherwise run code on this machine; '
             'restart the node with the new value',

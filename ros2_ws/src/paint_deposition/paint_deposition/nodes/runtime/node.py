@@ -184,7 +184,7 @@ Task = Callable[[], Status]
 class Diagnostics:
     """Publishes the status of every task of a node on /diagnostics.
 
-    `tasks` maps a task's name to the function that is asked for its `Status` each period. The
+    `tasks` maps a task's name to the function that gives its `Status` each period. The
     period runs on the steady clock: a simulated clock that stands still must not silence it.
     """
 
@@ -197,11 +197,11 @@ class Diagnostics:
         self._timer = node.create_steady_timer(period_s, self.publish)
 
     def show(self, tasks: Mapping[str, Task]) -> None:
-        """Tell of these tasks from now on."""
+        """Report these tasks from now on."""
         self._tasks = dict(tasks)
 
     def show_only(self, name: str, why: str) -> None:
-        """Tell of this task alone, and of the others why there is nothing to tell.
+        """Report this task alone, and why the others have nothing to report.
 
         An aggregator takes a status that is no longer sent for that of a node that is gone.
         """
@@ -218,7 +218,7 @@ class Diagnostics:
             message.status.append(
                 DiagnosticStatus(
                     level=status.level,
-                    # With the namespace: an aggregator tells two cells apart by it.
+                    # With the namespace: an aggregator distinguishes two cells by it.
                     name=f'{full_name.lstrip("/")}: {name}',
                     message=status.message,
                     hardware_id=full_name,

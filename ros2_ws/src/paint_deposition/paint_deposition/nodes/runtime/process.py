@@ -2,48 +2,50 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import signal
 import sys
-import threading
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import PaintNode
 
 EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
+# The main thread sleeps in the middleware, where no signal reaches it; it wakes so often.
+WAKE_S = 0.1
 
 
-def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None = None) -> int:
-    """Run one node until it finishes or the process is told to stop; return the exit code.
+def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = None) -> int:
+    """Run one node until it finishes or the process gets a signal; return the exit code.
 
     Ctrl-C, twice as `ros2 launch` sends it, and SIGTERM are a request to stop (exit code 0),
     never an exception in the middle of a callback. A PaintError becomes one line on stderr and
     exit code 2, any other exception a traceback and exit code 1; both close the node first.
-    ``stopped`` is set where a signal has come before.
+    ``signals`` holds those that have come before.
     """
     node: PaintNode | None = None
-    stopped = stopped or threading.Event()
+    came = [] if signals is None else signals
 
-    def stop(*_: object) -> None:
-        stopped.set()
-        _break_off_loading()
+    def note(number: int, _frame: object) -> None:
+        came.append(number)
+        if PaintNode.loading:
+            # Reading files can be broken off without harm; an exception could be swallowed by a
+            # library or by the compiler.
+            os._exit(0)
 
     try:
-        _on_signals(stop)
-        if stopped.is_set():
+        _on_signals(note)
+        if came:
             return 0
         _init()
         node = _made(make_node)
-        exit_code = _spin(node, stopped)
+        exit_code = _spin(node, came)
     except Exception as error:
         exit_code = _report(error)
     finally:
@@ -58,16 +60,9 @@ def run_node(make_node: Callable[[], PaintNode], stopped: threading.Event | None
     return exit_code
 
 
-def _on_signals(action: Callable[..., None] | signal.Handlers) -> None:
+def _on_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
     signal.signal(signal.SIGINT, action)
     signal.signal(signal.SIGTERM, action)
-
-
-def _break_off_loading(*_: object) -> None:
-    # Reading files can be broken off without harm; an exception could be lost in a library.
-    if PaintNode.loading:
-        sys.stderr.flush()
-        os._exit(0)
 
 
 def _init() -> None:
@@ -89,15 +84,13 @@ def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
         raise PaintError(f'ROS cannot make the node: {reason}') from None
 
 
-def _spin(node: PaintNode, stopped: threading.Event) -> int:
+def _spin(node: PaintNode, signals: list[int]) -> int:
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    with _signals_finish(node.finished):
-        if stopped.is_set():  # while the node was being made
-            node.finish()
-        else:
-            node.get_logger().info('ready')
-        executor.spin_until_future_complete(node.finished)
+    if not signals:
+        node.get_logger().info('ready')
+    while not (signals or node.finished.done()):
+        executor.spin_once(timeout_sec=WAKE_S)
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)
     return (node.finished.result() or 0) if node.finished.done() else 0
@@ -118,34 +111,3 @@ def _report(error: Exception) -> int:
         return EXIT_BAD_INPUT
     traceback.print_exception(error)
     return EXIT_CRASH
-
-
-@contextlib.contextmanager
-def _signals_finish(finished: Future) -> Iterator[None]:
-    """Signals complete `finished`, which wakes the executor.
-
-    Python runs its signal handlers in the main thread, which sleeps in the middleware where no
-    signal reaches it. The C handler writes to the wake-up descriptor at once, and the thread
-    started here reads it.
-    """
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-
-    def wait_for_signal() -> None:
-        while os.read(reader, 1) != b'\0':
-            if not finished.done():
-                finished.set_result(0)
-
-    _on_signals(_break_off_loading)
-    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    thread = threading.Thread(target=wait_for_signal, name='signals', daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        _on_signals(signal.SIG_IGN)
-        signal.set_wakeup_fd(-1)
-        os.write(writer, b'\0')
-        thread.join()
-        os.close(reader)
-        os.close(writer)
