@@ -115,11 +115,7 @@ class LargeTopic:
 class FilmDisplay:
     """Publishes `thickness/...`: statistics, legend, and the large messages to who listens.
 
-    Args:
-        node: paints the film.
-
-    Attributes:
-        shown_as: the part's messages.
+    `shown_as` are the messages of the part.
     """
 
     def __init__(self, node: PaintingNode) -> None:
@@ -169,12 +165,7 @@ class FilmDisplay:
         return {'last publication [ms]': f'{self._took_s * 1e3:.0f}', **each}
 
     def show(self, film: CommonFilm, changed: bool, run: str) -> None:
-        """Publish the film if it has changed, or to those who do not have it yet.
-
-        Args:
-            film: up to date. changed: since it was last shown.
-            run: of the part.
-        """
+        """Publish the film if it has changed, or to those who do not have it yet."""
         began_s = time.monotonic()
         self.of(self._node.surface)
         if changed:

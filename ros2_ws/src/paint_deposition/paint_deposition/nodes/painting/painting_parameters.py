@@ -69,8 +69,8 @@ PAINTING = dict(
         ),
         pose_reliability=NodeParameter(
             'as_offered',
-            'Reliability required of the publishers of poses and states; as_offered and best_effort '
-            'hear all of them, reliable only those that offer it [name]',
+            'Reliability required of the publishers of poses and states; as_offered and '
+            'best_effort hear all of them, reliable only those that offer it [name]',
             choices=('as_offered', 'best_effort', 'reliable'),
         ),
         catch_up=NodeParameter(

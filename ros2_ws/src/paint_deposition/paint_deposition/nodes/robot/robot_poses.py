@@ -27,15 +27,9 @@ ANOTHER_STREAM_NS = 1_000_000_000
 
 
 class JointPoses:
-    """Computes a pose from each joint state, which must have all joints.
+    """Computes a pose of frame `tip` in `base` from each joint state, which must have all joints.
 
-    Args:
-        robot: the chain of joints.
-        topic: of the joint states, for messages.
-        take_pose: gets each pose.
-
-    Attributes:
-        base, tip: frame of the poses, and whose they are.
+    `topic` is that of the joint states, for messages; `take_pose` gets each pose.
     """
 
     def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
@@ -86,9 +80,6 @@ class TfPoses:
 
     Raises:
         PaintError: tf2 is not installed.
-
-    Attributes:
-        base, tip: the same.
     """
 
     def __init__(self, node: PaintNode, base: str, tip: str, take_pose: TakePose) -> None:

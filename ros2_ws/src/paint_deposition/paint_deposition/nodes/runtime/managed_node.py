@@ -77,8 +77,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         """The health of the configured node by task, by name."""
         return {}
 
-    # --- for everybody
-
     @property
     def configured(self) -> bool:
         return len(self._before) > 0
