@@ -10,28 +10,15 @@ from nodes.processes import NodeProcess
 NODE = """
 import os, signal, sys, time
 from pathlib import Path
-import llvmlite.binding as llvm
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.process import run_node
 
 
-def compile_and_be_told_to_end():
-    # The signal comes while LLVM, called from Python, calls Python.
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_default_triple().create_target_machine()
-    module = llvm.parse_assembly('define i32 @one() { ret i32 1 }')
-    engine = llvm.create_mcjit_compiler(module, machine)
-    engine.set_object_cache(lambda *_: os.kill(os.getpid(), signal.SIGTERM), None)
-    engine.finalize_object()
-
-
 class Worker(PaintNode):
     PARAMETERS = {
         'does': NodeParameter('run', 'What it does [word]'),
-        'rate_hz': NodeParameter(1.0, 'Rate [Hz]', (0.1, float('inf'))),
     }
 
     def __init__(self, **kwargs):
@@ -48,10 +35,6 @@ class Worker(PaintNode):
             print('loading', flush=True)
             while True:
                 time.sleep(0.01)
-        if self.values['does'] == 'compile':
-            compile_and_be_told_to_end()
-            while True:
-                time.sleep(0.01)
 
     def work(self):
         if not self.ready:
@@ -62,10 +45,6 @@ class Worker(PaintNode):
             raise PaintError('the disk is full; empty it')
         if does == 'crash':
             raise ZeroDivisionError('never mind')
-        if does == 'finish':
-            self.finish(3)
-        if does == 'fail_later':
-            self.fail(PaintError('the bag is damaged; recover it'))
         if does == 'work':
             print('working', flush=True)
             start = time.monotonic()
@@ -89,8 +68,8 @@ def worker(ros_domain, tmp_path):
     """`worker(does)`: a process of the node above."""
     started = []
 
-    def worker(does: str, **parameters) -> NodeProcess:
-        process = NodeProcess(tmp_path / does, '', code=NODE, does=does, **parameters)
+    def worker(does: str) -> NodeProcess:
+        process = NodeProcess(tmp_path / does, '', code=NODE, does=does)
         started.append(process)
         return process
 

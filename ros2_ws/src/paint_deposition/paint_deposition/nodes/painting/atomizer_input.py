@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import time
+from collections import Counter
 from collections.abc import Callable
 
 import numpy as np
@@ -35,6 +36,7 @@ TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
 POSES_A_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
+NO_FLOW = 'states that spray with flow 0'
 
 
 def several_guns(publishers: list[str]) -> str:
@@ -66,10 +68,8 @@ class AtomizerInput:
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: why the last was.
         unpainted: poses that came while the node was not active.
-        without_frame: poses that name no frame.
-        refused_states: states without a time, a possible flow or a brush of the model;
-            refusals_of_states: why, each reason once.
-        states_without_flow: states that spray with flow 0.
+        odd: other poses and states with which something is wrong, by what it is, in words.
+        refusals_of_states: why states were refused, each reason once.
         intervals, jumps: of the stamps, and steps that no robot makes. These and all counts from
             `refused_frames` on are since the last reset.
     """
@@ -142,10 +142,8 @@ class AtomizerInput:
         """Forget what was wrong so far."""
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
-        self.refused_states = 0
+        self.odd: Counter[str] = Counter()
         self.refusals_of_states: set[str] = set()
-        self.states_without_flow = 0
-        self.without_frame = 0
         self.unpainted = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
@@ -250,7 +248,7 @@ class AtomizerInput:
         p, q = message.pose.position, message.pose.orientation
         pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
         if self._frame.is_own(frame_id):
-            self.without_frame += not frame_id
+            self.odd['poses without a frame'] += not frame_id
         else:
             pose = self._frame.transform_from(frame_id, stamp).applied(*pose)
         self._stamps.append(stamp)
@@ -287,12 +285,12 @@ class AtomizerInput:
             if str(error) not in self.refusals_of_states:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
             self.refusals_of_states.add(str(error))
-            self.refused_states += 1
+            self.odd['states refused'] += 1
             return
         if message.spraying and flow == 0.0:
-            if not self.states_without_flow:
+            if not self.odd[NO_FLOW]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
-            self.states_without_flow += 1
+            self.odd[NO_FLOW] += 1
         self.sprays = flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 

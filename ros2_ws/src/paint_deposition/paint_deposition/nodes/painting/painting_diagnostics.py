@@ -39,6 +39,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     counts = film.counts
     rhythm_ns = source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
+    counted |= {'steps faster than a robot': source.jumps.count, **source.odd}
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
@@ -50,14 +51,10 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'programmed speed [m/s]': f'{source.programmed_m_per_s:.3f}'
         if source.programmed_m_per_s > 0.0
         else 'unknown',
-        'steps faster than a robot': source.jumps.count,
-        'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses not painted while inactive': source.unpainted,
-        'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
-        'states refused': source.refused_states,
-        'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(film),
     }
@@ -77,10 +74,6 @@ def poses_status(node: PaintingNode, number: int) -> Status:
             values,
         )
     counted['poses refused for their frame'] = source.poses_refused
-    counted['states refused'] = source.refused_states
-    counted['states that spray with flow 0'] = source.states_without_flow
-    counted['poses without a frame'] = source.without_frame
-    counted['steps faster than a robot'] = source.jumps.count
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
     silent_s = now_s - source.pose_s
     if source.sprays and silent_s > SILENT_S:
