@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -32,19 +34,9 @@ pytestmark = pytest.mark.timeout(600)
 
 
 @pytest.fixture
-def call(ros_context, spin, wait_until):
+def call(onlooker, call):
     """`call(type, name, request)`: the response of a service of another process."""
-    caller = Onlooker(ros_context, {})
-    spin(caller)
-
-    def call(service, name, request):
-        client = caller.create_client(service, name)
-        wait_until(client.service_is_ready, what=f'service {name}')
-        future = client.call_async(request)
-        wait_until(future.done, what=f'answer of {name}')
-        return future.result()
-
-    return call
+    return partial(call, onlooker({}))
 
 
 def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wait_until, tmp_path):

@@ -16,6 +16,7 @@ from std_srvs.srv import Trigger
 from nodes.cell import Robot, offline_um, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import topics
 
@@ -111,3 +112,9 @@ def test_a_reset_gives_up_what_was_to_be_caught_up(
     rest = poses_of(motion, slice(AGAIN_AT, POSES))
     cell.send(rest)
     assert np.array_equal(painted(node, len(rest)), offline_um(node, rest))
+
+
+def test_only_the_motion_of_a_recording_is_copied(tmp_path):
+    run = write_pose_bag(tmp_path / 'run', MOTION)
+    copied = recover(run, tmp_path / 'copy', topics=['/atomizer/pose'])
+    assert copied.counts == {'/atomizer/pose': POSES}

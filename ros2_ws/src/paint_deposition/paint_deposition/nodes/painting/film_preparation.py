@@ -1,4 +1,4 @@
-"""Films that are prepared in a thread while the node goes on: repainted, or caught up."""
+"""Films that are prepared in a thread while the node paints: repainted, or caught up."""
 
 from __future__ import annotations
 

@@ -300,7 +300,7 @@ class PaintingNode(ManagedNode, ABC):
         self.model_problem = ''
         try:
             film = repainting.take_over(self.film)
-        except (Exception, SystemExit) as error:  # of a user's effect; the old model goes on
+        except (Exception, SystemExit) as error:  # of a user's effect; the old model stays
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
             self.models = tuple(gun.model for gun in self.film.guns)
