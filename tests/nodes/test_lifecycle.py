@@ -83,11 +83,6 @@ def recorder(ros_context, spin, tmp_path):
     return node
 
 
-def test_a_node_that_is_left_alone_is_active(simulator, manager):
-    node = simulator()
-    assert manager(node).state == 'active'
-
-
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
                                              wait_until):  # fmt: skip
     node = simulator(autostart=False)

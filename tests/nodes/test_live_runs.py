@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 SIMULATOR = 'deposition_simulator'
 COMPARISON = 'model_comparison'
@@ -32,19 +34,9 @@ pytestmark = pytest.mark.timeout(600)
 
 
 @pytest.fixture
-def call(ros_context, spin, wait_until):
+def call(onlooker, call):
     """`call(type, name, request)`: the response of a service of another process."""
-    caller = Onlooker(ros_context, {})
-    spin(caller)
-
-    def call(service, name, request):
-        client = caller.create_client(service, name)
-        wait_until(client.service_is_ready, what=f'service {name}')
-        future = client.call_async(request)
-        wait_until(future.done, what=f'answer of {name}')
-        return future.result()
-
-    return call
+    return partial(call, onlooker({}))
 
 
 def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wait_until, tmp_path):
@@ -83,7 +75,7 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
     """The recorder is there at once, the simulator seconds later; both get every pose."""
     mesh = write_panel(tmp_path / 'panel.stl')
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
-    statistics = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    statistics = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
     with (
         NodeProcess(tmp_path / 'player', PLAYER, bag=bag, wait_for_subscribers=2) as player,
         NodeProcess(
@@ -140,19 +132,3 @@ def test_ctrl_c_while_a_model_is_prepared_ends_it(ros_domain, call, tmp_path):
         assert answer.results[0].successful, answer.results[0].reason
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
-
-
-@pytest.mark.parametrize(
-    ('module', 'values', 'words'),
-    [
-        (SIMULATOR, {}, 'mesh_file is empty'),
-        (SIMULATOR, {'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        (COMPARISON, {'mesh_file': 'nowhere.stl'}, 'measurements_file is empty'),
-    ],
-)
-def test_bad_input_ends_the_process_with_one_line(ros_domain, tmp_path, module, values, words):
-    with NodeProcess(tmp_path / 'node', module, **values) as node:
-        assert node.wait() == 2
-        lines = node.err.splitlines()
-    assert len(lines) == 1
-    assert words in lines[0]

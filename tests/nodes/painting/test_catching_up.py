@@ -1,4 +1,4 @@
-"""A simulator that dies in a run and is started again has the whole film in the end."""
+"""A simulator that ends in a run and is started again has the whole film in the end."""
 
 from __future__ import annotations
 
@@ -16,13 +16,14 @@ from std_srvs.srv import Trigger
 from nodes.cell import Robot, offline_um, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 POSES = 900
 MOTION = two_passes(poses=POSES)
-KILLED_AT, AGAIN_AT = 350, 500
-STATS = {'thickness/stats': (ThicknessStats, qos.LATCHED)}
+ENDED_AT, AGAIN_AT = 350, 500
+STATS = {'thickness/stats': (ThicknessStats, topics.LATCHED)}
 
 
 def test_it_catches_up_from_the_running_recording(
@@ -38,12 +39,15 @@ def test_it_catches_up_from_the_running_recording(
         )
         with first:
             wait_until(lambda: robot.has_listeners(2), what='both')
-            robot.send(MOTION, slice(0, KILLED_AT))
+            robot.send(MOTION, slice(0, ENDED_AT))
             wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
-        # Killed; the gun goes on.
-        robot.send(MOTION, slice(KILLED_AT, AGAIN_AT))
+            first.terminate()
+            first.wait()
+        wait_until(lambda: not robot.has_listeners(2), what='the recorder alone')
+        # The gun paints on meanwhile.
+        robot.send(MOTION, slice(ENDED_AT, AGAIN_AT))
         node = simulator(catch_up=str(tmp_path / 'run'), pose_queue_depth=2000)
-        wait_until(lambda: robot.is_heard_by(node), what='the new simulator')
+        wait_until(lambda: robot.is_heard_by(node) and robot.has_listeners(2), what='both')
         robot.send(MOTION, slice(AGAIN_AT, POSES))
         film, expected = painted(node, POSES), offline_um(node, MOTION)
     assert expected.max() > 5.0
@@ -108,3 +112,9 @@ def test_a_reset_gives_up_what_was_to_be_caught_up(
     rest = poses_of(motion, slice(AGAIN_AT, POSES))
     cell.send(rest)
     assert np.array_equal(painted(node, len(rest)), offline_um(node, rest))
+
+
+def test_only_the_motion_of_a_recording_is_copied(tmp_path):
+    run = write_pose_bag(tmp_path / 'run', MOTION)
+    copied = recover(run, tmp_path / 'copy', topics=['/atomizer/pose'])
+    assert copied.counts == {'/atomizer/pose': POSES}

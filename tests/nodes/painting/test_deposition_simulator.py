@@ -29,7 +29,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 from paint_deposition.part.facing import toward_the_gun
 
@@ -50,54 +50,6 @@ def test_the_film_is_that_of_the_offline_run(simulator, robot, painted):
     assert exact.max() > 5.0
     assert np.abs(film - exact).max() < 1e-6 * exact.max()
     assert np.array_equal(film, offline_um(node, MOTION))
-
-
-def test_the_rate_at_which_poses_come_changes_no_bit(simulator, robot, painted):
-    node = simulator()
-    source = robot(node)
-    source.send(MOTION)
-    at_once = painted(node)
-    node.reset()
-    for start in range(0, len(MOTION), 37):
-        source.send(MOTION, slice(start, start + 37))
-        film = painted(node, min(start + 37, len(MOTION)))
-    assert np.array_equal(film, at_once)
-
-
-def test_without_any_state_the_gun_always_sprays(simulator, robot, painted):
-    motion = two_passes(trigger=False)
-    node = simulator()
-    robot(node).send(motion)
-    assert np.array_equal(painted(node), offline_um(node, motion))
-
-
-def test_a_state_that_comes_after_poses_of_its_time_still_cuts_there(simulator, robot, painted):
-    node = simulator()
-    source = robot(node)
-    changes = zip(MOTION.trigger_stamps_ns, MOTION.trigger_flow, strict=True)
-    sent = 0
-    for stamp, flow in changes:
-        upto = int(np.searchsorted(MOTION.stamps_ns, stamp + 60_000_000))
-        poses = two_passes(trigger=False)
-        source.send(poses, slice(sent, upto))
-        painted(node, upto)
-        source.send_state(stamp, flow)
-        sent = upto
-    source.send(two_passes(trigger=False), slice(sent, None))
-    assert np.array_equal(painted(node), offline_um(node, MOTION))
-    assert node.film.counts.late_triggers == 0
-
-
-def test_a_surface_turned_inside_out_is_painted_all_the_same(simulator, robot, painted, tmp_path):
-    right = simulator()
-    wrong = simulator(mesh_file=str(write_panel(tmp_path / 'reversed.stl', reverse=True)))
-    robot(right, wrong).send(MOTION)
-    film = painted(right)
-    painted(wrong)
-    wrong.up_to_date()
-    assert wrong.film.up_to_date().film_um.sum() == pytest.approx(film.sum(), rel=1e-5)
-    assert any('turned round' in note for note in wrong.surface.notes)
-    assert np.array_equal(wrong.surface.normals, np.tile([0, -1, 0], (len(film), 1)))
 
 
 def test_the_gun_tells_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
@@ -136,7 +88,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         pose_queue_depth=5000,
     )
     assert len(node.surface.faces) > 100_000
-    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
+    viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
     motion = two_passes(poses=1500, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
     player = 'bag_player'

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,22 +16,23 @@ pytest.importorskip('rclpy')
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 
-from cli.command import paint
+from brushes import two_brushes
 from nodes.cell import (
-    DIAGNOSTICS,
     PANEL_M,
     offline_um,
     parameters,
     two_passes,
-    values_of,
     write_panel,
 )
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'
@@ -81,7 +83,7 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
                                             wait_until, tmp_path):  # fmt: skip
     node = simulator()
     viewer = onlooker(
-        {'part': (Part, qos.LATCHED), 'thickness/stats': (ThicknessStats, qos.LATCHED)}
+        {'part': (Part, topics.LATCHED), 'thickness/stats': (ThicknessStats, topics.LATCHED)}
     )
     source = robot(node)
     first = change(serial='4711', type='door')
@@ -160,38 +162,25 @@ def test_poses_that_come_while_a_mesh_is_read_wait_for_it(simulator, robot, pain
     assert np.array_equal(film, offline_um(node, MOTION))
 
 
-def test_a_mesh_that_was_read_ahead_makes_no_gap(simulator, robot, painted, change, onlooker,
-                                                 wider, wait_until):  # fmt: skip
-    node = simulator(max_edge_length_m=0.015)
-    viewer = onlooker(DIAGNOSTICS)
-    first = node.mesh_file
-    unprepared = change(serial='1', mesh_file=wider)
-    assert unprepared.success, unprepared.message
-    # The one that has left is prepared, and so is what was read ahead.
-    back = change(serial='2', mesh_file=first)
-    again = change(serial='3', mesh_file=wider)
-    assert max(back.gap_s, again.gap_s) < 0.2 * unprepared.gap_s
-    third = write_panel(node_folder(node) / 'third.stl', reverse=True)
-    prepared = change(mesh_file=str(third), prepare=True)
+def test_a_mesh_that_was_read_ahead_is_there_at_once(simulator, change, wider, tmp_path):
+    """And so is the one of the part that has left."""
+    node = simulator()
+    first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
+    prepared = change(mesh_file=third, prepare=True)
     assert prepared.success
     assert 'third.stl is prepared: Surface(' in prepared.message
-    assert node.mesh_file == wider
-    ahead = change(serial='4', mesh_file=str(third))
-    assert ahead.gap_s < 0.2 * unprepared.gap_s
-    robot(node).send(MOTION)
-    film = painted(node, len(MOTION))
-    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the gun')
-    assert node.film.up_to_date().film_um.max() > 1.0, film.max()
+    assert node.mesh_file == first
 
-    def gap():
-        status = viewer.status('deposition_simulator: part')
-        return status and values_of(status)['gap of the last change [ms]']
+    def ready() -> str:
+        return node.parts.status().values['meshes prepared']
 
-    wait_until(lambda: gap() == f'{ahead.gap_s * 1e3:.1f}', what='the gap in the diagnostics')
-
-
-def node_folder(node):
-    return Path(node.mesh_file).parent
+    assert ready() == third
+    assert change(serial='1', mesh_file=third).success
+    assert ready() == first
+    assert change(serial='2', mesh_file=wider).success
+    assert ready() == f'{first} {third}'
+    assert change(serial='3', mesh_file=first).success
+    assert ready() == f'{third} {wider}'
 
 
 def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change, wider,
@@ -273,22 +262,73 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
             messages = {topic.name: topic.message_count for topic in bag.topics}
         # Where the part stands was published once, before the first of them.
         assert messages['/part'] == messages['/part_pose'] == 1
+        # The second begins with the state in which the gun was left.
+        assert messages['/atomizer/state'] == len(motion.triggers) + number - 1
         assert messages['/thickness/field']
         told = (run / 'metadata.yaml').read_text()
         assert f'serial: 47-{number}' in told
         saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
         assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
-    table = paint('runs', folder)
-    assert table.returncode == 0, table.stderr
-    heading, *rows = table.stdout.splitlines()
-    assert heading.split()[:3] == ['run', 'type', 'coat']
-    # The run before the first part has no film.
-    assert [row.split()[0] for row in rows] == ['47-1', '47-2', 'before']
-    assert rows[0].split()[1:3] == ['door', '1']
-    told = json.loads(paint('runs', folder, '--json').stdout)['runs']
-    assert [(run['serial'], run['poses'], run['recording']) for run in told] == [
-        ('47-1', len(MOTION), 'complete'),
-        ('47-2', len(MOTION), 'complete'),
-        ('', None, 'complete'),
-    ]
-    assert told[0]['film']['max_um'] == pytest.approx(saved.max(), rel=1e-3)
+
+
+def test_a_mesh_exported_anew_is_painted_in_its_new_shape(simulator, robot, painted, change,
+                                                          wider):  # fmt: skip
+    """Under the name of the part in the cell, and of one that was there before."""
+    node = simulator()
+    first = node.mesh_file
+    narrow = Path(first).read_bytes()
+    shutil.copy(wider, first)
+    assert change(serial='1').success
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
+    Path(first).write_bytes(narrow)
+    assert change(serial='2', mesh_file=wider).success
+    assert change(serial='3', mesh_file=first).success
+    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(PANEL_M)
+
+
+@pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
+def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot, painted, onlooker,
+                                                               wait_until, tmp_path, pose,
+                                                               frame):  # fmt: skip
+    """Poses that came while the next mesh was read are painted where the old part stands."""
+    node = simulator(part_pose=pose, part_parent_frame='cell')
+    large, broken = write_panel(tmp_path / 'large.stl'), tmp_path / 'broken.stl'
+    mesh = read_mesh(large, max_edge_length_m=0.005)
+    trimesh.Trimesh(mesh.vertices_m, mesh.faces).export(large)
+    broken.write_text('no mesh')
+    source, operator = robot(node), onlooker({})
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    # The broken mesh is looked at after the large one.
+    client.call_async(ChangePart.Request(prepare=True, mesh_file=str(large)))
+    aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
+    request = ChangePart.Request(serial='1', mesh_file=str(broken), part_pose=aside)
+    future = client.call_async(request)
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(MOTION, frame_id=frame)
+    wait_until(future.done, what='the answer')
+    assert not future.result().success
+    assert list(node.values['part_pose']) == pose
+    film, expected = painted(node, len(MOTION)), offline_um(node, MOTION)
+    assert np.abs(film - expected).max() <= 1e-6 * expected.max()
+
+
+def test_a_carried_brush_must_be_in_a_new_model(simulator, robot, painted, change, wider,
+                                                wait_until, tmp_path):  # fmt: skip
+    """The gun sprays on with it when the next part comes."""
+    brushes = two_brushes()
+    write_model(tmp_path / 'brushes.yaml', brushes)
+    other = DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
+    write_model(tmp_path / 'other.yaml', other)
+    node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
+    source = robot(node)
+    source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0, brush=2)
+    source.send(WITHOUT_TRIGGER)
+    painted(node, len(WITHOUT_TRIGGER))
+    assert change(serial='1', mesh_file=wider).success
+    node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
+    wait_until(lambda: not node.repainting, what='the end of the trial')
+    assert 'brush 2 is not in the model' in node.model_problem
+    source.send(later(WITHOUT_TRIGGER))
+    film = painted(node, len(WITHOUT_TRIGGER))
+    assert film.max() > 1.0

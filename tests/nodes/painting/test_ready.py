@@ -13,7 +13,7 @@ from nodes.processes import NodeProcess
 from paint_deposition.files.meshes import read_mesh
 
 # Each takes a tenth of a second or more, and none is needed to paint a part that is kept.
-SLOW = ('matplotlib', 'trimesh', 'scipy.linalg', 'scipy.spatial', 'scipy.special', 'networkx')
+SLOW = ('matplotlib', 'trimesh', 'networkx')
 START = f"""
 import atexit, sys
 from paint_deposition.nodes.executables import deposition_simulator
@@ -46,15 +46,3 @@ def test_it_loads_nothing_that_it_does_not_use(part, ros_domain, wait_until, tmp
         simulator.terminate()
         assert simulator.wait() == 0, simulator.err
         assert 'loaded set()' in simulator.out
-
-
-def test_compiled_code_still_finds_what_multiplies_matrices(ros_domain, tmp_path):
-    """An effect of the user's own may call what Numba takes from SciPy."""
-    code = (
-        'import paint_deposition.nodes.painting.early, numpy as np, numba\n'
-        'product = numba.njit(lambda a: np.linalg.norm(a) + np.dot(a, a) + np.convolve(a, a)[0])\n'
-        'print(product(np.array([3.0, 4.0])))\n'
-    )
-    with NodeProcess(tmp_path / 'product', '', code=code) as process:
-        assert process.wait() == 0, process.err
-        assert float(process.out) == pytest.approx(5.0 + 25.0 + 9.0)

@@ -18,7 +18,7 @@ from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 
 def moved(motion: Trajectory, by_m: list[float]) -> Trajectory:
@@ -84,8 +84,8 @@ def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, pa
 
 def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
-    fields = {f'{gun}/thickness/field': (ThicknessField, qos.RESULTS) for gun in GUNS}
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | fields | DIAGNOSTICS)
+    fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields | DIAGNOSTICS)
     first, second = guns(node)
     first.send(HIGH)
     second.send(LOW)

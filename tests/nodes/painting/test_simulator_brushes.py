@@ -121,17 +121,3 @@ def test_live_set_points_paint_between_brushes_as_offline(simulator, robot, pain
         ),
         what='the brush between in the diagnostics',
     )
-
-
-def test_live_set_points_outside_the_brushes_are_refused_and_the_gun_stays(
-    simulator, robot, painted, onlooker, wait_until, model_file
-):
-    node = simulator(model_file=model_file)
-    viewer = onlooker(DIAGNOSTICS)
-    robot(node).send(between(MIDDLE, CLOSED, NEARER, TOO_FAST))
-    film = painted(node)
-    taken = between(MIDDLE, CLOSED, NEARER, NEARER)
-    stays = replace(taken, trigger_flow=np.array([1.0, 0.0, 0.8, 0.8]))
-    assert np.array_equal(film, offline_um(node, stays, MODEL))
-    refusal = 'bell_speed_rpm is 52000, outside 30000 to 50000 of the calibrated brushes 1, 2'
-    wait_until(lambda: (s := viewer.status(POSES)) and refusal in s.message, what='the refusal')

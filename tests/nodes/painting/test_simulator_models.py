@@ -108,21 +108,6 @@ def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
     assert not node.get_parameter('allow_user_effects').value
 
 
-def test_a_model_is_read_once(simulator, robot, painted, wait_until, tmp_path):
-    """What is used is what was checked, whatever becomes of the file."""
-    model = DepositionModel(planar={'K1_cm3_per_s': 0.19})
-    write_model(tmp_path / 'thin.yaml', model)
-    node = simulator()
-    robot(node).send(MOTION)
-    painted(node)
-    assert node.set_parameters(parameters(model_file=str(tmp_path / 'thin.yaml')))[0].successful
-    (tmp_path / 'thin.yaml').unlink()
-    node.set_parameters(parameters(max_pose_gap_s=0.3))
-    wait_until(lambda: not node.repainting, what='repainting')
-    assert node.film.guns[0].model == model
-    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, MOTION, model))
-
-
 def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted, wait_until,
                                                       tmp_path):  # fmt: skip
     thin = DepositionModel(planar={'K1_cm3_per_s': 0.19})
@@ -153,3 +138,24 @@ def test_a_reset_while_a_model_is_prepared_is_kept(simulator, robot, painted, wa
     source.send(MOTION)
     wait_until(lambda: not node.repainting)
     assert np.array_equal(painted(node), offline_um(node, MOTION, model))
+
+
+def test_a_gun_that_was_off_before_a_reset_stays_off_in_a_new_model(
+    simulator, robot, painted, wait_until, tmp_path
+):
+    """The model is taken over after the reset and before the next pose."""
+    model = DepositionModel(planar={'K1_cm3_per_s': 0.19})
+    write_model(tmp_path / 'new.yaml', model)
+    node = simulator()
+    source = robot(node)
+    motion = two_passes(trigger=False)
+    source.send(motion, slice(0, 100))
+    source.send_state(motion.stamps_ns[100], 0.0)
+    source.send(motion, slice(100, 300))
+    painted(node, 300)
+    node.reset()
+    assert node.set_parameters(parameters(model_file=str(tmp_path / 'new.yaml')))[0].successful
+    wait_until(lambda: not node.repainting, what='the new model')
+    source.send(motion, slice(300, None))
+    assert painted(node, 300).max() == 0.0
+    assert node.film.guns[0].model == model

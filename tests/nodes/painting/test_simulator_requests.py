@@ -20,15 +20,14 @@ from nodes.cell import (
     parameters,
     two_passes,
 )
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 
 
 def test_reset_bares_the_metal(simulator, robot, painted, onlooker, call, wait_until):
     node = simulator()
-    viewer = onlooker({'thickness/field': (ThicknessField, qos.RESULTS)})
+    viewer = onlooker({'thickness/field': (ThicknessField, topics.RESULTS)})
     source = robot(node)
     source.send(MOTION)
     first = painted(node)
@@ -58,7 +57,7 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     mesh = trimesh.load_mesh(folder / 'door_7.ply', process=False)
     assert np.array_equal(mesh.faces, node.surface.faces)
     figures = json.loads((folder / 'door_7.json').read_text())
-    assert figures['mesh_id'] == node.shown_as.mesh_id
+    assert figures['mesh_id'] == node.display.shown_as.mesh_id
     assert figures['poses']['received'] == len(MOTION)
     again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
     assert not again.success
@@ -101,24 +100,13 @@ def test_changes_that_cannot_be_are_refused_with_the_reason(simulator, values, r
     assert {name: node.get_parameter(name).value for name in values} == before
 
 
-def test_every_parameter_says_what_it_is_and_whether_it_can_change(simulator):
-    node = simulator()
-    for name, row in DepositionSimulator.PARAMETERS.items():
-        descriptor = node.describe_parameter(name)
-        assert len(descriptor.description) > 10, name
-        assert '[' in descriptor.description, name
-        assert descriptor.read_only == row.is_read_only, name
-        if descriptor.read_only:
-            assert 'cannot change' in descriptor.additional_constraints
-
-
 def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, onlooker,
                                                     wait_until):  # fmt: skip
     node = simulator()
     viewer = onlooker(
         {
-            'thickness/stats': (ThicknessStats, qos.LATCHED),
-            'thickness/legend': (MarkerArray, qos.LATCHED),
+            'thickness/stats': (ThicknessStats, topics.LATCHED),
+            'thickness/legend': (MarkerArray, topics.LATCHED),
         }
     )
     robot(node).send(MOTION)

@@ -23,14 +23,11 @@ from nodes.cell import (
     Onlooker,
     Robot,
     offline_um,
-    parameters,
     two_passes,
     values_of,
-    write_panel,
 )
-from paint_deposition.film.colour_scales import BARE_RGB, FILM_PALETTE
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.film.colour_scales import FILM_PALETTE
+from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
 POSES = 'deposition_simulator: poses'
@@ -44,11 +41,11 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     node.publish()
     late = onlooker(
         {
-            'thickness/mesh': (Marker, qos.LATCHED),
-            'thickness/legend': (MarkerArray, qos.LATCHED),
-            'thickness/stats': (ThicknessStats, qos.LATCHED),
-            'thickness/field': (ThicknessField, qos.RESULTS),
-            'thickness/cloud': (PointCloud2, qos.RESULTS),
+            'thickness/mesh': (Marker, topics.LATCHED),
+            'thickness/legend': (MarkerArray, topics.LATCHED),
+            'thickness/stats': (ThicknessStats, topics.LATCHED),
+            'thickness/field': (ThicknessField, topics.RESULTS),
+            'thickness/cloud': (PointCloud2, topics.RESULTS),
         }
     )
     wait_until(lambda: all(late.heard.values()), what='all five topics')
@@ -61,7 +58,7 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     colour = mesh.colors[painted_row]
     assert np.allclose([colour.r, colour.g, colour.b], expected[:3], atol=1e-6)
     field = late.newest('thickness/field')
-    assert field.mesh_id == node.shown_as.mesh_id
+    assert field.mesh_id == node.display.shown_as.mesh_id
     assert np.array_equal(field.thickness_um, film.astype(np.float32))
     cloud = late.newest('thickness/cloud')
     values = np.frombuffer(bytes(cloud.data), np.float32).reshape(-1, 4)
@@ -78,27 +75,18 @@ def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, ex
                                                          wait_until):  # fmt: skip
     """One leaves and another comes between two publications: their number stays the same."""
     simulator(publish_rate_hz=0.5)
-    topics = {'thickness/field': (ThicknessField, qos.RESULTS)}
-    first = onlooker(topics)
+    field = {'thickness/field': (ThicknessField, topics.RESULTS)}
+    first = onlooker(field)
     wait_until(lambda: first.heard['thickness/field'], what='the field')
     executor.remove_node(first)
     first.destroy_node()
-    second = onlooker(topics)
+    second = onlooker(field)
     wait_until(lambda: second.heard['thickness/field'], what='the field')
-
-
-def test_bare_metal_is_grey_before_the_first_pose(simulator, onlooker, wait_until):
-    simulator()
-    viewer = onlooker({'thickness/mesh': (Marker, qos.LATCHED)})
-    wait_until(lambda: viewer.newest('thickness/mesh'))
-    colours = {(c.r, c.g, c.b) for c in viewer.newest('thickness/mesh').colors}
-    assert len(colours) == 1
-    assert np.allclose(colours.pop(), np.array(BARE_RGB) / 255.0, atol=1e-6)
 
 
 def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, wait_until):
     node = simulator(target_um=10.0, target_tolerance_um=5.0)
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
     robot(node).send(MOTION)
     film = painted(node)
 
@@ -123,7 +111,7 @@ def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, w
 def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted, onlooker,
                                                       wait_until):  # fmt: skip
     node = simulator()
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | DIAGNOSTICS)
     source = robot(node)
     # Two gaps of gun off, and one pose lost that only the rhythm tells.
     for rows in (slice(0, 100), slice(200, 300), slice(301, 400), slice(500, 600)):
@@ -140,21 +128,22 @@ def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted,
     assert values['gaps'] == '2'
     assert values['intervals over 1.5 times the usual one'] == '3'
     assert values['usual rate [Hz]'] == '250.0'
+    # Across 1 m in 45 % of 600 poses.
+    assert values['speed [m/s]'] == f'{1.0 / (0.45 * 599 * 0.004):.3f}'
+    assert values['programmed speed [m/s]'] == 'unknown'
+    stamp_ns = MOTION.stamps_ns[-1] + 1
+    source.send_fields(stamp_ns, spraying=True, programmed_speed_m_per_s=1.2)
 
+    def programmed() -> str:
+        return values_of(viewer.status(POSES))['programmed speed [m/s]']
 
-def test_stamps_before_any_pose_are_zero(simulator, onlooker, wait_until):
-    simulator()
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)})
-    wait_until(lambda: viewer.newest('thickness/stats'))
-    stats = viewer.newest('thickness/stats')
-    assert stats.header.stamp.sec == 0
-    assert math.isnan(stats.capture_fraction)
+    wait_until(lambda: programmed() == '1.200', what='the programmed speed')
 
 
 def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, painted, onlooker,
                                                              wait_until):  # fmt: skip
     node = simulator()
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | DIAGNOSTICS)
     source = robot(node)
     source.send(MOTION, slice(0, 300))
     good = MOTION.positions_m[300], MOTION.quaternions_xyzw[300]
@@ -184,7 +173,7 @@ def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, p
 def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot, onlooker,
                                                                wait_until):  # fmt: skip
     node = simulator()
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | DIAGNOSTICS)
     robot(node).send(MOTION, frame_id='base_link')
     wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
 
@@ -229,7 +218,7 @@ def test_a_pose_in_the_parent_frame_is_transformed(simulator, robot, painted):
 def test_progress_names_the_newest_pose_and_no_reset_lowers_it(simulator, robot, painted, onlooker,
                                                                wait_until):  # fmt: skip
     node = simulator()
-    player = onlooker({'atomizer/progress': (PoseProgress, qos.PROGRESS)})
+    player = onlooker({'atomizer/progress': (PoseProgress, topics.PROGRESS)})
     wait_until(lambda: player.newest('atomizer/progress'))
     assert player.newest('atomizer/progress').header.stamp.sec == 0
     robot(node).send(MOTION)
@@ -249,7 +238,7 @@ def test_a_partner_that_cannot_be_heard_is_an_error_while_it_is_there(
     simulator, ros_context, ros_domain, spin, onlooker, executor, wait_until
 ):
     simulator(pose_reliability='reliable')
-    viewer = onlooker({'thickness/stats': (ThicknessStats, qos.LATCHED)} | DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | DIAGNOSTICS)
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     late = Onlooker(ros_context, {'thickness/cloud': (PointCloud2, latched)})
     robot = Robot(ros_context, reliable=False)
@@ -301,17 +290,3 @@ def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, executor, 
     executor.remove_node(guns[1])
     guns[1].destroy_node()
     wait_until(lambda: 'publishers' not in status().message)
-
-
-def test_topics_follow_the_namespace(simulator, ros_context, spin, wait_until, tmp_path):
-    node = DepositionSimulator(
-        context=ros_context,
-        namespace='cell1',
-        parameter_overrides=parameters(mesh_file=str(write_panel(tmp_path / 'p.stl'))),
-    )
-    spin(node)
-    source = Robot(ros_context, namespace='cell1')
-    spin(source)
-    wait_until(lambda: source.is_heard_by(node))
-    names = {name for name, _ in node.get_topic_names_and_types()}
-    assert {'/cell1/thickness/mesh', '/cell1/atomizer/pose', '/diagnostics'} <= names

@@ -7,7 +7,7 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 
-from paint_deposition.nodes.painting.tf_queue import LONGEST, TIMEOUT_S, NoTransform, TfQueue
+from paint_deposition.nodes.painting.frames import TIMEOUT_S, NoTransform, TfQueue
 
 
 class Part:
@@ -57,15 +57,6 @@ def test_a_late_transform_lets_the_poses_through_in_order(part):
     assert (part.placed, part.refused, len(part.queue)) == ([4, 8, 12, 16], [], 0)
 
 
-def test_a_pose_that_needs_nothing_waits_behind_one_that_does(part):
-    part.take(20, now_s=0.0)
-    part.take(0, now_s=0.0)
-    assert (part.placed, len(part.queue)) == ([], 2)
-    part.known_until_ns = 20
-    part.release(now_s=0.1)
-    assert part.placed == [20, 0]
-
-
 def test_a_pose_is_refused_when_its_time_is_up(part):
     part.take(4, now_s=0.0)
     part.take(8, now_s=0.1)
@@ -81,9 +72,3 @@ def test_nothing_waits_for_what_cannot_come(part):
     part.may_come = False
     part.take(4, now_s=0.0)
     assert (part.refused, len(part.queue)) == ([4], 0)
-
-
-def test_no_more_wait_than_may(part):
-    for stamp_ns in range(1, LONGEST + 4):
-        part.take(stamp_ns, now_s=0.0)
-    assert (part.refused, len(part.queue)) == ([1, 2, 3], LONGEST)

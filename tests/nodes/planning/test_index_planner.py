@@ -21,16 +21,14 @@ from nodes.cell import (
     Onlooker,
     parameters,
     values_of,
-    write_own_model,
     write_panel,
 )
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
 
@@ -83,23 +81,6 @@ def test_answer_is_the_recommendation(planner, ask):
     assert 'keeps its orientation' in answer.message
 
 
-def test_what_was_not_asked_for_is_nan_or_zero(planner, ask):
-    planner()
-    answer = ask(speed_m_per_s=0.2, one_way=True)
-    assert answer.success
-    assert answer.travel == 'one_way'
-    assert answer.passes == 0
-    for name in ('tolerance', 'cycle_time_s', 'index_drift_low_m', 'standoff_drift_high_m'):
-        assert math.isnan(getattr(answer, name)), name
-
-
-def test_speed_follows_from_the_target(planner, ask):
-    planner()
-    answer = ask(target_um=20.0)
-    assert answer.mean_um == pytest.approx(20.0)
-    assert answer.speed_m_per_s == pytest.approx(1.9 / (20.0 * answer.index_m), rel=1e-6)
-
-
 @pytest.mark.parametrize(
     ('request_', 'words'),
     [
@@ -131,31 +112,12 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
 
 
-def test_effect_files_need_leave_at_the_start_and_later(planner, ros_context, tmp_path):
-    own = write_own_model(tmp_path)
-    (result,) = planner().set_parameters(parameters(model_file=str(own)))
-    assert not result.successful
-    assert 'start the node with allow_user_effects:=true' in result.reason
-    with pytest.raises(ModelError, match='start the node with allow_user_effects:=true'):
-        planner(model_file=str(own))
-    (tmp_path / 'gate').touch()
-    trusted = planner(model_file=str(own), allow_user_effects=True)
-    assert [effect.id for effect in trusted._model.effects] == ['own']
-
-
-def test_gun_turns_is_a_parameter_and_is_told(planner, ask):
-    planner(gun_turns=True)
-    turned = ask(speed_m_per_s=0.2, tolerance=0.2)
-    assert 'gun turns' in turned.message
-    assert turned.sigma_n > ask(speed_m_per_s=0.2, tolerance=0.2, one_way=True).sigma_n
-
-
 def test_passes_are_planned_on_a_mesh_and_latched(
     planner, ros_context, spin, wait_until, tmp_path
 ):
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
-    late = Onlooker(ros_context, {'planned_path': (Path, qos.LATCHED)})
+    late = Onlooker(ros_context, {'planned_path': (Path, topics.LATCHED)})
     spin(late)
     wait_until(lambda: late.newest('planned_path'), what='the latched path')
     path = late.newest('planned_path')
@@ -176,15 +138,6 @@ def test_diagnostics_name_model_and_last_answer(planner, ask, ros_context, spin,
     name = 'index_planner: index'
     wait_until(lambda: (s := onlooker.status(name)) and 'sigma_n' in s.message, what='diagnostics')
     assert values_of(onlooker.status(name))['model'] == 'a 50 mm bell'
-
-
-@pytest.mark.parametrize(
-    'values',
-    [{'model_file': 'nowhere.yaml'}, {'mesh_file': 'nowhere.stl'}, {'direction': 'diagonal'}],
-)
-def test_bad_parameters_stop_the_node(ros_context, values):
-    with pytest.raises(PaintError):
-        IndexPlanner(context=ros_context, parameter_overrides=parameters(**values))
 
 
 def test_bad_model_ends_the_process_with_one_line_and_exit_code_2(ros_domain, tmp_path):

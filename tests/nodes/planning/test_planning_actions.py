@@ -20,7 +20,7 @@ from nodes.cell import parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.plan import PlanRequest, plan
 from small_campaign import small_campaign
 
@@ -76,7 +76,7 @@ def ask(ros_context, spin, wait_until):
 def test_passes_are_planned_with_feedback(planner, ask, onlooker, wait_until, tmp_path):
     mesh = write_panel(tmp_path / 'panel.stl')
     planner()
-    viewer = onlooker({'planned_path': (Path, qos.LATCHED)})
+    viewer = onlooker({'planned_path': (Path, topics.LATCHED)})
     status, result, heard = ask(
         PlanPasses, 'plan_passes', mesh_file=str(mesh), target_um=15.0, direction='vertical'
     )

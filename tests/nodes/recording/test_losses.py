@@ -8,12 +8,12 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
-from rclpy.serialization import serialize_message
 from std_msgs.msg import String
 
 from files.recorded import START_NS
 from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.recording.recorded_topic import LogTime
+from paint_deposition.nodes.runtime import topics
 
 
 def test_gaps_and_missed_messages_are_counted(record, publisher, wait_until):
@@ -47,26 +47,10 @@ def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_un
     assert f'{recorder.run.message_count} messages{missed}' in recorder.summary()
 
 
-@pytest.mark.skipif(not NUMBERED, reason='no message has a number here')
-def test_losses_that_cannot_be_counted_are_not_called_none(record, publisher, wait_until):
-    """Some middlewares number no messages; the second one comes as from them."""
-    recorder = record(topics=['chatter'])
-    sender = publisher(String, 'chatter', QoSProfile(depth=10))
-    sender.publish(String(data='numbered'))
-    topic = recorder.resolve_topic_name('chatter')
-    wait_until(lambda: recorder._topics[topic].messages == 1, what='the message')
-    assert 'cannot be counted' not in recorder.summary()
-    times = {'received_timestamp': 1, 'source_timestamp': 1}
-    cdr = serialize_message(String(data='without a number'))
-    recorder._topics[topic]._on_message(cdr, times | {'publication_sequence_number': None})
-    assert '2 messages (losses cannot be counted: ' in recorder.summary()
-    recorder.close()
-
-
 def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
     record()
     got = []
-    cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
+    cell.create_subscription(DiagnosticArray, '/diagnostics', got.append, topics.DIAGNOSTICS)
     poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
     poses.publish(pose(START_NS))
 
@@ -81,3 +65,11 @@ def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
     assert status.name == 'run_recorder: recording'
     assert int(values['bytes']) > 0
     assert int(values['disk free bytes']) > 0
+
+
+def test_log_times_keep_their_pace_where_the_clock_is_set_back():
+    hour_ns, log_time = 3_600_000_000_000, LogTime()
+    # A little out of order is no step back.
+    before = [log_time.of(START_NS + time) - START_NS for time in (5, 7, 6, 9)]
+    after = [log_time.of(START_NS - hour_ns + time) - START_NS for time in (0, 4, 8)]
+    assert before + after == [5, 7, 6, 9, 9, 13, 17]

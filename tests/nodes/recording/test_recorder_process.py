@@ -24,7 +24,7 @@ from nodes.recording.runs import pose
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 MODULE = 'run_recorder'
 
@@ -94,7 +94,7 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
 def test_a_recorder_told_to_end_completes_its_run(ros_domain, cell, wait_until, tmp_path, how):
     reports: list[PoseProgress] = []
     RobotStream(cell)
-    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, qos.PROGRESS)
+    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, topics.PROGRESS)
     with NodeProcess(
         tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run'
     ) as process:

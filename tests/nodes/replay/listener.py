@@ -7,7 +7,7 @@ from rclpy.qos import QoSProfile
 from rclpy.serialization import deserialize_message
 
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 
 class Listener(Node):
@@ -26,7 +26,7 @@ class Listener(Node):
             AtomizerState, 'atomizer/state', self.take_state, QoSProfile(depth=5_000)
         )
         self.publisher = (
-            self.create_publisher(PoseProgress, 'atomizer/progress', qos.PROGRESS)
+            self.create_publisher(PoseProgress, 'atomizer/progress', topics.PROGRESS)
             if reports is not None
             else None
         )

@@ -14,7 +14,7 @@ from std_srvs.srv import Trigger
 
 from files.recorded import straight_pass
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.runtime import qos
+from paint_deposition.nodes.runtime import topics
 
 
 @pytest.fixture
@@ -28,7 +28,7 @@ def clock_ticks(ros_context, spin):
             Clock,
             '/clock',
             lambda message: ticks.append(Time.from_msg(message.clock).nanoseconds),
-            qos.CLOCK,
+            topics.CLOCK,
         )
         spin(node)
         return ticks

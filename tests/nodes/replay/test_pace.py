@@ -32,18 +32,6 @@ def test_the_player_stays_within_its_window(play, listen, wait_until, still, pas
     assert listener.poses == recorded(pass_bag)
 
 
-def test_the_slowest_of_two_sets_the_pace(play, listen, wait_until, still, pass_bag):
-    listen('quick', reports=True)
-    slow = listen('slow', reports=False)
-    player = play(pass_bag, rate=0.0, window=50, wait_for_subscribers=2)
-    wait_until(lambda: player.poses_published == 50, what='a window of poses')
-    still(0.3)
-    assert player.poses_published == 50
-    slow.create_timer(0.02, slow.report)
-    wait_until(player.finished.done, what='the end of the replay')
-    assert len(slow.poses) == 700
-
-
 def test_a_node_that_dies_does_not_hold_the_replay(
     ros_context, play, listen, wait_until, pass_bag
 ):
@@ -84,13 +72,6 @@ def test_who_joins_late_is_waited_for(play, listen, call, wait_until, still, tmp
     wait_until(player.finished.done, what='the end of the replay')
     everything = recorded(bag)
     assert late.poses == everything[-len(late.poses) :]
-
-
-def test_who_does_not_report_is_not_waited_for(play, listen, wait_until, pass_bag):
-    listener = listen(reports=None)
-    player = play(pass_bag, rate=0.0, window=50)
-    wait_until(player.finished.done, what='the end of the replay')
-    wait_until(lambda: len(listener.poses) == 700, what='all poses')
 
 
 def test_nothing_is_sent_before_somebody_listens(play, listen, wait_until, still, pass_bag):

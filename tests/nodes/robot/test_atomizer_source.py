@@ -127,40 +127,30 @@ def test_a_signal_opens_the_gun(source, driver, viewer, wait_until, trigger, kin
     assert abs(first.header.stamp.sec - time.time()) < 60.0
 
 
-def test_an_analogue_signal_is_the_flow(source, driver, viewer, wait_until):
-    source(trigger='/paint_ml_min > 5', flow='/paint_ml_min', calibrated_flow=250.0)
-    robot = driver(('/paint_ml_min', Float64))
-    for value in (0.0, 250.0, 300.0, 0.0):
-        robot.signals['/paint_ml_min'].publish(Float64(data=value))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 4, what='the changes')
-    told = [viewer.decoded('atomizer/state', row) for row in range(4)]
-    assert [state.spraying for state in told] == [False, True, True, False]
-    assert [state.flow for state in told] == [0.0, 1.0, 1.2, 0.0]
+def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wait_until):
+    source(
+        trigger='/paint_ml_min > 5', flow='/paint_ml_min', calibrated_flow=250.0,
+        brush='/brush_number', speed='/speed_mm_s', speed_scale=0.001,
+    )  # fmt: skip
+    robot = driver(('/paint_ml_min', Float64), ('/brush_number', UInt16), ('/speed_mm_s', UInt16))
 
+    def say(topic: str, message, states: int) -> None:
+        robot.signals[topic].publish(message)
+        wait_until(lambda: len(viewer.heard['atomizer/state']) == states, what=topic)
 
-def test_a_number_is_the_brush(source, driver, viewer, wait_until):
-    source(trigger='/gun', brush='/brush_number')
-    robot = driver(('/gun', Bool), ('/brush_number', UInt16))
-    robot.signals['/gun'].publish(Bool(data=True))
-    # A state needs both.
-    robot.signals['/brush_number'].publish(UInt16(data=3))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 1, what='the state')
-    robot.signals['/brush_number'].publish(UInt16(data=4))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the next brush')
-    told = [viewer.decoded('atomizer/state', row) for row in range(2)]
-    assert [(state.spraying, state.brush) for state in told] == [(True, 3), (True, 4)]
-
-
-def test_the_programmed_speed_is_told(source, driver, viewer, wait_until):
-    source(trigger='/gun', speed='/speed_mm_s', speed_scale=0.001)
-    robot = driver(('/gun', Bool), ('/speed_mm_s', UInt16))
-    robot.signals['/gun'].publish(Bool(data=True))
-    robot.signals['/speed_mm_s'].publish(UInt16(data=350))
-    wait_until(lambda: viewer.heard['atomizer/state'], what='the state')
-    robot.signals['/speed_mm_s'].publish(UInt16(data=500))
-    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the next speed')
-    told = [viewer.decoded('atomizer/state', row).programmed_speed_m_per_s for row in range(2)]
-    assert told == pytest.approx([0.35, 0.5], rel=1e-12)
+    # A state needs all of them.
+    say('/paint_ml_min', Float64(data=0.0), states=0)
+    say('/brush_number', UInt16(data=3), states=0)
+    say('/speed_mm_s', UInt16(data=350), states=1)
+    say('/paint_ml_min', Float64(data=300.0), states=2)
+    say('/brush_number', UInt16(data=4), states=3)
+    say('/speed_mm_s', UInt16(data=500), states=4)
+    states = [viewer.decoded('atomizer/state', row) for row in range(4)]
+    assert [state.spraying for state in states] == [False, True, True, True]
+    assert [state.flow for state in states] == [0.0, 1.2, 1.2, 1.2]
+    assert [state.brush for state in states] == [3, 3, 4, 4]
+    speeds = [state.programmed_speed_m_per_s for state in states]
+    assert speeds == pytest.approx([0.35, 0.35, 0.35, 0.5], rel=1e-12)
 
 
 def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
@@ -172,7 +162,7 @@ def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
     def status(task):
         return viewer.status(f'atomizer_source: {task}')
 
-    wait_until(lambda: (s := status('robot')) and 'no joint state tells of all' in s.message)
+    wait_until(lambda: (s := status('robot')) and 'no joint state has all' in s.message)
     assert 'wrist_roll' in status('robot').message
     wait_until(lambda: '/io: UInt16 has no number or Bool at .level' in status('signals').message)
     assert status('signals').level == b'\x02'

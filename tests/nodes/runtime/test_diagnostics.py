@@ -7,9 +7,8 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticArray
 from rclpy.node import Node
 
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 
 
 def test_every_task_reports_each_period(ros_context, spin, wait_until):
@@ -23,7 +22,7 @@ def test_every_task_reports_each_period(ros_context, spin, wait_until):
     Diagnostics(node, {'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
     listener = Node('listener', context=ros_context)
     got = []
-    listener.create_subscription(DiagnosticArray, '/diagnostics', got.append, qos.DIAGNOSTICS)
+    listener.create_subscription(DiagnosticArray, '/diagnostics', got.append, topics.DIAGNOSTICS)
     spin(node, listener)
     wait_until(lambda: len(got) >= 3, what='diagnostics')
     first, later = got[0], got[2]

@@ -65,12 +65,3 @@ def test_the_mesh_is_the_marker_that_rclpy_builds(part, rng, frame_id, triangles
         assert received == expected
         # Padding may hold anything; there is none behind the header's name.
         assert len(data) == len(serialize_message(expected))
-
-
-def test_serialised_bytes_stay_as_they_are(part):
-    vertices, faces = part
-    mesh = ColouredMesh(vertices, faces, 'part', 'thickness')
-    first = mesh.serialised(1, FILM_PALETTE, np.zeros(40, dtype=int))
-    copy = bytes(bytearray(first))
-    mesh.serialised(2, FILM_PALETTE, np.full(40, 200))
-    assert first == copy

@@ -63,18 +63,6 @@ def test_defaults_keep_their_types(declared):
     assert kinds['down'] == ParameterType.PARAMETER_DOUBLE_ARRAY
 
 
-def test_whole_numbers_serve_as_floats(declared):
-    _, values = declared(rate_hz=3, down=[0, -1, 0])
-    assert (values['rate_hz'], values['down']) == (3.0, [0.0, -1.0, 0.0])
-    assert isinstance(values['rate_hz'], float)
-
-
-def test_lists_of_text(declared):
-    node, values = declared(topics=['a', 'b'])
-    assert values['topics'] == ['a', 'b']
-    assert node.describe_parameter('topics').read_only
-
-
 @pytest.mark.parametrize(
     ('overrides', 'line'),
     [
@@ -120,12 +108,6 @@ def test_later_changes_are_checked_too(declared, name, value, reason):
     assert node.get_parameter(name).value == values[name]
 
 
-def test_a_later_change_that_fits(declared):
-    node, _ = declared()
-    (result,) = node.set_parameters([Parameter('compression', value='none')])
-    assert result.successful
-
-
 def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tmp_path):
     monkeypatch.setenv('HOME', str(tmp_path))
     node, values = declared(mesh_file='~/door.stl', model_file='models~/a.yaml')
@@ -141,20 +123,6 @@ def test_a_home_folder_is_found_at_the_start_and_later(declared, monkeypatch, tm
 def test_a_fixed_parameter_says_why(node_class):
     for name, row in node_class.PARAMETERS.items():
         assert len(row.fixed_because) > 20, name
-
-
-def test_a_running_recorder_says_why_it_refuses(ros_context, executor, tmp_path):
-    recorder = RunRecorder(
-        context=ros_context,
-        parameter_overrides=[Parameter('output_directory', value=str(tmp_path))],
-    )
-    executor.add_node(recorder)
-    (result,) = recorder.set_parameters([Parameter('compression', value='none')])
-    assert not result.successful
-    assert result.reason == (
-        'compression cannot change while the node is configured: the run is made with it; clean '
-        'the node up, or call ~/stop and start another recorder'
-    )
 
 
 def test_sim_time_and_qos_overrides_are_not_ours(declared):

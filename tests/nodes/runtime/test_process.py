@@ -10,28 +10,15 @@ from nodes.processes import NodeProcess
 NODE = """
 import os, signal, sys, time
 from pathlib import Path
-import llvmlite.binding as llvm
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.process import run_node
-
-
-def compile_and_be_told_to_end():
-    # The signal comes while LLVM, called from Python, calls Python.
-    llvm.initialize_native_target()
-    llvm.initialize_native_asmprinter()
-    machine = llvm.Target.from_default_triple().create_target_machine()
-    module = llvm.parse_assembly('define i32 @one() { ret i32 1 }')
-    engine = llvm.create_mcjit_compiler(module, machine)
-    engine.set_object_cache(lambda *_: os.kill(os.getpid(), signal.SIGTERM), None)
-    engine.finalize_object()
 
 
 class Worker(PaintNode):
     PARAMETERS = {
         'does': NodeParameter('run', 'What it does [word]'),
-        'rate_hz': NodeParameter(1.0, 'Rate [Hz]', (0.1, float('inf'))),
     }
 
     def __init__(self, **kwargs):
@@ -48,10 +35,6 @@ class Worker(PaintNode):
             print('loading', flush=True)
             while True:
                 time.sleep(0.01)
-        if self.values['does'] == 'compile':
-            compile_and_be_told_to_end()
-            while True:
-                time.sleep(0.01)
 
     def work(self):
         if not self.ready:
@@ -62,10 +45,6 @@ class Worker(PaintNode):
             raise PaintError('the disk is full; empty it')
         if does == 'crash':
             raise ZeroDivisionError('never mind')
-        if does == 'finish':
-            self.finish(3)
-        if does == 'fail_later':
-            self.fail(PaintError('the bag is damaged; recover it'))
         if does == 'work':
             print('working', flush=True)
             start = time.monotonic()
@@ -89,8 +68,8 @@ def worker(ros_domain, tmp_path):
     """`worker(does)`: a process of the node above."""
     started = []
 
-    def worker(does: str, **parameters) -> NodeProcess:
-        process = NodeProcess(tmp_path / does, '', code=NODE, does=does, **parameters)
+    def worker(does: str) -> NodeProcess:
+        process = NodeProcess(tmp_path / does, '', code=NODE, does=does)
         started.append(process)
         return process
 
@@ -120,20 +99,6 @@ def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
     assert process.out.split() == ['ready', 'closed']
     assert process.err.strip().endswith('[worker]: ready')
     assert complaints(process.err) == []
-
-
-def test_a_signal_that_the_compiler_would_swallow_ends_cleanly(worker):
-    process = worker('compile')
-    assert process.wait() == 0
-    assert complaints(process.err) == []
-
-
-def test_terminate_ends_cleanly(worker, wait_until):
-    process = worker('run')
-    wait_until(lambda: 'ready' in process.out, what='the node')
-    process.terminate()
-    assert process.wait() == 0
-    assert process.out.split() == ['ready', 'closed']
 
 
 def test_a_callback_is_completed_first(worker, wait_until, tmp_path):
@@ -166,12 +131,6 @@ def test_bad_input_is_one_line_and_exit_code_2(worker):
     assert one_line(process.err) == 'error: mesh none.stl does not exist; give a mesh'
 
 
-def test_a_bad_parameter_is_one_line_and_exit_code_2(worker):
-    process = worker('run', rate_hz='0.0')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: worker: rate_hz is 0.0: must be at least 0.1'
-
-
 def test_bad_ros_arguments_are_exit_code_2(ros_domain, tmp_path):
     with NodeProcess(tmp_path / 'bad', '', code=NODE, ros_arguments=('-p', 'does')) as process:
         assert process.wait() == 2
@@ -186,26 +145,11 @@ def test_an_error_in_a_callback_closes_the_node(worker):
     assert process.out.split() == ['ready', 'closed']
 
 
-def test_an_error_from_elsewhere_closes_the_node(worker):
-    process = worker('fail_later')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: the bag is damaged; recover it'
-    assert process.out.split() == ['ready', 'closed']
-
-
 def test_a_defect_shows_its_traceback(worker):
     process = worker('crash')
     assert process.wait() == 1
     assert 'ZeroDivisionError: never mind' in process.err
     assert process.out.split() == ['ready', 'closed']
-
-
-def test_a_node_may_finish_by_itself(worker):
-    process = worker('finish')
-    assert process.wait() == 3
-    assert process.out.split() == ['ready', 'closed']
-    assert process.err.strip().endswith('[worker]: ready')
-    assert complaints(process.err) == []
 
 
 INTERRUPTED_IMPORT = """

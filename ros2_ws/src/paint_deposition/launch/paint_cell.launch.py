@@ -24,110 +24,66 @@ def shared(*path):
     return PathJoinSubstitution([FindPackageShare(PACKAGE), *path])
 
 
+# Name, default and description; a default of 'true' or 'false' is a switch.
+ARGUMENTS = (
+    (
+        'mesh',
+        shared('samples', 'door.stl'),
+        "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]",
+    ),
+    ('model', '', 'Deposition model, model.yaml; empty: a 50 mm bell [path]'),
+    ('allow_user_effects', 'false', 'Run the Python code of effect files that a model names'),
+    ('urdf', '', 'Robot whose joint states give the poses; empty: none [path]'),
+    ('joint_topic', 'joint_states', "The robot's joint states, with urdf [topic]"),
+    ('base_frame', '', 'Frame in which tf gives the poses of tip_frame; empty: none [name]'),
+    (
+        'tip_frame',
+        '',
+        "Frame that carries the gun, with base_frame; empty: tool0. The TCP's offset in it is "
+        'tcp_offset of the parameter file [name]',
+    ),
+    (
+        'trigger',
+        '',
+        'What opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" [topic]',
+    ),
+    ('bag', '', 'Bag to replay into the cell; empty: poses come from the robot [path]'),
+    ('pose_topic', '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"),
+    (
+        'state_topic',
+        '',
+        'Gun trigger in the bag; empty: spraying whenever poses flow [topic]',
+    ),
+    ('rate', '1.0', 'Speed of the replay; 0: as fast as the nodes take poses [-]'),
+    ('publish_clock', 'true', 'Publish the time of the bag on /clock, which all cells share'),
+    ('record', '', 'Folder to record the run in; empty: no recording [path]'),
+    ('measurements', '', 'Gauge readings to compare with, CSV; empty: no comparison [path]'),
+    # A node that is still loading when the replay starts would miss its first poses.
+    (
+        'wait_for_subscribers',
+        '',
+        'Nodes that take the poses and must be there before the replay; empty: as many as are '
+        'started here [count]',
+    ),
+    (
+        'parameters',
+        shared('config', 'cell.yaml'),
+        'Parameters of all nodes; the arguments above go first [path]',
+    ),
+    ('namespace', '', 'Namespace of the cell; topic names are relative to it'),
+    ('use_sim_time', 'false', 'Take time from /clock, which a replayed bag publishes'),
+)
+
+
 def generate_launch_description():
     arguments = [
         DeclareLaunchArgument(
-            'mesh',
-            default_value=shared('samples', 'door.stl'),
-            description="The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]",
-        ),
-        DeclareLaunchArgument(
-            'model',
-            default_value='',
-            description='Deposition model, model.yaml; empty: a 50 mm bell [path]',
-        ),
-        DeclareLaunchArgument(
-            'allow_user_effects',
-            default_value='false',
-            choices=SWITCH,
-            description='Run the Python code of effect files that a model names',
-        ),
-        DeclareLaunchArgument(
-            'urdf',
-            default_value='',
-            description='Robot whose joint states give the poses; empty: none [path]',
-        ),
-        DeclareLaunchArgument(
-            'joint_topic',
-            default_value='joint_states',
-            description="The robot's joint states, with urdf [topic]",
-        ),
-        DeclareLaunchArgument(
-            'base_frame',
-            default_value='',
-            description='Frame in which tf gives the poses of tip_frame; empty: none [name]',
-        ),
-        DeclareLaunchArgument(
-            'tip_frame',
-            default_value='',
-            description="Frame that carries the gun, with base_frame; empty: tool0. The TCP's "
-            'offset in it is tcp_offset of the parameter file [name]',
-        ),
-        DeclareLaunchArgument(
-            'trigger',
-            default_value='',
-            description='What opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" '
-            '[topic]',
-        ),
-        DeclareLaunchArgument(
-            'bag',
-            default_value='',
-            description='Bag to replay into the cell; empty: poses come from the robot [path]',
-        ),
-        DeclareLaunchArgument(
-            'pose_topic',
-            default_value='',
-            description="PoseStamped topic in the bag; empty: the bag's only one [topic]",
-        ),
-        DeclareLaunchArgument(
-            'state_topic',
-            default_value='',
-            description='Gun trigger in the bag; empty: spraying whenever poses flow [topic]',
-        ),
-        DeclareLaunchArgument(
-            'rate',
-            default_value='1.0',
-            description='Speed of the replay; 0: as fast as the nodes take poses [-]',
-        ),
-        DeclareLaunchArgument(
-            'publish_clock',
-            default_value='true',
-            choices=SWITCH,
-            description='Publish the time of the bag on /clock, which all cells share',
-        ),
-        DeclareLaunchArgument(
-            'record',
-            default_value='',
-            description='Folder to record the run in; empty: no recording [path]',
-        ),
-        DeclareLaunchArgument(
-            'measurements',
-            default_value='',
-            description='Gauge readings to compare with, CSV; empty: no comparison [path]',
-        ),
-        # A node that is still loading when the replay starts would miss its first poses.
-        DeclareLaunchArgument(
-            'wait_for_subscribers',
-            default_value='',
-            description='Nodes that take the poses and must be there before the replay; '
-            'empty: as many as are started here [count]',
-        ),
-        DeclareLaunchArgument(
-            'parameters',
-            default_value=shared('config', 'cell.yaml'),
-            description='Parameters of all nodes; the arguments above go first [path]',
-        ),
-        DeclareLaunchArgument(
-            'namespace',
-            default_value='',
-            description='Namespace of the cell; topic names are relative to it',
-        ),
-        DeclareLaunchArgument(
-            'use_sim_time',
-            default_value='false',
-            choices=SWITCH,
-            description='Take time from /clock, which a replayed bag publishes',
-        ),
+            name,
+            default_value=default,
+            description=description,
+            choices=SWITCH if default in SWITCH else None,
+        )
+        for name, default, description in ARGUMENTS
     ]
     # All is checked before the first node starts: one that fails later would leave the others.
     return LaunchDescription([*arguments, OpaqueFunction(function=cell)])
@@ -140,7 +96,7 @@ def cell(context):
 
 
 def wanted(given):
-    """The parameters that the arguments tell of each node, by its name."""
+    """The parameters that the arguments give each node, by its name."""
     if not Path(given['parameters']).is_file():
         raise ValueError(f'parameters: there is no file {given["parameters"]}')
     if given['urdf'] and given['base_frame']:
@@ -194,7 +150,7 @@ def cell_node(given, name, parameters):
             )
 
     # Text stays text, also where it looks like a number.
-    told = {
+    arguments = {
         key: ParameterValue(value, value_type=str) if isinstance(value, str) else value
         for key, value in parameters.items()
     }
@@ -205,7 +161,7 @@ def cell_node(given, name, parameters):
         namespace=given['namespace'],
         parameters=[
             given['parameters'],
-            told | {'use_sim_time': switched(given, 'use_sim_time')},
+            arguments | {'use_sim_time': switched(given, 'use_sim_time')},
         ],
         output='screen',
         on_exit=ended,

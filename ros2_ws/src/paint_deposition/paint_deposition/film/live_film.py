@@ -12,6 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.between_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.lines_of_sight import Obstacle
+from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.pose_stream import (
     DEFAULT_LIMIT_POSES,
@@ -123,8 +124,17 @@ class LiveFilm:
         self._clear()
 
     def carry_on(self, before: 'LiveFilm') -> None:
-        """Begin bare, with the gun as the motion left it that was painted elsewhere before."""
-        self._carried = before._changes or before._carried
+        """Begin bare, with the gun as the motion left it that was painted elsewhere before.
+
+        Raises:
+            ModelError: the model does not have the brush that it sprays with.
+        """
+        carried = before._changes or before._carried
+        # A brush between the calibrated ones is made anew from its set-points.
+        sprayed = {change.brush for change in carried if change.flow > 0.0}
+        brushes = {brush for brush in sprayed if brush < BETWEEN}
+        self.model.require_brushes(brushes)
+        self._carried, self._brushes = carried, brushes
         self._clear()
 
     def _clear(self) -> None:

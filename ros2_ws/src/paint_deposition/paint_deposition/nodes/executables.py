@@ -1,11 +1,9 @@
 """The executables of the nodes: they say in one line what is missing where there is no ROS 2."""
 
-import gc
 import importlib
 import os
 import signal
 import sys
-import threading
 from functools import partial
 from importlib.util import find_spec
 
@@ -20,20 +18,17 @@ REMEDIES = {
 
 def _run(name: str, folder: str, node_class: str) -> int:
     """Load a node's module and run it; returns the process's exit code."""
-    # What is loaded stays. To look through it for garbage time and again, while it grows, would
-    # take a tenth of the start; ``run_node`` begins with that.
-    gc.disable()
-    # Libraries catch what is raised while they are imported, so a signal only leaves word.
-    told_to_stop = threading.Event()
+    # Libraries catch what is raised while they are imported, so a signal is only noted.
+    signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: told_to_stop.set())
+        signal.signal(number, lambda number, _: signals.append(number))
     for needed, remedy in REMEDIES.items():
         if find_spec(needed) is None:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
     module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
     process = importlib.import_module('paint_deposition.nodes.runtime.process')
-    return process.run_node(getattr(module, node_class), told_to_stop)
+    return process.run_node(getattr(module, node_class), signals)
 
 
 atomizer_source = partial(_run, 'atomizer_source', 'robot', 'AtomizerSource')

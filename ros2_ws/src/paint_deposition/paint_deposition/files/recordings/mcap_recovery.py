@@ -4,7 +4,7 @@ import mmap
 import re
 import shutil
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from io import BytesIO
@@ -76,6 +76,7 @@ def recover(
     path: Path | str,
     folder: Path | str,
     on_bytes: Callable[[int], None] = lambda count: None,
+    topics: Collection[str] = (),
 ) -> Recovery:
     """Copy every readable message of `path` into the new run `folder`.
 
@@ -83,6 +84,7 @@ def recover(
         path: an .mcap file or the folder of a run (its files in the order of their numbers).
         folder: must not exist; QoS, type hashes, custom data and distribution come along.
         on_bytes: called with the number of bytes read, for a progress bar.
+        topics: to copy; all, if none are named.
 
     Raises:
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
@@ -101,7 +103,7 @@ def recover(
     try:
         with writer:
             for file, survey in zip(files, surveys, strict=True):
-                _copy(file, survey, writer, recovery, on_bytes)
+                _copy(file, survey, writer, recovery, on_bytes, topics)
             if not writer.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
@@ -210,18 +212,20 @@ def _copy(
     writer: RunWriter,
     recovery: Recovery,
     on_bytes: Callable[[int], None],
+    topics: Collection[str],
 ) -> None:
     with _content(file) as stream:
         position = 0
         for record in _records(file, stream, recovery.breaks):
             for inner in _opened(record, recovery):
                 survey.note(inner)
-                if isinstance(inner, Channel):
+                if isinstance(inner, Channel) and (not topics or inner.topic in topics):
                     _is_kept(inner, survey, writer, recovery)
                 elif isinstance(inner, Message):
                     # The chunk that introduced the channel may be among the damaged ones.
                     channel = survey.channels.get(inner.channel_id)
-                    if channel and _is_kept(channel, survey, writer, recovery):
+                    wanted = channel and (not topics or channel.topic in topics)
+                    if wanted and _is_kept(channel, survey, writer, recovery):
                         writer.write(channel.topic, inner.data, inner.log_time, inner.publish_time)
             on_bytes(stream.tell() - position)
             position = stream.tell()

@@ -23,9 +23,9 @@ from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, Status, Task
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.node import OK, Status, Task
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -68,7 +68,7 @@ class ModelComparison(PaintingNode):
     def _configure(self) -> None:
         super()._configure()
         self._outputs = {
-            topic: self.watch.publisher(message, topic, qos.LATCHED)
+            topic: self.watch.publisher(message, topic, topics.LATCHED)
             for topic, message in (
                 ('comparison/mesh', Marker),
                 ('comparison/stats', ComparisonStats),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 import time
-from typing import TYPE_CHECKING
+from collections import Counter
+from collections.abc import Callable
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -17,16 +18,11 @@ from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
-from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC, of_gun
-from paint_deposition.nodes.runtime.qos_watch import endpoint_name
+from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import PaintNode
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, QosWatch, endpoint_name, of_gun
 
-if TYPE_CHECKING:
-    from paint_deposition.nodes.painting.painting_node import PaintingNode
-
-POSE_TOPIC = 'atomizer/pose'
-STATE_TOPIC = 'atomizer/state'
 RELIABILITIES = {
     'as_offered': None,
     'best_effort': ReliabilityPolicy.BEST_EFFORT,
@@ -38,6 +34,7 @@ TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
 POSES_A_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
+NO_FLOW = 'states that spray with flow 0'
 
 
 def several_guns(publishers: list[str]) -> str:
@@ -52,44 +49,43 @@ class AtomizerInput:
     """Takes a gun's `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
 
     The gun's name, if it has one, stands before the three topics: `robot_1/atomizer/pose`.
-
-    Poses are handed on in batches of fifty or more, and what there is of them every twentieth of a
-    second. States that have come are handed on first, so that they are there before the poses that
-    they may cut.
+    States are passed on as they come, poses in batches of fifty or every twentieth of a second.
 
     Args:
-        node: paints the poses.
-        number: of the gun among those of the node.
+        node: makes publishers and timers; `watch` makes the subscriptions.
         name: of the gun, '' for the only one of a cell.
+        frame: of the part, into which the poses are brought.
+        on_poses, on_state: get the poses, and the states; a PaintError refuses a state.
 
     Attributes:
-        number, name: the same.
-        poses_received: since the node started.
-        refused_frames: poses refused for their frame, by frame, since the last reset.
-        unpainted: poses that came while the node was not active, since the last reset.
-        without_frame: poses that name no frame, since the last reset.
-        refusal: why the last refused pose was refused, '' if none was since the last reset.
-        states_received: since the node started.
+        poses_received, states_received: since the node started.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
         sprays: whether the newest state says that the gun sprays; False before any.
-        refused_states: states that say no time, no possible flow or a brush that the model does
-            not have, since the last reset.
-        refusals_of_states: why, in words, each once.
-        states_without_flow: states that spray with flow 0, since the last reset.
-        intervals: rhythm of the stamps since the last reset.
-        speed: of the TCP now.
-        programmed_m_per_s: of the newest state, 0 or NaN where it is not known [m/s].
-        jumps: steps between poses that no robot makes, since the last reset.
+        speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
         pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
+        refused_frames: poses refused for their frame, by frame; refusal: why the last was.
+        unpainted: poses that came while the node was not active.
+        odd: other poses and states with which something is wrong, by what it is, in words.
+        refusals_of_states: why states were refused, each reason once.
+        intervals, jumps: of the stamps, and steps that no robot makes. These and all counts from
+            `refused_frames` on are since the last reset.
     """
 
-    def __init__(self, node: PaintingNode, number: int, name: str) -> None:
-        self._node = node
-        self.number = number
+    def __init__(
+        self,
+        node: PaintNode,
+        watch: QosWatch,
+        name: str,
+        frame: PartFrame,
+        on_poses: Callable[[PoseBatch], None],
+        on_state: Callable[[TriggerChange], None],
+    ) -> None:
+        self._node, self._watch, self._frame = node, watch, frame
+        self._on_poses, self._on_state = on_poses, on_state
         self.name = name
-        self._pose_topic = of_gun(name, POSE_TOPIC)
-        self._state_topic = of_gun(name, STATE_TOPIC)
+        self._pose_topic = of_gun(name, 'atomizer/pose')
+        self._state_topic = of_gun(name, 'atomizer/state')
         self.poses_received = self.states_received = 0
         self.refused_s = self.pose_s = -math.inf
         self.sprays = False
@@ -97,14 +93,15 @@ class AtomizerInput:
         self.programmed_m_per_s = 0.0
         self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
-        self._handed_on_s = -math.inf
+        self._flushed_s = -math.inf
         self._stamps: list[int] = []
         self._poses: list[tuple[np.ndarray, np.ndarray]] = []
+        self._held: list[PoseStamped | AtomizerState] | None = None
         self.tf_queue = TfQueue()
         self.reset()
         self._topics = [
             AtomizerTopic(
-                node.watch,
+                watch,
                 message,
                 topic,
                 take,
@@ -119,8 +116,9 @@ class AtomizerInput:
             )
         ]
         node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
-        topic = of_gun(name, PROGRESS_TOPIC)
-        self._progress = node.create_publisher(PoseProgress, topic, qos.PROGRESS)
+        self._progress = node.create_publisher(
+            PoseProgress, of_gun(name, PROGRESS_TOPIC), topics.PROGRESS
+        )
         node.create_steady_timer(TAKE_PERIOD_S, self._take)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
 
@@ -130,20 +128,20 @@ class AtomizerInput:
         return sum(self.refused_frames.values())
 
     def reset(self) -> None:
-        """Count from zero; poses that were not handed on yet are dropped."""
+        """Count from zero; poses that were not passed on yet are dropped."""
         self.count_from_zero()
         self.tf_queue.clear()
         self._stamps.clear()
         self._poses.clear()
+        if self._held is not None:
+            self._held[:] = [kept for kept in self._held if isinstance(kept, AtomizerState)]
 
     def count_from_zero(self) -> None:
         """Forget what was wrong so far."""
         self.refused_frames: dict[str, int] = {}
         self.refusal = ''
-        self.refused_states = 0
+        self.odd: Counter[str] = Counter()
         self.refusals_of_states: set[str] = set()
-        self.states_without_flow = 0
-        self.without_frame = 0
         self.unpainted = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
@@ -156,27 +154,50 @@ class AtomizerInput:
             )
         self.unpainted += poses
 
+    # --- holding
+
+    def hold(self) -> None:
+        """Keep what comes from now on, in its own frame, until `release`."""
+        if self._held is None:
+            self._held = []
+
+    def release(self) -> None:
+        """Pass on what was kept, as if it came now."""
+        held, self._held = self._held or [], None
+        for message in held:
+            if isinstance(message, AtomizerState):
+                self._use_state(message)
+            else:
+                self._queue(message)
+        self.flush()
+
+    def held_stamps(self) -> tuple[list[int], list[int]]:
+        """Stamps of the poses and of the states that are kept [ns]."""
+        held = list(self._held or [])
+        states = [stamp_ns(kept.header) for kept in held if isinstance(kept, AtomizerState)]
+        poses = [stamp_ns(kept.header) for kept in held if isinstance(kept, PoseStamped)]
+        return poses, states
+
+    # --- taking and passing on
+
     def take_waiting(self) -> None:
-        """Take all that has come so far and hand it on."""
+        """Take all that has come so far and pass it on."""
         for topic in self._topics:
             topic.take_waiting()
-        self.hand_on()
+        self.flush()
 
     def _take(self) -> None:
         for topic in self._topics:
             topic.take_waiting()
-        waited = time.monotonic() - self._handed_on_s >= BATCH_PERIOD_S
+        waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
         if waited or len(self._stamps) >= POSES_A_BATCH:
-            self.hand_on()
+            self.flush()
 
-    def hand_on(self) -> None:
-        """Give the receiver what was taken, except poses that wait for their transform.
-
-        What comes in the moment in which the node activates itself waits until it has.
-        """
-        self._handed_on_s = time.monotonic()
+    def flush(self) -> None:
+        """Pass on the poses that were taken, except those that wait for their transform."""
+        self._flushed_s = time.monotonic()
         self.tf_queue.release(time.monotonic(), self._place, self._refuse)
-        if not self._stamps or self._node.starts_itself:
+        if not self._stamps:
             return
         stamps = np.array(self._stamps, dtype=np.int64)
         positions, quaternions = map(np.array, zip(*self._poses, strict=True))
@@ -184,46 +205,50 @@ class AtomizerInput:
         self._poses.clear()
         self.intervals.add(stamps)
         self.speed.add(stamps, positions)
-        self._look_for_jumps(stamps, positions)
-        self._node.add_poses(self.number, PoseBatch(stamps, positions, quaternions))
-
-    def _look_for_jumps(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
-        known = self.jumps.count
-        self.jumps.add(stamps_ns, positions_m)
-        if self.jumps.count and not known:
+        jumped = self.jumps.count
+        self.jumps.add(stamps, positions)
+        if self.jumps.count and not jumped:
             self._node.get_logger().error(
                 f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
+        self._on_poses(PoseBatch(stamps, positions, quaternions))
 
     def _follow_publishers(self) -> None:
         for topic in self._topics:
             topic.follow_publishers()
-        publishers = sorted(
-            endpoint_name(info) for info in self._node.watch.publishers_of(self._pose_topic)
-        )
+        publishers = sorted(map(endpoint_name, self._watch.publishers_of(self._pose_topic)))
         if len(publishers) > max(1, len(self.pose_publishers)):
             self._node.get_logger().warning(f'{self._pose_topic}: {several_guns(publishers)}')
         self.pose_publishers = publishers
 
+    # --- poses
+
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
         self._newest = message
-        now_s = self.pose_s = time.monotonic()
-        self.tf_queue.add(message, now_s)
-        self.tf_queue.release(now_s, self._place, self._refuse)
+        self.pose_s = time.monotonic()
+        if self._held is not None:
+            self._held.append(message)
+        else:
+            self._queue(message)
         if self.poses_received % POSES_A_BATCH == 0:
             self._report_progress()
+
+    def _queue(self, message: PoseStamped) -> None:
+        now_s = time.monotonic()
+        self.tf_queue.add(message, now_s)
+        self.tf_queue.release(now_s, self._place, self._refuse)
 
     def _place(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
         stamp = stamp_ns(message.header)
         p, q = message.pose.position, message.pose.orientation
         pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
-        if self._node.frame.is_own(frame_id):
-            self.without_frame += not frame_id
+        if self._frame.is_own(frame_id):
+            self.odd['poses without a frame'] += not frame_id
         else:
-            pose = self._node.frame.transform_from(frame_id, stamp).applied(*pose)
+            pose = self._frame.transform_from(frame_id, stamp).applied(*pose)
         self._stamps.append(stamp)
         self._poses.append(pose)
 
@@ -234,29 +259,36 @@ class AtomizerInput:
         if frame_id not in self.refused_frames:
             self._node.get_logger().error(
                 f"{self._pose_topic}: poses in frame '{frame_id}' are refused: the mesh is in "
-                f"frame '{self._node.frame.frame_id}' and {missing}"
+                f"frame '{self._frame.frame_id}' and {missing}"
             )
         self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
 
+    # --- states
+
     def _take_state(self, message: AtomizerState) -> None:
         self.states_received += 1
+        if self._held is not None:
+            self._held.append(message)
+        else:
+            self._use_state(message)
+
+    def _use_state(self, message: AtomizerState) -> None:
         stamp = stamp_ns(message.header)
         try:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')
             flow = relative_flow(message.spraying, message.flow)
-            change = TriggerChange(stamp, flow, message.brush, set_points_of(message))
-            self._node.add_trigger(self.number, change)
+            self._on_state(TriggerChange(stamp, flow, message.brush, set_points_of(message)))
         except PaintError as error:
             if str(error) not in self.refusals_of_states:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
             self.refusals_of_states.add(str(error))
-            self.refused_states += 1
+            self.odd['states refused'] += 1
             return
         if message.spraying and flow == 0.0:
-            if not self.states_without_flow:
+            if not self.odd[NO_FLOW]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
-            self.states_without_flow += 1
+            self.odd[NO_FLOW] += 1
         self.sprays = flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 

@@ -3,25 +3,21 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.qos_watch import QosWatch
-
-if TYPE_CHECKING:  # older distributions have no such name
-    from rclpy.subscription import MessageInfo
+from paint_deposition.nodes.runtime.topics import QosWatch, accepting
 
 # More than a publisher keeps for those who come late.
 REMEMBERED = 1000
 
 
 class Polled(CallbackGroup):
-    """Of subscriptions whose messages do not wake the executor: they are asked now and then."""
+    """Of subscriptions whose messages do not wake the executor: they are taken now and then."""
 
     def can_execute(self, _entity: Any) -> bool:
         return False
@@ -44,7 +40,7 @@ class AtomizerTopic:
         watch: makes the subscription.
         take: gets each message, in `take_waiting`.
         depth: messages that may wait.
-        reliability: asked for whatever is offered; None: as offered.
+        reliability: to ask for whatever is offered; None: as offered.
     """
 
     def __init__(
@@ -90,7 +86,7 @@ class AtomizerTopic:
         offered = [info.qos_profile for info in self._watch.publishers_of(self._topic)]
         if not offered:
             return self._first
-        profile = qos.accepting(offered, self._first.depth)
+        profile = accepting(offered, self._first.depth)
         # More reliable in mid-stream would lose what is sent until both ends have met again.
         if self._reliability is not None or self._profile.reliability > profile.reliability:
             profile.reliability = self._profile.reliability
@@ -114,7 +110,7 @@ class AtomizerTopic:
             while taken := handle.take_message(self._message, False):
                 self._on_message(*taken)
 
-    def _on_message(self, message: Any, info: MessageInfo) -> None:
+    def _on_message(self, message: Any, info: Mapping[str, Any]) -> None:
         publisher = info.get('publisher_gid') or {'data': b''}
         # A message is known by who sent it and when.
         identity = info['source_timestamp'], bytes(publisher['data'])

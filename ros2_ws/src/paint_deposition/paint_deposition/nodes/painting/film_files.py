@@ -1,21 +1,19 @@
-"""The simulator's film on its way to the disk, and its figures."""
+"""The film on its way to the disk, and its figures."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.film_messages import shares
+from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.film import write_film
-
-if TYPE_CHECKING:
-    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 
 def figures_of(
@@ -38,11 +36,16 @@ def laid_by(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str
 
 
 def film_to_save(
-    node: DepositionSimulator, folder: Path, stem: str, part: Mapping[str, Any] | None = None
+    node: PaintingNode,
+    mesh_id: str,
+    folder: Path,
+    stem: str,
+    part: Mapping[str, Any] | None = None,
 ) -> Callable[[], list[Path]]:
     """A function that writes the film as it is now, in any thread, and returns the paths.
 
     Args:
+        node: that has painted it. mesh_id: of its refined mesh.
         folder, stem: where to.
         part: what to say of the part in the statistics.
     """
@@ -50,7 +53,7 @@ def film_to_save(
     names, counts = node.gun_names, [gun.counts.to_dict() for gun in node.film.guns]
     details = {
         'mesh_file': node.mesh_file,
-        'mesh_id': node.shown_as.mesh_id,
+        'mesh_id': mesh_id,
         'frame_id': node.frame.frame_id,
         'down': surface.down,
         'model_file': values['model_file'],

@@ -1,4 +1,4 @@
-"""The simulator's film as messages, whose arrays are filled in place."""
+"""The simulator's film as messages."""
 
 from __future__ import annotations
 
@@ -9,43 +9,47 @@ from functools import cached_property
 
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
-from rclpy.time import Time
+from rclpy.serialization import serialize_message
 from sensor_msgs.msg import PointCloud2, PointField
+from visualization_msgs.msg import Marker
 
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
 from paint_deposition.part.surface import Surface
 
 # Triangles of a marker, which takes 120 bytes for each.
 MOST_FACES = 150_000
+KINDS = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
+POINT = np.dtype([(name, np.float32) for name in ('x', 'y', 'z', 'thickness_um')])
+CHANGED_POINT = np.dtype([*POINT.descr, ('vertex', np.uint32)])
 
 
 class ShownFilm:
-    """A part as the simulator shows it: its messages, each made when it is first asked for."""
+    """A part as the simulator shows it: its messages."""
 
     def __init__(self, surface: Surface, frame_id: str) -> None:
-        self._surface, self._frame_id = surface, frame_id
+        self.surface, self._frame_id = surface, frame_id
         self._made: dict[int, ColouredMesh] = {}
 
     @cached_property
     def mesh_id(self) -> str:
         """Digest of the refined mesh."""
-        return self._surface.mesh_id
+        return self.surface.mesh_id
 
     @property
     def tiles(self) -> int:
         """How many markers the mesh takes."""
-        return -(-len(self._surface.faces) // MOST_FACES)
+        return -(-len(self.surface.faces) // MOST_FACES)
 
     def corners(self, tile: int) -> np.ndarray:
         """(3 F,) vertices at the corners of a marker's triangles."""
         return self._faces_of(tile).ravel()
 
     def tile(self, number: int) -> ColouredMesh:
-        """A marker of the mesh."""
+        """A marker of the mesh, made when it is first needed."""
         if number not in self._made:
-            faces, vertices = self._faces_of(number), self._surface.vertices_m
+            faces, vertices = self._faces_of(number), self.surface.vertices_m
             self._made[number] = ColouredMesh(vertices, faces, self._frame_id, 'thickness', number)
         return self._made[number]
 
@@ -56,63 +60,50 @@ class ShownFilm:
     @cached_property
     def _faces(self) -> np.ndarray:
         """Those of the part; of a large one along its longest side, so that few markers change."""
-        vertices, faces = self._surface.vertices_m, self._surface.faces
+        vertices, faces = self.surface.vertices_m, self.surface.faces
         if self.tiles == 1:
             return faces
         along = vertices[:, np.ptp(vertices, axis=0).argmax()]
         return faces[np.argsort(along[faces].sum(axis=1), kind='stable')]
 
-    @cached_property
-    def cloud(self) -> FilmCloud:
-        return FilmCloud(self._surface.vertices_m, self._frame_id)
+    def cloud(
+        self, stamp_ns: int, film_um: np.ndarray, vertices: np.ndarray | None = None
+    ) -> PointCloud2:
+        """x, y, z [m] and thickness_um of all vertices, or of these with their numbers.
 
-    @cached_property
-    def field(self) -> FilmField:
-        return FilmField(len(self._surface.vertices_m), self.mesh_id, self._frame_id)
+        Args:
+            film_um: (V,) film [um]. vertices: (N,) their numbers.
+        """
+        layout = POINT if vertices is None else CHANGED_POINT
+        rows = slice(None) if vertices is None else vertices
+        points = np.empty(len(film_um[rows]), layout)
+        for name, column in zip('xyz', self.surface.vertices_m.T, strict=True):
+            points[name] = column[rows]
+        points['thickness_um'] = film_um[rows]
+        if vertices is not None:
+            points['vertex'] = vertices
+        return PointCloud2(
+            height=1,
+            width=len(points),
+            fields=[
+                PointField(name=name, offset=4 * k, datatype=KINDS[layout[name].kind], count=1)
+                for k, name in enumerate(layout.names or ())
+            ],
+            is_bigendian=sys.byteorder == 'big',
+            point_step=layout.itemsize,
+            row_step=points.nbytes,
+            data=array('B', points.tobytes()),
+            is_dense=True,
+            header=header(self._frame_id, stamp_ns),
+        )
 
-
-def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
-    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
-    total = sum(laid_cm3.values())
-    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
-
-
-def _cloud(frame_id: str, layout: np.dtype, points: int) -> tuple[PointCloud2, np.ndarray]:
-    """A cloud of so many points, and its (points,) values to fill; four bytes each field."""
-    kinds = {'f': PointField.FLOAT32, 'u': PointField.UINT32}
-    message = PointCloud2(
-        height=1,
-        width=points,
-        fields=[
-            PointField(name=name, offset=4 * k, datatype=kinds[layout[name].kind], count=1)
-            for k, name in enumerate(layout.names or ())
-        ],
-        is_bigendian=sys.byteorder == 'big',
-        point_step=layout.itemsize,
-        row_step=layout.itemsize * points,
-        data=array('B', bytes(layout.itemsize * points)),
-        is_dense=True,
-        header=header(frame_id, 0),
-    )
-    return message, np.frombuffer(message.data, layout)
-
-
-class FilmCloud:
-    """A PointCloud2 with x, y, z [m] and thickness_um, filled in place."""
-
-    LAYOUT = np.dtype([(name, np.float32) for name in ('x', 'y', 'z', 'thickness_um')])
-
-    def __init__(self, positions_m: np.ndarray, frame_id: str) -> None:
-        self.frame_id, self.positions_m = frame_id, positions_m
-        self._message, self._values = _cloud(frame_id, self.LAYOUT, len(positions_m))
-        for name, column in zip('xyz', positions_m.T, strict=True):
-            self._values[name] = column
-
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> PointCloud2:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self._values['thickness_um'] = film_um
-        return self._message
+    def field(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
+        """(V,) film [um] in the order of the vertices."""
+        return ThicknessField(
+            header=header(self._frame_id, stamp_ns),
+            mesh_id=self.mesh_id,
+            thickness_um=array('f', film_um.astype(np.float32).tobytes()),
+        )
 
 
 class FilmChanges:
@@ -120,61 +111,87 @@ class FilmChanges:
 
     The first holds the whole film, a point for each vertex in their order. The others have one
     more field, the number of the vertex.
-
-    Args:
-        shown_as: the part, its cloud used for the whole film.
     """
-
-    LAYOUT = np.dtype([*FilmCloud.LAYOUT.descr, ('vertex', np.uint32)])
 
     def __init__(self, shown_as: ShownFilm) -> None:
         self._shown_as = shown_as
-        self._told_um: np.ndarray | None = None
+        self._sent_um: np.ndarray | None = None
 
     def message(
         self, stamp_ns: int, film_um: np.ndarray, whole: bool, exact: bool
     ) -> PointCloud2 | None:
-        """What has changed, None if nothing has; publish it before the next call.
+        """What has changed, None if nothing has.
 
         Args:
             film_um: (V,) the film as it is now [um].
-            whole: tell all of it, as the first time.
-            exact: tell every change, also what no gauge would show.
+            whole: show all of it, as the first time.
+            exact: show every change, also what no gauge would show.
         """
-        cloud = self._shown_as.cloud
-        if whole or self._told_um is None:
-            self._told_um = film_um.astype(np.float32)
-            return cloud.message(stamp_ns, film_um)
         now_um = film_um.astype(np.float32)
-        change_um = np.abs(now_um - self._told_um)
+        if whole or self._sent_um is None:
+            self._sent_um = now_um
+            return self._shown_as.cloud(stamp_ns, now_um)
+        change_um = np.abs(now_um - self._sent_um)
         vertices = np.flatnonzero(change_um > (0.0 if exact else NO_PAINT_UM))
         if not len(vertices):
             return None
-        message, values = _cloud(cloud.frame_id, self.LAYOUT, len(vertices))
-        message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        for name, column in zip('xyz', cloud.positions_m[vertices].T, strict=True):
-            values[name] = column
-        values['thickness_um'] = self._told_um[vertices] = now_um[vertices]
-        values['vertex'] = vertices
-        return message
+        self._sent_um[vertices] = now_um[vertices]
+        return self._shown_as.cloud(stamp_ns, now_um, vertices)
 
 
-class FilmField:
-    """A ThicknessField, filled in place."""
+class MeshTiles:
+    """The coloured mesh: one marker, or several of a large part, each sent as its colours change.
 
-    def __init__(self, vertex_count: int, mesh_id: str, frame_id: str) -> None:
-        self._message = ThicknessField(
-            header=header(frame_id, 0),
-            mesh_id=mesh_id,
-            thickness_um=array('f', bytes(4 * vertex_count)),
-        )
-        self._values = np.frombuffer(self._message.thickness_um, np.float32)
+    To make and send a marker of a million triangles takes half a second, during which poses and
+    statistics wait. A large part therefore goes out in turns.
 
-    def message(self, stamp_ns: int, film_um: np.ndarray) -> ThicknessField:
-        """The one message that is filled; publish it before the next call."""
-        self._message.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self._values[:] = film_um
-        return self._message
+    Args:
+        shown_as: the part, which has the markers.
+        clear: whether markers of another part are to be removed first.
+    """
+
+    def __init__(self, shown_as: ShownFilm, clear: bool = False) -> None:
+        self._shown_as = shown_as
+        self._clear = clear
+        self._sent: list[tuple[object, np.ndarray] | None] = [None] * shown_as.tiles
+        self._next = 0
+
+    def message(
+        self, edition: object, stamp_ns: int, palette: np.ndarray, rows: np.ndarray, whole: bool
+    ) -> bytes | None:
+        """The next marker, None if there is nothing to show.
+
+        A part of one marker is sent in every edition; of several, those whose colours changed.
+
+        Args:
+            edition: of the film. palette, rows: as for ``ColouredMesh.serialised``.
+            whole: send all of them, as to somebody who is new.
+        """
+        count = len(self._sent)
+        if whole:
+            self._sent = [None] * count
+        if self._clear:
+            self._clear = False
+            return serialize_message(
+                white_marker(Marker.TRIANGLE_LIST, '', 0, '', action=Marker.DELETEALL)
+            )
+        for tile in ((self._next + k) % count for k in range(count)):
+            sent = self._sent[tile]
+            if sent is not None and sent[0] == edition:
+                continue
+            now = rows[self._shown_as.corners(tile)]
+            if sent is not None and count > 1 and np.array_equal(sent[1], now):
+                continue
+            self._sent[tile] = edition, now
+            self._next = (tile + 1) % count
+            return self._shown_as.tile(tile).serialised(stamp_ns, palette, rows)
+        return None
+
+
+def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
+    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
+    total = sum(laid_cm3.values())
+    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
 def stats_message(

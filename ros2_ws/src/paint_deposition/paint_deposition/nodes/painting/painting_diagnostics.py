@@ -9,10 +9,10 @@ from collections.abc import Callable, Mapping
 
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
-from paint_deposition.nodes.painting.atomizer_input import AtomizerInput, several_guns
+from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.messages import of_gun
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.topics import of_gun
 
 # Real-time factor above which there is little time left for anything but painting.
 BUSY = 0.8
@@ -33,12 +33,13 @@ IN_WORDS = {
 }
 
 
-def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
+def poses_status(node: PaintingNode, number: int) -> Status:
     """A gun's motion since the last reset: what came and what was wrong with it."""
-    film = node.film.guns[source.number]
+    source, film = node.inputs[number], node.film.guns[number]
     counts = film.counts
     rhythm_ns = source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
+    counted |= {'steps faster than a robot': source.jumps.count, **source.odd}
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
@@ -50,14 +51,10 @@ def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
         'programmed speed [m/s]': f'{source.programmed_m_per_s:.3f}'
         if source.programmed_m_per_s > 0.0
         else 'unknown',
-        'steps faster than a robot': source.jumps.count,
-        'fastest of them [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses not painted while inactive': source.unpainted,
-        'poses without a frame': source.without_frame,
         'poses in the tf queue': len(source.tf_queue),
-        'states refused': source.refused_states,
-        'states that spray with flow 0': source.states_without_flow,
         'messages lost by the middleware': node.watch.lost_messages,
         'gun': _gun_in_words(film),
     }
@@ -77,10 +74,6 @@ def poses_status(node: PaintingNode, source: AtomizerInput) -> Status:
             values,
         )
     counted['poses refused for their frame'] = source.poses_refused
-    counted['states refused'] = source.refused_states
-    counted['states that spray with flow 0'] = source.states_without_flow
-    counted['poses without a frame'] = source.without_frame
-    counted['steps faster than a robot'] = source.jumps.count
     wrong = [f'{count} {words}' for words, count in counted.items() if count]
     silent_s = now_s - source.pose_s
     if source.sprays and silent_s > SILENT_S:
@@ -110,7 +103,7 @@ def topics_status(node: PaintingNode) -> Status:
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """Part and model."""
     guns = node.film.guns
-    factor = sum(each.value for each in node.real_time_factors)
+    factor = node.real_time_factor
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
@@ -155,8 +148,8 @@ def painting_tasks(
 ) -> dict[str, Callable[[], Status]]:
     """The tasks by name; `film_values` are added to those of the film."""
     poses = {
-        of_gun(source.name, 'poses'): functools.partial(poses_status, node, source)
-        for source in node.inputs
+        of_gun(source.name, 'poses'): functools.partial(poses_status, node, number)
+        for number, source in enumerate(node.inputs)
     }
     return {
         **poses,

@@ -5,31 +5,40 @@ from __future__ import annotations
 import itertools
 import time
 from abc import ABC, abstractmethod
+from collections import deque
 from collections.abc import Mapping
+from functools import partial
 from typing import Any
 
+import numpy as np
 from rclpy.timer import Timer
 
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
-from paint_deposition.film.between_brushes import require_its_brush
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.nodes.painting import early
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
-from paint_deposition.nodes.painting.catching_up import CatchingUp
+from paint_deposition.nodes.painting.film_preparation import (
+    CatchingUp,
+    Repainting,
+    index_facing,
+    paint_in_one_thread,
+)
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
-from paint_deposition.nodes.painting.real_time_factor import RealTimeFactor
-from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
-from paint_deposition.nodes.runtime.qos_watch import QosWatch
+from paint_deposition.nodes.runtime.topics import QosWatch
+from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 TEND_PERIOD_S = 0.1
+# Batches over which the real-time factor is taken.
+BATCHES = 100
+# So many poses that look at the part settle its outward side; after so many in all it stays.
+POSES_FACING = 50
+POSES_CONSIDERED = 2000
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -41,11 +50,11 @@ class PaintingNode(ManagedNode, ABC):
         gun_names: of the guns, one empty name for the only one.
         mesh_file: the part's mesh; surface: the same refined.
         points: where it is painted.
+        models: of the guns, as the parameters choose them.
         film: what is painted so far, by one gun or several.
         inputs: what comes from the cell, one for each gun.
         watch: publishers and subscribers whose quality of service does not fit.
-        real_time_factors: how long painting takes beside the motion, one for each gun.
-        catching_up: with the recording of a run in which the node was started, if it was.
+        catching_up: with the recording of a run in which the node was started, while it lasts.
         repainting: the changed models that are being prepared, if any are.
         model_problem: why the last models that were set are not used, '' if they are.
     """
@@ -56,47 +65,63 @@ class PaintingNode(ManagedNode, ABC):
     def _configure(self) -> None:
         self.watch = QosWatch(self)
         self.inputs = [
-            AtomizerInput(self, number, name) for number, name in enumerate(self.gun_names)
+            AtomizerInput(
+                self,
+                self.watch,
+                name,
+                self.frame,
+                partial(self._add_poses, number),
+                partial(self._add_trigger, number),
+            )
+            for number, name in enumerate(self.gun_names)
         ]
+        if self.starts_itself:  # what comes until it has activated itself is painted
+            self._hold()
         self._shown: CommonFilm | None = None
         self.offer('~/reset', self._reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
-        early.look_soon(self)
 
     def _activate(self) -> None:
         if self.values['catch_up'] and not self.film.counts.received:
-            self.catching_up = CatchingUp(self, self.values['catch_up'])
+            self.catching_up = CatchingUp(
+                self.values['catch_up'],
+                self.inputs,
+                partial(bare_films, self.surface, self.points, self.models, self.values),
+                self.resolve_topic_name,
+                self.frame.frame_id,
+                self.values['part_pose'],
+            )
+        else:
+            self.release()
 
     def _deactivate(self) -> None:
         for source in self.inputs:
             source.take_waiting()
-        if self.catching_up is not None:
-            self.catching_up.give_up()
+        self._abort_catching_up('it was deactivated')
 
     def _cleanup(self) -> None:
-        self._give_up_repainting()
+        self._abort_repainting()
 
     def _prepare(self) -> None:
-        early.paint_in_one_thread()
+        paint_in_one_thread()
         self.gun_names: list[str] = self.values['atomizers'] or ['']
         self.mesh_file: str = self.values['mesh_file']
-        self.real_time_factors = [RealTimeFactor() for _ in self.gun_names]
-        # What comes while a part is changed waits for the next one.
-        self._held: list[tuple[int, PoseBatch | TriggerChange]] | None = None
+        self._spans: list[deque[tuple[float, float]]] = [
+            deque(maxlen=BATCHES) for _ in self.gun_names
+        ]
         self.model_problem = ''
-        self._outward = OutwardSide(len(self.gun_names))
-        self._notes_told = 0
+        self._notes_logged = 0
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
-        self._models = read_chosen_models(self.values)
+        self.models = read_chosen_models(self.values)
         self._read_part()
-        loading = early.load_what_paints(self._models, self.values.get('precision', 'double'))
         self._take_surface(read_part(self.values, self.mesh_file))
-        self.film = bare_films(self.surface, self.points, self._models, self.values)
+        self._may_turn = list(range(len(self.gun_names)))
+        self.film = bare_films(self.surface, self.points, self.models, self.values)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
-        loading.join()
         self.film.warm_up()
+        index_facing(self.surface)
 
     # --- for the subclass
 
@@ -111,9 +136,9 @@ class PaintingNode(ManagedNode, ABC):
         """Take the part, at the start and when the gun shows which side is outward."""
         self.surface = surface
         self.points = self._points_on(surface)
-        for note in surface.notes[self._notes_told :]:
+        for note in surface.notes[self._notes_logged :]:
             self.get_logger().warning(note)
-        self._notes_told = len(surface.notes)
+        self._notes_logged = len(surface.notes)
 
     @abstractmethod
     def publish(self) -> None:
@@ -121,53 +146,58 @@ class PaintingNode(ManagedNode, ABC):
 
     # --- motion
 
-    def add_poses(self, gun: int, batch: PoseBatch) -> None:
+    def _add_poses(self, gun: int, batch: PoseBatch) -> None:
         """Paint poses of a gun, by its number, while the node is active."""
         if not self.active:
             self.inputs[gun].not_painted(len(batch))
             return
-        if self._held is not None:
-            self._held.append((gun, batch))
-            return
         began_s = time.monotonic()
         self.film.guns[gun].add_poses(batch)
-        self.real_time_factors[gun].note(time.monotonic() - began_s, batch.stamps_ns)
+        spent_s = time.monotonic() - began_s
+        steps_ns = np.diff(batch.stamps_ns)
+        steps_ns = steps_ns[steps_ns > 0]
+        if len(steps_ns):
+            # One interval more than there are between the batch's own poses.
+            lasted_s = float(np.median(steps_ns)) * len(batch) * 1e-9
+            self._spans[gun].append((spent_s, lasted_s))
 
-    def add_trigger(self, gun: int, change: TriggerChange) -> None:
-        """Switch a gun, by its number.
+    def _add_trigger(self, gun: int, change: TriggerChange) -> None:
+        self.film.guns[gun].add_trigger(change)
 
-        Raises:
-            ModelError: its model does not have the brush; the change is not taken.
-        """
-        if self._held is None:
-            self.film.guns[gun].add_trigger(change)
-            return
-        if change.flow > 0.0:
-            require_its_brush(self._models[gun], change)
-        self._held.append((gun, change))
+    @property
+    def real_time_factor(self) -> float:
+        """Time spent on painting over that of the motion; above 1 the node falls behind."""
+        sums = [np.sum(spans, axis=0) for spans in self._spans if spans]
+        return float(sum(spent_s / lasted_s for spent_s, lasted_s in sums))
 
     def reset(self) -> None:
         """Back to bare metal, all counts to zero."""
         for source in self.inputs:
             source.reset()
-        if self._held is not None:
-            self._held[:] = [item for item in self._held if isinstance(item[1], TriggerChange)]
         self.film.reset()
-        if self.catching_up is not None:
-            self.catching_up.give_up()
+        self._abort_catching_up('it was reset')
         if self.repainting is not None:
             self._repaint()
 
-    def hold(self) -> list[tuple[int, PoseBatch | TriggerChange]]:
-        """Keep what comes from now on, with its gun's number, in this list until `release`."""
-        self._held = []
-        return self._held
+    def _hold(self) -> None:
+        for source in self.inputs:
+            source.hold()
 
-    def take_part(self, mesh_file: str, surface: Surface, points: SurfacePoints,
-                  film: LiveFilms) -> None:  # fmt: skip
-        """Paint another part from bare metal on, as the guns are now; the counts begin anew."""
-        if any(new.model != now for new, now in zip(film.guns, self._models, strict=True)):
-            film = bare_films(surface, points, self._models, self.values)
+    def release(self) -> None:
+        """Paint what the inputs held."""
+        for source in self.inputs:
+            source.release()
+
+    def take_part(
+        self, mesh_file: str, surface: Surface, points: SurfacePoints, film: LiveFilms
+    ) -> None:
+        """Paint another part from bare metal on, as the guns are now; the counts begin anew.
+
+        Raises:
+            ModelError: the model does not have the brush that a gun sprays with.
+        """
+        if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
+            film = bare_films(surface, points, self.models, self.values)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
@@ -175,19 +205,11 @@ class PaintingNode(ManagedNode, ABC):
         for source in self.inputs:
             source.count_from_zero()
         self.mesh_file, self.surface, self.points, self.film = mesh_file, surface, points, film
-        self._notes_told = len(surface.notes)
-        self._outward = OutwardSide(len(self.gun_names))
+        self._shown = None
+        self._notes_logged = len(surface.notes)
+        self._may_turn = list(range(len(self.gun_names)))
         if self.repainting is not None:
             self._repaint()
-
-    def release(self) -> None:
-        """Paint what was kept, on the part that is there now."""
-        held, self._held = self._held or [], None
-        for gun, event in held:
-            if isinstance(event, PoseBatch):
-                self.add_poses(gun, event)
-            else:
-                self.add_trigger(gun, event)
 
     def _reset(self) -> tuple[bool, str]:
         poses = self.film.counts.received
@@ -225,12 +247,13 @@ class PaintingNode(ManagedNode, ABC):
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & {'model_file', 'model_files'}:
-            self._models = self._next_models
+            self.models = self._next_models
         if names & {'model_file', 'model_files', 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
             self.destroy_timer(self._show_timer)
             self._show_timer = self._new_show_timer()
+        self._shown = None
 
     def _new_show_timer(self) -> Timer:
         return self.create_steady_timer(1.0 / self.values['publish_rate_hz'], self.publish)
@@ -240,8 +263,8 @@ class PaintingNode(ManagedNode, ABC):
 
     def _repaint(self, from_start: bool = True) -> None:
         """Prepare films, in a thread, with the models and the values as they are now."""
-        self._give_up_repainting()
-        surface, points, models = self.surface, self.points, self._models
+        self._abort_repainting()
+        surface, points, models = self.surface, self.points, self.models
 
         def make() -> LiveFilms:
             for effect in itertools.chain.from_iterable(model.effects for model in models):
@@ -253,25 +276,61 @@ class PaintingNode(ManagedNode, ABC):
 
     def _tend(self) -> None:
         """Take over films that are ready, and settle which side of the part is outward."""
+        if self.catching_up is not None and self.catching_up.done:
+            self._take_over_recorded(self.catching_up)
         if self.repainting is not None and self.repainting.done:
             self._take_over(self.repainting)
-        if not self._outward.settled:
-            self._turn(self._outward.turned(self.surface, self.film))
+        if self._may_turn:
+            self._turn(self._turned())
+
+    def _take_over_recorded(self, catching_up: CatchingUp) -> None:
+        self.catching_up = None
+        try:
+            self.film = catching_up.result()
+        except PaintError as error:
+            self.get_logger().error(f'not caught up: {error}')
+        else:
+            self.get_logger().info(f'caught up from {catching_up.folder}: {catching_up.summary}')
+            if any(gun.model != now for gun, now in zip(self.film.guns, self.models, strict=True)):
+                self._repaint()
+        self.release()
 
     def _take_over(self, repainting: Repainting) -> None:
         self.repainting = None
         self.model_problem = ''
         try:
             film = repainting.take_over(self.film)
-        except (Exception, SystemExit) as error:  # of a user's effect; the old model goes on
+        except (Exception, SystemExit) as error:  # of a user's effect; the old model stays
             self.model_problem = f'the new model is not used: {error}'
             self.get_logger().error(self.model_problem)
-            self._models = tuple(gun.model for gun in self.film.guns)
+            self.models = tuple(gun.model for gun in self.film.guns)
             return
         if film is None:
             self._repaint()
             return
         self.film = film
+
+    def _turned(self) -> Surface:
+        """The part with the side outward that the first gun wants whose poses look at it.
+
+        As long as an earlier gun has not settled it, that one may still decide otherwise: which
+        side is outward does not depend on whose poses came first.
+        """
+        for gun in tuple(self._may_turn):
+            poses = self.film.guns[gun].log.first_poses(POSES_CONSIDERED)
+            if poses is None:
+                continue
+            positions, axes = poses.finite_axes()
+            seen = facing(self.surface, positions, axes)
+            looking = seen.front + seen.back
+            settled = looking >= POSES_FACING or len(poses) >= POSES_CONSIDERED
+            if settled:
+                self._may_turn.remove(gun)
+            if looking:
+                if settled:
+                    self._may_turn = [earlier for earlier in self._may_turn if earlier < gun]
+                return toward_the_gun(self.surface, positions, axes)
+        return self.surface
 
     def _turn(self, faced: Surface) -> None:
         """Paint the motion so far on the part as it is turned now."""
@@ -286,7 +345,14 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None:
             self._repaint()
 
-    def _give_up_repainting(self) -> None:
+    def _abort_catching_up(self, why: str) -> None:
+        if self.catching_up is not None:
+            self.catching_up.abort()
+            folder, self.catching_up = self.catching_up.folder, None
+            self.get_logger().warning(f'not caught up from {folder}: {why}')
+            self.release()
+
+    def _abort_repainting(self) -> None:
         if self.repainting is not None:
-            self.repainting.give_up()
+            self.repainting.abort()
             self.repainting = None

@@ -69,8 +69,8 @@ PAINTING = dict(
         ),
         pose_reliability=NodeParameter(
             'as_offered',
-            'Reliability asked of the publishers of poses and states; as_offered and best_effort '
-            'hear all of them, reliable only those that offer it [name]',
+            'Reliability required of the publishers of poses and states; as_offered and '
+            'best_effort hear all of them, reliable only those that offer it [name]',
             choices=('as_offered', 'best_effort', 'reliable'),
         ),
         catch_up=NodeParameter(
@@ -93,7 +93,8 @@ PAINTING = dict(
         element=str,
     ),
     repaint=NodeParameter(
-        True, 'Whether a new model paints the motion so far again; false: from then on only [-]'
+        True,
+        'Paint the motion so far again with a new model; false: from then on only [true/false]',
     ),
     publish_rate_hz=NodeParameter(
         2.0, 'How often what is shown goes out while the film changes [Hz]', (0.1, 30.0)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from paint_msgs.msg import Part as PartMessage
 from paint_msgs.srv import ChangePart
@@ -16,18 +16,112 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
+from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_to_save
-from paint_deposition.nodes.painting.parts import Part, PreparedPart, PreparedParts
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.file_names import require_file_name
-from paint_deposition.nodes.runtime.messages import PART_TOPIC
-
-if TYPE_CHECKING:
-    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.painting.film_messages import ShownFilm
+from paint_deposition.nodes.painting.film_preparation import index_facing
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.parameters import require_file_name
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
 
 # Longer than this, the first poses on a part are painted late.
 LATE_S = 0.05
+# A large part takes some 100 MB.
+MOST_KEPT = 4
+# A mesh file, when it was changed [ns], its size; None where there is no such file.
+Version = tuple[str, int | None, int | None]
+
+
+@dataclass(frozen=True)
+class Part:
+    """The part in the cell, as it was announced.
+
+    Attributes:
+        mesh_file: its mesh.
+        type: what the cell calls its kind, '' where nobody said; serial: likewise.
+        coat: 1 for the first coat on it.
+        since: when it came.
+    """
+
+    mesh_file: str
+    type: str = ''
+    serial: str = ''
+    coat: int = 1
+    since: datetime = field(default_factory=lambda: datetime.now(timezone.utc))
+
+    @property
+    def run(self) -> str:
+        """The folder of its run, '' for a part without a serial number."""
+        return self.serial if self.coat == 1 else f'{self.serial}_coat_{self.coat}'
+
+
+@dataclass(frozen=True)
+class PreparedPart:
+    """A part that can be painted at once.
+
+    Attributes:
+        version: of the mesh file when it was read.
+        surface: refined. points: where it is painted.
+        film: of all guns. shown: its messages.
+    """
+
+    version: Version
+    surface: Surface
+    points: SurfacePoints
+    film: LiveFilms
+    shown: ShownFilm
+
+
+def version_of(mesh_file: str) -> Version:
+    """The file as it is now; another version is another shape."""
+    try:
+        status = os.stat(mesh_file)
+    except OSError:
+        return mesh_file, None, None  # reading it says what is wrong
+    return mesh_file, status.st_mtime_ns, status.st_size
+
+
+class PreparedParts:
+    """Reads parts in a thread, and keeps the latest of them by the version of their mesh."""
+
+    def __init__(self, prepare: Callable[[Version], PreparedPart]) -> None:
+        self._prepare = prepare
+        self._kept: dict[Version, Future[PreparedPart]] = {}
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
+
+    @property
+    def ready(self) -> list[str]:
+        """The mesh files that are prepared."""
+        return [version[0] for version, part in self._kept.items() if part.done()]
+
+    def get(self, version: Version) -> Future[PreparedPart]:
+        """The part of this mesh; it is read unless it has been."""
+        part = self._kept.pop(version, None)
+        if part is None or (part.done() and part.exception()):
+            part = self._thread.submit(self._prepare, version)
+        self._keep(version, part)
+        return part
+
+    def swap(self, into_the_cell: PreparedPart, out_of_it: PreparedPart) -> None:
+        """Forget a part whose film is in use now, and keep the one that has left the cell."""
+        self._kept.pop(into_the_cell.version, None)
+        done: Future[PreparedPart] = Future()
+        done.set_result(out_of_it)
+        self._keep(out_of_it.version, done)
+
+    def close(self) -> None:
+        """Wait for what is being read."""
+        self._thread.shutdown(cancel_futures=True)
+
+    def _keep(self, version: Version, part: Future[PreparedPart]) -> None:
+        self._kept[version] = part
+        while len(self._kept) > MOST_KEPT:
+            self._kept.pop(next(iter(self._kept)))
 
 
 class PartChange:
@@ -35,20 +129,27 @@ class PartChange:
 
     Poses and states that come while the next part's mesh is still being read wait for it.
 
+    Args:
+        node: paints the part. display: shows it.
+        version: of the mesh of the part that is in the cell.
+        group: of the service.
+
     Attributes:
         part: the one in the cell.
         waiting: whether the mesh of the next one is still being read.
     """
 
-    def __init__(self, node: DepositionSimulator, group: CallbackGroup) -> None:
-        self._node = node
+    def __init__(
+        self, node: PaintingNode, display: FilmDisplay, version: Version, group: CallbackGroup
+    ) -> None:
+        self._node, self._display, self._version = node, display, version
         self.part = Part(node.mesh_file)
         self._parts = PreparedParts(self._prepare)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving parts')
         self.waiting = False
         self._gap_s = 0.0
         self._unsaved = ''
-        self._publisher = node.create_publisher(PartMessage, PART_TOPIC, qos.LATCHED)
+        self._publisher = node.create_publisher(PartMessage, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
     def close(self) -> None:
@@ -62,8 +163,8 @@ class PartChange:
         """The part, and how the last change went."""
         part = self.part
         values = {
-            'type': part.type or 'not told',
-            'serial number': part.serial or 'not told',
+            'type': part.type or 'unknown',
+            'serial number': part.serial or 'unknown',
             'coat': part.coat,
             'mesh': part.mesh_file,
             'since': part.since.isoformat(timespec='seconds'),
@@ -79,7 +180,7 @@ class PartChange:
                 'it before the part comes',
                 values,
             )
-        return Status(OK, part.run or 'no serial number told', values)
+        return Status(OK, part.run or 'the part has no serial number', values)
 
     # --- the change
 
@@ -104,35 +205,34 @@ class PartChange:
         if not request.mesh_file:
             raise PaintError('prepare without a mesh_file: name the mesh to read ahead of time')
         mesh_file = os.path.expanduser(request.mesh_file)
-        part = await self._node.in_a_thread(self._parts.get(mesh_file))
+        part = await self._node.in_a_thread(self._parts.get(version_of(mesh_file)))
         response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
         node = self._node
         if self.waiting:
             raise PaintError('another part is being changed: ask again when it is there')
-        if node.catching_up is not None and node.catching_up.under_way:
-            # Nobody could tell which of the poses that wait are the part's before.
+        if node.catching_up is not None:
+            # Nobody could say which of the poses that wait are the part's before.
             raise PaintError(
                 f'the film is being caught up from {node.catching_up.folder}: ask again when that '
-                'is done, in 2 s'
+                'is done'
             )
-        following = self._asked_for(request)
+        following = self._requested(request)
         # A request overtakes poses that wait; they belong to the part before.
-        for source in node.inputs:
-            source.take_waiting()
         node.up_to_date()
         began_s = time.monotonic()
-        notes = self._sprays()
+        notes = [
+            f'{source.name or "the gun"} sprays while the part is changed'
+            for source in node.inputs
+            if source.sprays
+        ]
         save = self._film_to_save() if node.film.counts.received else None
-        pose = list(node.values['part_pose'] or [])
-        self._place(request.part_pose)
         try:
-            if not request.coat:
-                await self._take(following.mesh_file)
-        except BaseException:
-            self._place(pose)
-            raise
+            ready = None if request.coat else await self._ready(following.mesh_file)
+            self._put_in_place(ready, request.part_pose)
+        finally:
+            node.release()
         self.part = following
         self._gap_s = response.gap_s = time.monotonic() - began_s
         self._publish()
@@ -140,36 +240,10 @@ class PartChange:
         if save is not None:
             response.paths = await self._saved(save)
             notes.append(f'wrote {", ".join(response.paths)}')
-        told = [self._sentence(), *notes]
-        response.message = '; '.join(told)
+        response.message = '; '.join([self._sentence(), *notes])
         node.get_logger().info(response.message)
 
-    async def _take(self, mesh_file: str) -> None:
-        """Put the bare part of this mesh in the place of the one in the cell."""
-        node = self._node
-        before = PreparedPart(node.surface, node.points, node.film, node.shown_as)
-        if mesh_file == node.mesh_file:
-            ready = before
-        else:
-            read = self._parts.get(mesh_file)
-            if not read.done():
-                self.waiting = True
-                node.hold()
-            try:
-                ready = read.result() if read.done() else await node.in_a_thread(read)
-            except BaseException:
-                node.release()
-                raise
-            finally:
-                self.waiting = False
-            self._parts.take(mesh_file)
-            self._parts.put_back(node.mesh_file, before)
-        node.shown_as = ready.shown
-        node.take_part(mesh_file, ready.surface, ready.points, ready.film)
-        node.show_anew()
-        node.release()
-
-    def _asked_for(self, request: ChangePart.Request) -> Part:
+    def _requested(self, request: ChangePart.Request) -> Part:
         """The part that the request describes.
 
         Raises:
@@ -200,59 +274,98 @@ class PartChange:
             )
         return following
 
-    def _place(self, part_pose: Sequence[float]) -> None:
-        """Say where the part stands, if that is told."""
-        if not len(part_pose):
+    async def _ready(self, mesh_file: str) -> PreparedPart:
+        """The part of this mesh; the inputs hold what comes while it is read."""
+        version = version_of(mesh_file)
+        if version == self._version:
+            return self._present()
+        read = self._parts.get(version)
+        if read.done():
+            return read.result()
+        self.waiting = True
+        for source in self._node.inputs:
+            source.hold()
+        try:
+            return await self._node.in_a_thread(read)
+        finally:
+            self.waiting = False
+
+    def _put_in_place(self, ready: PreparedPart | None, part_pose: Sequence[float]) -> None:
+        """Set the part's pose, if one is given, and take the bare part, if it is another one."""
+        node, present = self._node, self._present()
+        pose = list(node.values['part_pose'] or [])
+        if len(part_pose):
+            self._set_pose(list(part_pose))
+        if ready is None:
             return
-        change = Parameter('part_pose', value=list(part_pose))
+        try:
+            node.take_part(ready.version[0], ready.surface, ready.points, ready.film)
+        except PaintError:
+            self._set_pose(pose)
+            raise
+        self._version = ready.version
+        if ready.version != present.version:
+            self._parts.swap(ready, present)
+        self._display.take(ready.shown, clear=True)
+
+    def _set_pose(self, part_pose: list[float]) -> None:
+        change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
         result = self._node.set_parameters_atomically([change])
         if not result.successful:
             raise PaintError(result.reason)
-
-    def _sprays(self) -> list[str]:
-        """What is odd in changing the part now."""
-        return [
-            f'{source.name or "the gun"} sprays while the part is changed'
-            for source in self._node.inputs
-            if source.sprays
-        ]
 
     def _sentence(self) -> str:
         part = self.part
         called = f' ({part.type})' if part.type else ''
         if part.coat > 1:
-            return f'coat {part.coat} on {part.serial}{called}: the film goes on'
+            return f'coat {part.coat} on {part.serial}{called}: on top of the film so far'
         return (
             f'{part.serial}{called} on {part.mesh_file}: bare metal, ready after '
             f'{self._gap_s * 1e3:.0f} ms'
         )
 
-    # --- files and messages
+    # --- parts, files and messages
 
-    def _prepare(self, mesh_file: str) -> PreparedPart:
-        return self._node.prepared_part(mesh_file)
+    def _present(self) -> PreparedPart:
+        """The part in the cell."""
+        node = self._node
+        shown = self._display.of(node.surface)
+        return PreparedPart(self._version, node.surface, node.points, node.film, shown)
+
+    def _prepare(self, version: Version) -> PreparedPart:
+        """Read a part that is to come; in a thread of its own."""
+        node = self._node
+        surface = read_part(node.values, version[0])
+        points = surface.points()
+        film = bare_films(surface, points, node.models, node.values)
+        film.warm_up()
+        index_facing(surface)
+        return PreparedPart(
+            version, surface, points, film, ShownFilm(surface, node.frame.frame_id)
+        )
 
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run
 
-    def _film_to_save(self) -> Any:
-        part = self.part
+    def _film_to_save(self) -> Callable[[], list[Path]]:
+        part, node = self.part, self._node
+        mesh_id = self._display.of(node.surface).mesh_id
         if not part.serial:
             stem = time.strftime('film_%Y%m%d_%H%M%S')
-            return film_to_save(self._node, self._folder(''), stem)
-        told = {
+            return film_to_save(node, mesh_id, self._folder(''), stem)
+        described = {
             'type': part.type,
             'serial': part.serial,
             'coat': part.coat,
             'run': part.run,
             'since': part.since.isoformat(timespec='milliseconds'),
             'until': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
-            'part_pose': list(self._node.values['part_pose'] or []),
+            'part_pose': list(node.values['part_pose'] or []),
             'gap_s': self._gap_s,
         }
-        return film_to_save(self._node, self._folder(part.run), 'film', told)
+        return film_to_save(node, mesh_id, self._folder(part.run), 'film', described)
 
-    async def _saved(self, save: Any) -> list[str]:
+    async def _saved(self, save: Callable[[], list[Path]]) -> list[str]:
         try:
             paths = await self._node.in_a_thread(self._saving.submit(save))
         except (PaintError, OSError) as error:
@@ -270,7 +383,7 @@ class PartChange:
             coat=part.coat,
             run=part.run,
             mesh_file=part.mesh_file,
-            mesh_id=node.shown_as.mesh_id,
+            mesh_id=self._display.of(node.surface).mesh_id,
             part_parent_frame=node.values['part_parent_frame'],
             part_pose=list(node.values['part_pose'] or []),
         )

@@ -5,18 +5,19 @@ from __future__ import annotations
 import multiprocessing
 import shutil
 import signal
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.model_parameters import effect_loader
 
-if TYPE_CHECKING:
-    from paint_deposition.nodes.runtime.long_work import Tell
+POLL_S = 0.1
 
-LOOK_S = 0.1
+# What is being done, and the share of it that is done, 0 to 1; it may raise to end the work.
+Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -36,12 +37,12 @@ class Task:
     allow_user_effects: bool
 
 
-def diagnosed(task: Task, tell: Tell) -> dict[str, Any]:
+def diagnosed(task: Task, progress: Progress) -> dict[str, Any]:
     """The fields of the action's result, by name; nothing is left of work that is broken off.
 
     Args:
         task: what to diagnose.
-        tell: called with each step, and ten times a second; what it raises ends the work.
+        progress: called with each step, and ten times a second; what it raises ends the work.
 
     Raises:
         PaintError: the diagnosis refuses its input, or its process ended.
@@ -60,7 +61,7 @@ def diagnosed(task: Task, tell: Tell) -> dict[str, Any]:
     result: dict[str, Any] | None = None
     try:
         with receiver:
-            result = _followed(receiver, tell)
+            result = _followed(receiver, progress)
     finally:
         process.kill()
         process.join()
@@ -69,12 +70,12 @@ def diagnosed(task: Task, tell: Tell) -> dict[str, Any]:
     return result
 
 
-def _followed(receiver: Connection, tell: Tell) -> dict[str, Any]:
+def _followed(receiver: Connection, progress: Progress) -> dict[str, Any]:
     stage = 'starting'
     while True:
-        tell(stage, 0.0)
+        progress(stage, 0.0)
         try:
-            news = receiver.recv() if receiver.poll(LOOK_S) else stage
+            news = receiver.recv() if receiver.poll(POLL_S) else stage
         except EOFError:
             raise PaintError('the process of the diagnosis has ended before its work') from None
         if isinstance(news, PaintError):
@@ -88,9 +89,9 @@ def _work(task: Task, sender: Connection) -> None:
     """In the process: send each step, and at last the result or why there is none."""
     # Pictures and fits take seconds to load, which a node that only plans need not wait for.
     from paint_deposition.api.inference import diagnose
-    from paint_deposition.report.writers.write import write
     from paint_deposition.files.campaign_file import read_campaign
     from paint_deposition.files.model_file import read_model_file
+    from paint_deposition.report.writers.write import write
 
     try:
         campaign = read_campaign(task.campaign_file, sender.send)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -16,12 +16,12 @@ from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.planning.planning_actions import PlanningActions
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
+from paint_deposition.nodes.planning.actions import PlanningActions
+from paint_deposition.nodes.planning.diagnosing import Progress
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     direction,
@@ -60,8 +60,8 @@ PLANNER = dict(
     ),
     gun_turns=NodeParameter(
         False,
-        'Whether the gun is turned by 180 deg for every return pass; else it keeps its '
-        'orientation and lays the same profile both ways [-]',
+        'Turn the gun by 180 deg for every return pass; else it keeps its orientation and '
+        'lays the same profile both ways [true/false]',
     ),
     output_directory=NodeParameter('runs', 'Where the action `diagnose` writes [path]'),
     **fixed(
@@ -104,13 +104,13 @@ class IndexPlanner(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('index_planner', **kwargs)
-        self._asked = 0
-        self._last = Status(OK, 'not asked yet')
+        self._requests = 0
+        self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
-        self._path_publisher = self.create_publisher(Path, 'planned_path', qos.LATCHED)
+        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
         if self._path is not None:
             self._path_publisher.publish(self._path)
-        self._actions = PlanningActions(self)
+        self._actions = PlanningActions(self, self._plan_and_show)
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
     def _prepare(self) -> None:
@@ -128,9 +128,9 @@ class IndexPlanner(PaintNode):
     def _recommend(
         self, request: RecommendIndex.Request, response: RecommendIndex.Response
     ) -> RecommendIndex.Response:
-        self._asked += 1
+        self._requests += 1
         try:
-            answer = recommend(self._of_brush(), self._asked_for(request))
+            answer = recommend(self._of_brush(), self._request_of(request))
         except PaintError as error:
             self._last = Status(WARN, str(error))
             response.message = str(error)
@@ -143,7 +143,7 @@ class IndexPlanner(PaintNode):
         brush = self.values['brush']
         return self._model.with_brush(brush) if brush else self._model
 
-    def _asked_for(self, request: RecommendIndex.Request) -> IndexRequest:
+    def _request_of(self, request: RecommendIndex.Request) -> IndexRequest:
         # In requests and parameters 0 stands for none.
         return IndexRequest(
             speed_m_per_s=request.speed_m_per_s or None,
@@ -161,11 +161,9 @@ class IndexPlanner(PaintNode):
 
     # --- planning
 
-    def plan_and_show(
-        self, changed: Mapping[str, Any], tell: Callable[[str, float], None]
-    ) -> tuple[Plan, Path]:
+    def _plan_and_show(self, changed: Mapping[str, Any], progress: Progress) -> tuple[Plan, Path]:
         """Plan passes with other values of parameters, and publish them."""
-        planned = self._planned(self.values | dict(changed), tell)
+        planned = self._planned(self.values | dict(changed), progress)
         path = self._path_of(planned)
         self._path_publisher.publish(path)
         return planned, path
@@ -173,11 +171,11 @@ class IndexPlanner(PaintNode):
     def _planned(
         self,
         values: Mapping[str, Any],
-        tell: Callable[[str, float], None] = lambda what, share: None,
+        progress: Progress = lambda stage, share: None,
     ) -> Plan:
         if not values['mesh_file']:
             raise PlanError('mesh_file is empty: name the mesh of the part')
-        tell('reading the mesh', 0.0)
+        progress('reading the mesh', 0.0)
         surface = read_mesh(values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)
@@ -197,7 +195,7 @@ class IndexPlanner(PaintNode):
                 outward=tuple(values['outward']) or None,
             ),
             frame_id,
-            tell,
+            progress,
         )
         self.get_logger().info(planned.sentence)
         return planned
@@ -219,7 +217,7 @@ class IndexPlanner(PaintNode):
         values = {
             'model': self.values['model_file'] or 'a 50 mm bell',
             'effects': ' '.join(effect.id for effect in self._model.effects) or 'none',
-            'requests': self._asked,
+            'requests': self._requests,
         }
         return Status(self._last.level, self._last.message, values)
 
@@ -231,19 +229,16 @@ def _or_nan(value: float | None) -> float:
 def _fill(response: RecommendIndex.Response, answer: Recommendation) -> RecommendIndex.Response:
     response.success = True
     response.message = '; '.join([answer.sentence, *answer.notes])
-    response.index_m = answer.index_m
-    response.sigma_n = answer.sigma_n
+    for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
+        setattr(response, name, getattr(answer, name))
     response.index_range_m = list(answer.index_range_m)
     response.tolerance = _or_nan(answer.tolerance)
     response.window_low_m = [low for low, _ in answer.windows_m]
     response.window_high_m = [high for _, high in answer.windows_m]
     response.minima_index_m = [minimum.index_m for minimum in answer.minima]
     response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
-    response.mean_um = answer.mean_um
-    response.speed_m_per_s = answer.speed_m_per_s
     response.passes = answer.passes or 0
     response.cycle_time_s = _or_nan(answer.cycle_time_s)
-    response.travel = answer.travel
     response.curve_index_m = answer.curve.index_m.tolist()
     response.curve_sigma_n = answer.curve.sigma_n.tolist()
     index_drift = answer.index_drift_m or (math.nan, math.nan)

@@ -3,20 +3,47 @@
 from __future__ import annotations
 
 import importlib
-from collections.abc import Callable
-from typing import TYPE_CHECKING
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rclpy.subscription import Subscription
+from rosbags.interfaces import (
+    Qos,
+    QosDurability,
+    QosHistory,
+    QosLiveliness,
+    QosReliability,
+    QosTime,
+)
 
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
-if TYPE_CHECKING:  # older distributions have no such name
-    from rclpy.subscription import MessageInfo
-
-# (topic, serialised message, time received [ns], time sent [ns])
+# Messages of one topic come out of order by less.
+LEAST_STEP_NS = 1_000_000_000
+# (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
+
+
+class LogTime:
+    """Log times of a topic, which keep their pace where the clock of the machine is set back.
+
+    Readers order messages by them: those from after the step would come before those from before.
+    """
+
+    def __init__(self) -> None:
+        self._set_back_ns = self._newest_ns = 0
+
+    def of(self, received_ns: int) -> int:
+        """The log time of a message received at this time of the clock [ns]."""
+        time_ns = received_ns + self._set_back_ns
+        if time_ns < self._newest_ns - LEAST_STEP_NS:
+            self._set_back_ns += self._newest_ns - time_ns
+            time_ns = self._newest_ns
+        self._newest_ns = max(self._newest_ns, time_ns)
+        return time_ns
 
 
 class RecordedTopic:
@@ -40,6 +67,7 @@ class RecordedTopic:
         self.messages = self.messages_before = 0
         self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
+        self._log_time = LogTime()
         self.profile: QoSProfile | None = None
         self._node = node
         package, kind, message = type_name.split('/')
@@ -78,14 +106,15 @@ class RecordedTopic:
             while taken := handle.take_message(self._message_class, True):
                 self._on_message(*taken)
 
-    def _on_message(self, cdr: bytes, info: MessageInfo) -> None:
+    def _on_message(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
-        self._take(self.name, cdr, info['received_timestamp'], info['source_timestamp'])
+        log_time_ns = self._log_time.of(info['received_timestamp'])
+        self._take(self.name, cdr, log_time_ns, info['source_timestamp'])
 
-    def _count_missed(self, info: MessageInfo) -> None:
+    def _count_missed(self, info: Mapping[str, Any]) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
         if number is None or gid is None:
             self.unnumbered += 1
@@ -101,3 +130,22 @@ class RecordedTopic:
             self.gaps += 1
             self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         self.newest_stamp_ns = stamp_ns
+
+
+def as_recorded(profile: QoSProfile) -> Qos:
+    """A publisher's profile, as the middleware reports it, the way bags store it."""
+    return Qos(
+        QosHistory[profile.history.name],
+        profile.depth,
+        QosReliability[profile.reliability.name],
+        QosDurability[profile.durability.name],
+        _as_time(profile.deadline),
+        _as_time(profile.lifespan),
+        QosLiveliness[profile.liveliness.name],
+        _as_time(profile.liveliness_lease_duration),
+        profile.avoid_ros_namespace_conventions,
+    )
+
+
+def _as_time(duration: Duration) -> QosTime:
+    return QosTime(*divmod(duration.nanoseconds, 10**9))

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import shutil
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import Part, PoseProgress
+from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -16,25 +18,27 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
-from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.nodes.recording.default_topics import (
-    PART_POSE,
-    POSES,
-    STATIC_FRAMES,
-    default_topics,
-)
-from paint_deposition.nodes.recording.log_time import LogTime
-from paint_deposition.nodes.recording.part_runs import SaidOnce, free_name, notes_on
-from paint_deposition.nodes.recording.recorded_qos import as_recorded
-from paint_deposition.nodes.recording.recorded_topic import RecordedTopic
-from paint_deposition.nodes.recording.recorder_parameters import RECORDER
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Status, Task
-from paint_deposition.nodes.runtime.file_names import (
+from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic, RunWriter
+from paint_deposition.nodes.recording.recorded_topic import RecordedTopic, as_recorded
+from paint_deposition.nodes.runtime.managed_node import MANAGED, ManagedNode
+from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, Task
+from paint_deposition.nodes.runtime.parameters import (
+    FILE_NAME,
+    FILE_NAME_WORDS,
+    NodeParameter,
+    atomizer_names,
+    read_to_configure,
     require_file_name,
 )
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.messages import PART_TOPIC, PROGRESS_TOPIC, header, of_gun
+from paint_deposition.nodes.runtime.topics import (
+    PART_TOPIC,
+    PROGRESS,
+    PROGRESS_TOPIC,
+    accepting,
+    of_gun,
+    weaker_policies,
+)
 
 DISCOVERY_PERIOD_S = 0.1
 FLUSH_PERIOD_S = 0.1
@@ -43,6 +47,62 @@ POSES_A_REPORT = 50
 POSE_QUEUE_DEPTH = 5000
 QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
+POSES, STATES = 'atomizer/pose', 'atomizer/state'
+STATIC_FRAMES, PART_POSE, PARAMETERS = '/tf_static', 'part_pose', '/parameter_events'
+# The mesh marker is left out: the cloud and the field say the same in a fortieth of its size.
+OF_THE_CELL = (
+    'thickness/cloud',
+    'thickness/field',
+    'thickness/stats',
+    'comparison/stats',
+    'planned_path',
+    # Where the part stood, for poses that are not in its frame.
+    PART_POSE,
+    '/tf',
+    STATIC_FRAMES,
+    '/diagnostics',
+    PARAMETERS,
+)
+
+RECORDER = dict(
+    **MANAGED,
+    output_directory=NodeParameter(
+        'runs',
+        'Folder to make the run in [path]',
+        fixed_because='the network does not choose where files are written; restart the node',
+    ),
+    **read_to_configure(
+        'the run is made with it; clean the node up, or call ~/stop and start another recorder',
+        topics=NodeParameter(
+            [],
+            'Topics to record; empty: motion, film, plan, diagnostics and parameter changes '
+            '[topics]',
+            element=str,
+        ),
+        atomizers=atomizer_names('whose run is recorded'),
+        name=NodeParameter(
+            '',
+            "Run's name; empty: run_<date>_<time> [text]",
+            constraints=FILE_NAME_WORDS,
+            allows=lambda value: not value or bool(FILE_NAME.fullmatch(value)),
+        ),
+        compression=NodeParameter(
+            'zstd', 'Compression of the chunks in the file [name]', choices=tuple(COMPRESSIONS)
+        ),
+        max_pose_gap_s=NodeParameter(
+            0.25, 'Longest interval between pose stamps that is no gap [s]', (0.001, 60.0)
+        ),
+        mesh_file=NodeParameter('', 'Mesh whose digest to keep with the run; empty: none [path]'),
+        model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
+    ),
+)
+
+
+def default_topics(guns: Sequence[str]) -> list[str]:
+    """Motion, film, plan, diagnostics and parameter changes; of several guns the film of each."""
+    motion = [of_gun(gun, topic) for gun in guns for topic in (POSES, STATES)]
+    shares = [of_gun(gun, 'thickness/field') for gun in guns if len(guns) > 1]
+    return [*motion, *shares, *OF_THE_CELL]
 
 
 class RunRecorder(ManagedNode):
@@ -66,11 +126,16 @@ class RunRecorder(ManagedNode):
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
-        self._said_once = SaidOnce(STATIC_FRAMES, self.resolve_topic_name(PART_POSE))
+        # Topics of which the newest message holds until the next one, also in the next run.
+        self._newest_holds = {
+            self.resolve_topic_name(name)
+            for name in (PART_POSE, *(of_gun(gun, STATES) for gun in guns))
+        }
+        self._in_force: dict[object, tuple[str, bytes, int]] = {}
         self._error: RecordingError | None = None
         self._progress = {
             self.resolve_topic_name(of_gun(gun, POSES)): self.create_publisher(
-                PoseProgress, of_gun(gun, PROGRESS_TOPIC), qos.PROGRESS
+                PoseProgress, of_gun(gun, PROGRESS_TOPIC), PROGRESS
             )
             for gun in guns
         }
@@ -83,7 +148,6 @@ class RunRecorder(ManagedNode):
         self._topics: dict[str, RecordedTopic] = {}
         self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
-        self._log_time = LogTime()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -95,11 +159,11 @@ class RunRecorder(ManagedNode):
             require_file_name('name', self.values['name'])
 
     def _next_name(self) -> str:
-        """The run's name; one that this node has recorded by itself is not told from another."""
+        """The run's name; one that this node has recorded by itself gets a date behind it."""
         name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
         if not self.runs:
             return name
-        return free_name(Path(self.values['output_directory']), name)
+        return _free_name(Path(self.values['output_directory']), name)
 
     def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
         folder = Path(self.values['output_directory']) / name
@@ -127,7 +191,7 @@ class RunRecorder(ManagedNode):
         if len(types) > 1:
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
-        profile = qos.accepting(
+        profile = accepting(
             [publisher.qos_profile for publisher in publishers],
             POSE_QUEUE_DEPTH if is_pose else QUEUE_DEPTH,
         )
@@ -139,39 +203,41 @@ class RunRecorder(ManagedNode):
             topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name], self._run_topics[name] = topic, run_topic
-        if topic.profile is None or qos.offers_less(profile, topic.profile):
+        if topic.profile is None or weaker_policies(profile, topic.profile):
             topic.subscribe(profile)
 
     # --- writing
 
-    def _write(self, name: str, cdr: bytes, received_ns: int, sent_ns: int) -> None:
+    def _write(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
         if name == self._part_topic:
-            self._follow_part(deserialize_message(cdr, Part))
-        log_time_ns = self._log_time_ns(name, received_ns)
-        self._said_once.note((name, cdr, log_time_ns, sent_ns))
+            self._follow_part(deserialize_message(cdr, Part), log_time_ns)
+        self._note_in_force(name, cdr, sent_ns)
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_A_REPORT == 0:
             self._report_progress()
 
-    def _log_time_ns(self, name: str, received_ns: int) -> int:
-        """When a message is logged: as received, but never before the one before."""
-        set_back_ns = self._log_time.set_back_ns
-        log_time_ns = self._log_time.of(received_ns, name)
-        if self._log_time.set_back_ns > set_back_ns:
-            step_s = (self._log_time.set_back_ns - set_back_ns) * 1e-9
-            self.get_logger().warning(
-                f'the clock of this machine was set back by {step_s:.3g} s; log times go on'
-            )
-        return log_time_ns
+    def _note_in_force(self, name: str, cdr: bytes, sent_ns: int) -> None:
+        """Keep a message that holds for later runs: newest state, place, parameters, frames."""
+        key: object = name
+        if name == PARAMETERS:
+            event = deserialize_message(cdr, ParameterEvent)
+            changed = (*event.new_parameters, *event.changed_parameters)
+            key = event.node, *(parameter.name for parameter in changed)
+        elif name == STATIC_FRAMES:
+            key = cdr
+        elif name not in self._newest_holds:
+            return
+        self._in_force.pop(key, None)
+        self._in_force[key] = name, cdr, sent_ns
 
-    def _follow_part(self, part: Part) -> None:
+    def _follow_part(self, part: Part, log_time_ns: int) -> None:
         """Begin the run of a part; the one before is complete."""
         # The message is latched, and may come again.
         if self._error is not None or part.run == self._part_run:
             return
         try:
-            name = free_name(Path(self.values['output_directory']), part.run)
-            following = self._new_run(name, notes_on(part, self.values['model_file']))
+            name = _free_name(Path(self.values['output_directory']), part.run)
+            following = self._new_run(name, _notes_on(part, self.values['model_file']))
             # The message overtakes others that wait; they belong to the part before.
             for recorded in self._topics.values():
                 if recorded.name != self._part_topic:
@@ -182,13 +248,13 @@ class RunRecorder(ManagedNode):
             for topic, run_topic in self._run_topics.items():
                 self._topics[topic].count_from_zero()
                 self.run.add_topic(run_topic)
-            for message in self._said_once.messages:
-                self.run.write(*message)
+            for topic_name, cdr, sent_ns in self._in_force.values():
+                self.run.write(topic_name, cdr, log_time_ns, sent_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
-            self._give_up(error)
+            self._record_failure(error)
         except PaintError as error:
-            self.get_logger().error(f'{self._part_topic}: {error}; the run goes on')
+            self.get_logger().error(f'{self._part_topic}: {error}; the run continues')
 
     def _flush(self) -> None:
         if not self.run.complete:
@@ -201,9 +267,9 @@ class RunRecorder(ManagedNode):
         try:
             step(*arguments)
         except RecordingError as error:
-            self._give_up(error)
+            self._record_failure(error)
 
-    def _give_up(self, error: RecordingError) -> None:
+    def _record_failure(self, error: RecordingError) -> None:
         self._error = error
         self.get_logger().error(str(error))
         self.fail(error)
@@ -261,7 +327,7 @@ class RunRecorder(ManagedNode):
         except OSError as error:
             gone = f'{self.run.path}: {error.strerror}; nothing more can be recorded there'
             if self._error is None:
-                self._give_up(RecordingError(gone))
+                self._record_failure(RecordingError(gone))
             return Status(ERROR, gone)
         topics = self._topics.values()
         level, message = OK, 'recording'
@@ -284,3 +350,21 @@ class RunRecorder(ManagedNode):
             **{t.name: f'{t.messages} messages, {t.losses}, {t.gaps} gaps' for t in topics},
         }
         return Status(level, message, values)
+
+
+def _notes_on(part: Part, model_file: str) -> dict[str, str]:
+    """What the run of a part is made with, by name."""
+    notes = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
+    if part.part_pose:
+        notes['part_pose'] = ' '.join(map(str, part.part_pose))
+    # The simulator may run on another machine, with files of its own.
+    mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
+    return provenance(mesh_file, model_file) | notes
+
+
+def _free_name(folder: Path, run: str) -> str:
+    """The name of a run, with date and time behind it where there is one of that name."""
+    require_file_name('run', run)
+    dated = run + time.strftime('_%Y%m%d_%H%M%S')
+    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
+    return next(name for name in names if not (folder / name).exists())

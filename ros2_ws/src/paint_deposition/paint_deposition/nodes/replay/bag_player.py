@@ -20,11 +20,13 @@ from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
 from paint_deposition.nodes.replay.flow_control import FlowControl
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
-from paint_deposition.nodes.replay.replayed_messages import ReplayMessage, replay_messages
-from paint_deposition.nodes.replay.replayed_transforms import ReplayedTransforms
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.replay.replayed_messages import (
+    ReplayedTransforms,
+    ReplayMessage,
+    replay_messages,
+)
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 
 CLOCK_PERIOD_S = 0.01
@@ -71,15 +73,15 @@ class BagPlayer(PaintNode):
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
-        # Reliable, so that acknowledgement can be asked.
-        profile = QoSProfile(depth=max(qos.POSE_DEPTH, self.values['window']))
+        # Reliable, so that it knows of acknowledgements.
+        profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
         self._clock_publisher: Publisher | None = None
         self._clock_order = threading.Lock()
         self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
         if self.values['publish_clock']:
-            self._clock_publisher = self.create_publisher(Clock, '/clock', qos.CLOCK)
+            self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(CLOCK_PERIOD_S, self._publish_clock)
         self.offer('~/pause', self._pause)
         self.offer('~/resume', self._resume)

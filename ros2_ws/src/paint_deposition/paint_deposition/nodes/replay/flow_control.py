@@ -5,6 +5,9 @@ from __future__ import annotations
 import math
 import threading
 import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 from paint_msgs.msg import PoseProgress
 from rclpy.duration import Duration
@@ -12,16 +15,132 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.nodes.replay.pose_window import PoseWindow
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.messages import PROGRESS_TOPIC
-from paint_deposition.nodes.runtime.qos_watch import endpoint_name
+from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, endpoint_name
 
 # Discovery brings a node's subscriptions and its progress publisher one after the other.
 SETTLED_S = 0.5
 GRAPH_PERIOD_S = 0.1
 NOTICE_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
+# A subscriber that has reported the same pose for so long while none was sent has got all that
+# will ever reach it.
+LOST_AFTER_S = 5.0
+# One that has never reported is not waited for after so long; nodes report as soon as they run.
+UNHEARD_AFTER_S = 20.0
+
+
+@dataclass
+class _Subscriber:
+    taken: int
+    advanced_s: float
+    reported_s: float | None = None
+    lost: int = 0
+    unheard: bool = False
+
+
+class PoseWindow:
+    """Poses that were published, and which of them each reporting subscriber has taken.
+
+    A subscriber is known by its full name; one that joins late, or again, starts with what is
+    published after. Its reports name the newest pose it took by stamp: what was lost before that
+    one does not matter any more. All times are monotonic seconds. Safe to use from several
+    threads.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._published = 0
+        self._published_s = 0.0
+        self._stamps: deque[int] = deque()  # of the poses that somebody has not taken yet
+        self._subscribers: dict[str, _Subscriber] = {}
+
+    def publish(self, stamp_ns: int, now_s: float) -> None:
+        """Note that the pose of this stamp was sent."""
+        with self._lock:
+            self._published += 1
+            self._published_s = now_s
+            if self._subscribers:
+                self._stamps.append(stamp_ns)
+
+    def present(self, names: Iterable[str], now_s: float) -> None:
+        """Note which subscribers are there now: others are no longer waited for."""
+        with self._lock:
+            known = self._subscribers
+            self._subscribers = {
+                name: known.get(name) or _Subscriber(self._published, now_s)
+                for name in sorted(names)
+            }
+            self._forget_taken()
+
+    def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
+        """Note the newest pose that a subscriber has taken; without a name, all of them."""
+        with self._lock:
+            taken = self._number_of(stamp_ns)
+            for known, subscriber in self._subscribers.items():
+                if name not in (None, known):
+                    continue
+                subscriber.reported_s = now_s
+                if subscriber.unheard:  # what was forgotten meanwhile is not waited for
+                    subscriber.unheard = False
+                    subscriber.taken = self._published - len(self._stamps)
+                if taken > subscriber.taken:
+                    subscriber.taken = taken
+                    subscriber.advanced_s = now_s
+            self._forget_taken()
+
+    def ahead(self, now_s: float) -> int:
+        """Poses that the slowest subscriber has not taken yet."""
+        with self._lock:
+            for subscriber in self._subscribers.values():
+                if subscriber.taken < self._published:
+                    self._drop_hopeless(subscriber, now_s)
+            self._forget_taken()
+            return len(self._stamps)
+
+    def slowest(self) -> list[str]:
+        """The subscribers that are furthest behind."""
+        with self._lock:
+            least = self._least_taken()
+            behind = least < self._published
+            return [name for name, s in self._subscribers.items() if behind and s.taken == least]
+
+    def unheard(self) -> list[str]:
+        """Subscribers that are not waited for because they have never reported."""
+        with self._lock:
+            return [name for name, s in self._subscribers.items() if s.unheard]
+
+    def lost(self) -> dict[str, int]:
+        """Poses that never reached a subscriber, by its name."""
+        with self._lock:
+            return {name: s.lost for name, s in self._subscribers.items() if s.lost}
+
+    def _number_of(self, stamp_ns: int) -> int:
+        """How many poses were published up to the newest one of this stamp; 0: not among them."""
+        for back, stamp in enumerate(reversed(self._stamps)):
+            if stamp == stamp_ns:
+                return self._published - back
+        return 0
+
+    def _drop_hopeless(self, subscriber: _Subscriber, now_s: float) -> None:
+        quiet_since_s = max(self._published_s, subscriber.advanced_s)
+        if subscriber.reported_s is None:
+            subscriber.unheard |= now_s - quiet_since_s > UNHEARD_AFTER_S
+        elif (
+            now_s - quiet_since_s > LOST_AFTER_S
+            # It still reports; one that is silent may be busy.
+            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_AFTER_S
+        ):
+            subscriber.lost += self._published - subscriber.taken
+            subscriber.taken = self._published
+
+    def _least_taken(self) -> int:
+        heard = (s.taken for s in self._subscribers.values() if not s.unheard)
+        return min(heard, default=self._published)
+
+    def _forget_taken(self) -> None:
+        least = self._least_taken()
+        while len(self._stamps) > self._published - least:
+            self._stamps.popleft()
 
 
 class FlowControl:
@@ -41,8 +160,9 @@ class FlowControl:
         self._window = PoseWindow()
         self._sent = 0
         self._looked_s = -math.inf
+        self._unheard: set[str] = set()
         self.doing = 'starting'
-        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, qos.PROGRESS)
+        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
 
     @property
     def poses_ahead(self) -> int:
@@ -85,8 +205,8 @@ class FlowControl:
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
-        for name, count in self._window.take_lost().items():
-            self._node.get_logger().warning(f'{name} never got the last {count} poses')
+        for name, count in self._window.lost().items():
+            self._node.get_logger().warning(f'{name} never got {count} poses')
 
     def _wait_until_ahead_is_less_than(self, limit: int) -> None:
         notice_s = time.monotonic()
@@ -94,14 +214,15 @@ class FlowControl:
             now_s = time.monotonic()
             if now_s - self._looked_s > GRAPH_PERIOD_S:
                 self._look_around()
-            ahead = self.poses_ahead
-            for name in self._window.take_unheard():
+            if self.poses_ahead < limit:
+                break
+            unheard = set(self._window.unheard())
+            for name in unheard - self._unheard:
                 self._node.get_logger().warning(
                     f'{name} has never reported its progress: it is no longer waited for, and '
                     'may lose what its queue does not hold'
                 )
-            if ahead < limit:
-                break
+            self._unheard = unheard
             if now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
                 slowest = ' '.join(self._window.slowest())
@@ -118,15 +239,12 @@ class FlowControl:
         self._window.report(progress.reporter or None, stamp, time.monotonic())
 
     def _look_around(self) -> frozenset[str]:
-        self._looked_s = time.monotonic()
-        names = self._reporters()
-        self._window.present(names, time.monotonic())
-        return names
-
-    def _reporters(self) -> frozenset[str]:
         """Full names of the nodes that take the poses and can report progress."""
-        progress_topic = self._node.resolve_topic_name(PROGRESS_TOPIC)
-        node = self._node
-        takers = node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        tellers = node.get_publishers_info_by_topic(progress_topic)
-        return frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, tellers))
+        self._looked_s = time.monotonic()
+        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        reporters = self._node.get_publishers_info_by_topic(
+            self._node.resolve_topic_name(PROGRESS_TOPIC)
+        )
+        names = frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, reporters))
+        self._window.present(names, self._looked_s)
+        return names

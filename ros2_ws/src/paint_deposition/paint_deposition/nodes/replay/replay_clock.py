@@ -10,12 +10,8 @@ import time
 class ReplayClock:
     """Bag time as a function of the steady clock; safe to use from several threads.
 
-    Args:
-        rate: bag seconds for one second; 0: time jumps from message to message.
-        running: False to start paused.
-
-    Attributes:
-        running: False while paused.
+    `rate` is bag seconds for one second; 0: time jumps from message to message. `running` is False
+    while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -56,7 +52,7 @@ class ReplayClock:
             self.running = False
 
     def resume(self) -> None:
-        """Go on after `pause`."""
+        """End a `pause`."""
         with self._changed:
             self.running = True
             self._run_on()

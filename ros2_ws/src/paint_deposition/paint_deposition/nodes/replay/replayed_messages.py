@@ -1,4 +1,4 @@
-"""What a bag player publishes, in order: poses as they were recorded, the trigger as states."""
+"""What a bag player publishes, in order: poses as recorded, the trigger as states, transforms."""
 
 from __future__ import annotations
 
@@ -7,17 +7,29 @@ from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
+from geometry_msgs.msg import TransformStamped
 from paint_msgs.msg import AtomizerState
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
 from std_msgs.msg import Bool
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.transforms import (
+    PART_POSE_TYPE,
+    STATIC,
+    StaticFrames,
+    part_pose_topics,
+)
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
+
+TF_DEPTH = 100
 
 
 class ReplayMessage(NamedTuple):
@@ -79,3 +91,55 @@ def _state_of(recorded: Any) -> AtomizerState:
     state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
     state.spraying = bool(recorded.spraying)
     return state
+
+
+class ReplayedTransforms:
+    """Publishes `/tf` and `/tf_static`; a recorded `part_pose` goes out as a static transform.
+
+    Where tf2_msgs is not installed nothing is published, and a warning says what to give the
+    simulator instead.
+
+    Attributes:
+        topics: of the bag, whose messages are to be published.
+    """
+
+    def __init__(self, node: Node, bag: Bag) -> None:
+        self.topics = [topic.name for topic in bag.topics_of(*TF_TYPES)] + part_pose_topics(bag)
+        self._publishers: dict[bool, Publisher] = {}
+        if not self.topics:
+            return
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            self.topics = []
+            node.get_logger().warning(
+                f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
+                f'replayed{_instead(bag)}'
+            )
+            return
+        self._message = TFMessage
+        for static in (False, True):
+            durability = DurabilityPolicy.TRANSIENT_LOCAL if static else DurabilityPolicy.VOLATILE
+            self._publishers[static] = node.create_publisher(
+                TFMessage,
+                f'/{STATIC}' if static else '/tf',
+                QoSProfile(depth=TF_DEPTH, durability=durability),
+            )
+
+    def publish(self, message: RawMessage) -> None:
+        """Publish a message of one of the topics."""
+        cdr = message.cdr
+        if message.type == PART_POSE_TYPE:
+            placed = deserialize_message(cdr, TransformStamped)
+            cdr = serialize_message(self._message(transforms=[placed]))
+        static = message.type == PART_POSE_TYPE or message.topic.endswith(STATIC)
+        self._publishers[static].publish(cdr)
+
+
+def _instead(bag: Bag) -> str:
+    """The parameters of the simulator that stand for what the bag says of the part."""
+    for parent, child, place in StaticFrames.in_bag(bag).places:
+        if child == 'part':
+            values = ', '.join(f'{value:.9g}' for value in place.values)
+            return f"; give the simulator part_parent_frame: '{parent}' and part_pose: [{values}]"
+    return '; give the simulator part_parent_frame and part_pose'

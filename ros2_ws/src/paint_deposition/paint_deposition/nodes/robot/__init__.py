@@ -1,1 +1,1 @@
-"""What a robot tells of its gun, for those who follow `atomizer/pose` and `atomizer/state`."""
+"""The poses and signals of a robot's gun, published as `atomizer/pose` and `atomizer/state`."""

@@ -6,7 +6,7 @@ import importlib
 import math
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
@@ -20,23 +20,17 @@ from paint_deposition.files.recordings.joint_states import USUAL_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
-from paint_deposition.nodes.robot.joint_poses import JointPoses
-from paint_deposition.nodes.robot.tf_poses import TfPoses
-from paint_deposition.nodes.runtime import qos
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, WARN, Diagnostics, Status
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, JointPoses, TfPoses
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, accepting
 
-if TYPE_CHECKING:  # older distributions have no such name
-    from rclpy.subscription import MessageInfo
-
-QUEUE_DEPTH = 5000
 # Who comes late must know whether the gun is open; who is slow must miss no change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # (topic, message, what the middleware says of it)
-TakeMessage = Callable[[str, Any, 'MessageInfo'], None]
+TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
 SOURCE = fixed(
@@ -62,12 +56,12 @@ SOURCE = fixed(
     trigger=NodeParameter(
         '', f'What opens the gun: {SIGNAL}; empty: nothing is published on atomizer/state [topic]'
     ),
-    flow=NodeParameter('', f'What tells the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
+    flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
     brush=NodeParameter(
-        '', f'What tells the number of the brush: {SIGNAL}; empty: the only one [topic]'
+        '', f'Signal of the number of the brush: {SIGNAL}; empty: the only one [topic]'
     ),
     speed=NodeParameter(
-        '', f'What tells the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
+        '', f'Signal of the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
     ),
     speed_scale=NodeParameter(
         1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
@@ -90,7 +84,7 @@ class AtomizerSource(PaintNode):
     def __init__(self, **kwargs: Any):
         super().__init__('atomizer_source', **kwargs)
         self._pose_publisher = self.create_publisher(
-            PoseStamped, 'atomizer/pose', QoSProfile(depth=qos.POSE_DEPTH)
+            PoseStamped, 'atomizer/pose', QoSProfile(depth=POSE_DEPTH)
         )
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
@@ -101,7 +95,7 @@ class AtomizerSource(PaintNode):
         for signal in self._signals.values():
             self._missing[signal.topic] = self._take_signals
         self._values: dict[str, float] = {}
-        self._told: tuple[bool, float, int, float | None] | None = None
+        self._published: tuple[bool, float, int, float | None] | None = None
         self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
@@ -166,13 +160,13 @@ class AtomizerSource(PaintNode):
             if found:
                 package, kind, name = found[0].topic_type.split('/')
                 message = getattr(importlib.import_module(f'{package}.{kind}'), name)
-                profile = qos.accepting([info.qos_profile for info in found], QUEUE_DEPTH)
+                profile = accepting([info.qos_profile for info in found], QUEUE_DEPTH)
                 self.create_subscription(message, topic, _with_topic(take, topic), profile)
                 del self._missing[topic]
         if not self._missing:
             self._find_timer.cancel()
 
-    def _take_signals(self, topic: str, message: Any, info: MessageInfo) -> None:
+    def _take_signals(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
         """Take trigger, flow and brush, which may be fields of one message."""
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         self._problem = ''
@@ -205,10 +199,10 @@ class AtomizerSource(PaintNode):
         flow = self._values['flow'] / full if 'flow' in self._values else 1.0
         brush = int(self._values.get('brush', ONLY_BRUSH))
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
-        told = on, flow, brush, speed if 'speed' in self._values else None
-        if told == self._told:
+        new = on, flow, brush, speed if 'speed' in self._values else None
+        if new == self._published:
             return
-        self._told = told
+        self._published = new
         state = AtomizerState(spraying=on, flow=flow, brush=brush, programmed_speed_m_per_s=speed)
         state.header.frame_id = self._motion.base
         state.header.stamp = Time(nanoseconds=stamp).to_msg()
@@ -238,9 +232,9 @@ class AtomizerSource(PaintNode):
         return Status(OK, 'following the signals' if values else 'no signal is named', values)
 
 
-def _with_topic(take: TakeMessage, topic: str) -> Callable[[Any, MessageInfo], None]:
+def _with_topic(take: TakeMessage, topic: str) -> Callable[[Any, Mapping[str, Any]], None]:
     # rclpy counts the arguments of a callback: two are the message and what is said of it.
-    def on_message(message: Any, info: MessageInfo) -> None:
+    def on_message(message: Any, info: Mapping[str, Any]) -> None:
         take(topic, message, info)
 
     return on_message

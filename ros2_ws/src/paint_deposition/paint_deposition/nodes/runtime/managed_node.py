@@ -8,16 +8,15 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.diagnostics import ERROR, OK, Diagnostics, Status, Task
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import ERROR, OK, Diagnostics, PaintNode, Status, Task
 from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(
     'it counts when the node starts',
     autostart=NodeParameter(
         True,
-        'Whether the node configures and activates itself when it starts; false: a lifecycle '
-        'manager does [true/false]',
+        'Configure and activate the node when it starts; false: a lifecycle manager does '
+        '[true/false]',
     ),
 )
 ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
@@ -75,10 +74,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         """End threads and the like; what was made on the node goes by itself."""
 
     def _tasks(self) -> Mapping[str, Task]:
-        """What tells of the health of the configured node, by name."""
+        """The health of the configured node by task, by name."""
         return {}
-
-    # --- for everybody
 
     @property
     def configured(self) -> bool:

@@ -1,4 +1,4 @@
-"""Messages that several nodes use: progress, stamps in serialised messages, a coloured mesh.
+"""Messages that several nodes use: stamps in serialised messages, a coloured mesh.
 
 A Marker of 100,000 triangles takes a second to build from Python objects. Here it is serialised
 once, and for each publication only its stamp and colours are rewritten in the bytes.
@@ -15,10 +15,6 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
-# Every node that takes poses reports here how far it has come.
-PROGRESS_TOPIC = 'atomizer/progress'
-# The part in the cell, for those who record.
-PART_TOPIC = 'part'
 # A header begins with its stamp, behind the four bytes that say how the message is encoded.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
@@ -26,11 +22,6 @@ SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 
 SAMPLE_COLOURS = np.array(
     [[0.31, 0.41, 0.59, 0.26], [0.53, 0.58, 0.97, 0.93], [0.23, 0.84, 0.62, 0.64]], np.float32
 )
-
-
-def of_gun(name: str, topic: str) -> str:
-    """A topic of the gun of this name; '' is the only gun of a cell."""
-    return f'{name}/{topic}' if name else topic
 
 
 def header(frame_id: str, stamp_ns: int) -> Header:

@@ -25,7 +25,7 @@ def model_parameters(use: str) -> ParameterTable:
         ),
         'allow_user_effects': NodeParameter(
             False,
-            'Whether a model may name effect files, whose Python code this node then runs '
+            'Allow a model to name effect files, whose Python code this node then runs '
             '[true/false]',
             fixed_because='whoever can set parameters could otherwise run code on this machine; '
             'restart the node with the new value',
@@ -36,11 +36,7 @@ def model_parameters(use: str) -> ParameterTable:
 def read_chosen_model(
     values: Mapping[str, Any], load: LoadEffect = load_effect_file
 ) -> DepositionModel:
-    """The model that a node's parameters choose.
-
-    Args:
-        values: of the rows above.
-        load: reads an effect file, where the model may name one.
+    """The model that a node's parameters choose; `load` reads effect files it may name.
 
     Raises:
         ModelError: the model cannot be used, or names an effect file without being allowed to.
@@ -58,11 +54,7 @@ def effect_loader(values: Mapping[str, Any], load: LoadEffect = load_effect_file
 def read_chosen_models(
     values: Mapping[str, Any], load: LoadEffect = load_effect_file
 ) -> tuple[DepositionModel, ...]:
-    """The model of each gun that a node's parameters name, at least one.
-
-    Args:
-        values: of the rows above, `atomizers` and `model_files`.
-        load: reads an effect file, where the model may name one.
+    """The model of each of `atomizers`, at least one, by `model_files` or `model_file`.
 
     Raises:
         PaintError: there are not as many models as guns, or as for one model.

@@ -26,6 +26,8 @@ INT64_MAX = 2**63 - 1
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 RESERVED_PREFIX = 'qos_overrides.'
+FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
+FILE_NAME_WORDS = "letters, digits, '-', '_' and '.', the last not in front"
 TYPE_WORDS = {
     Parameter.Type.BOOL: 'true or false',
     Parameter.Type.INTEGER: 'a whole number',
@@ -260,3 +262,13 @@ def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParame
         if reason:
             return SetParametersResult(successful=False, reason=f'{change.name} {reason}')
     return SetParametersResult(successful=True)
+
+
+def require_file_name(what: str, name: str) -> None:
+    """Refuse a name that could lead to another folder.
+
+    Raises:
+        PaintError: it is empty, or has other characters than files of a cell need.
+    """
+    if not FILE_NAME.fullmatch(name):
+        raise PaintError(f"{what} '{name}': use {FILE_NAME_WORDS}")

@@ -2,66 +2,56 @@
 
 from __future__ import annotations
 
-import contextlib
-import gc
 import os
 import signal
 import sys
-import threading
 import traceback
-from collections.abc import Callable, Iterator
-from types import FrameType
+from collections.abc import Callable
 
 import rclpy
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.signals import SignalHandlerOptions
-from rclpy.task import Future
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.paint_node import PaintNode
+from paint_deposition.nodes.runtime.node import PaintNode
 
 EXIT_BAD_INPUT = 2
 EXIT_CRASH = 1
-# After so long a signal is tried again that came at a bad moment.
-AGAIN_S = 0.02
+# The main thread sleeps in the middleware, where no signal reaches it; it wakes so often.
+WAKE_S = 0.1
 
 
-def run_node(
-    make_node: Callable[[], PaintNode], told_to_stop: threading.Event | None = None
-) -> int:
-    """Run one node until it finishes or the process is told to stop; return the exit code.
+def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = None) -> int:
+    """Run one node until it finishes or the process gets a signal; return the exit code.
 
     Ctrl-C, twice as `ros2 launch` sends it, and SIGTERM are a request to stop (exit code 0),
     never an exception in the middle of a callback. A PaintError becomes one line on stderr and
     exit code 2, any other exception a traceback and exit code 1; both close the node first.
-    ``told_to_stop`` is set where a signal has come before.
+    ``signals`` holds those that have come before.
     """
     node: PaintNode | None = None
-    told_to_stop = told_to_stop or threading.Event()
+    came = [] if signals is None else signals
 
-    def stop(signum: int, frame: FrameType | None) -> None:
-        told_to_stop.set()
-        _break_off_loading(signum, frame)
+    def note(number: int, _frame: object) -> None:
+        came.append(number)
+        if PaintNode.loading:
+            # Reading files can be broken off without harm; an exception could be swallowed by a
+            # library or by the compiler.
+            os._exit(0)
 
     try:
-        _on_signals(stop)
-        if told_to_stop.is_set():
+        _on_signals(note)
+        if came:
             return 0
         _init()
         node = _made(make_node)
-        gc.enable()
-        exit_code = _spin(node, told_to_stop)
-    except KeyboardInterrupt:
-        exit_code = 0
+        exit_code = _spin(node, came)
     except Exception as error:
-        # A library that swallows the interrupt of its loading fails in ways of its own.
-        broken_off = node is None and told_to_stop.is_set()
-        exit_code = 0 if broken_off else _report(error)
+        exit_code = _report(error)
     finally:
         # Python restores the default action of its own handlers while it exits, and a second
         # SIGINT would then kill it; an ignored signal stays ignored.
         _on_signals(signal.SIG_IGN)
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
     try:
         if node is not None:
             exit_code = max(exit_code, _closed(node))
@@ -70,28 +60,9 @@ def run_node(
     return exit_code
 
 
-def _on_signals(action: Callable[[int, FrameType | None], None] | signal.Handlers) -> None:
+def _on_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
     signal.signal(signal.SIGINT, action)
     signal.signal(signal.SIGTERM, action)
-
-
-def _break_off_loading(_signum: int, frame: FrameType | None) -> None:
-    # Loading a mesh takes a while and can be broken off without harm.
-    if not PaintNode.loading:
-        return
-    if not _in_the_compiler(frame):
-        raise KeyboardInterrupt
-    # It calls back into Python from C, where an exception is printed and lost: try again soon.
-    signal.signal(signal.SIGALRM, _break_off_loading)
-    signal.setitimer(signal.ITIMER_REAL, AGAIN_S)
-
-
-def _in_the_compiler(frame: FrameType | None) -> bool:
-    while frame is not None:
-        if str(frame.f_globals.get('__name__')).startswith('llvmlite.'):
-            return True
-        frame = frame.f_back
-    return False
 
 
 def _init() -> None:
@@ -113,15 +84,13 @@ def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
         raise PaintError(f'ROS cannot make the node: {reason}') from None
 
 
-def _spin(node: PaintNode, told_to_stop: threading.Event) -> int:
+def _spin(node: PaintNode, signals: list[int]) -> int:
     executor = SingleThreadedExecutor(context=node.context)
     executor.add_node(node)
-    with _signals_finish(node.finished):
-        if told_to_stop.is_set():  # while the node was being made
-            node.finish()
-        else:
-            node.get_logger().info('ready')
-        executor.spin_until_future_complete(node.finished)
+    if not signals:
+        node.get_logger().info('ready')
+    while not (signals or node.finished.done()):
+        executor.spin_once(timeout_sec=WAKE_S)
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)
     return (node.finished.result() or 0) if node.finished.done() else 0
@@ -142,34 +111,3 @@ def _report(error: Exception) -> int:
         return EXIT_BAD_INPUT
     traceback.print_exception(error)
     return EXIT_CRASH
-
-
-@contextlib.contextmanager
-def _signals_finish(finished: Future) -> Iterator[None]:
-    """Signals complete `finished`, which wakes the executor.
-
-    Python runs its signal handlers in the main thread, which sleeps in the middleware where no
-    signal reaches it. The C handler writes to the wake-up descriptor at once, and the thread
-    started here reads it.
-    """
-    reader, writer = os.pipe()
-    os.set_blocking(writer, False)
-
-    def wait_for_signal() -> None:
-        while os.read(reader, 1) != b'\0':
-            if not finished.done():
-                finished.set_result(0)
-
-    _on_signals(_break_off_loading)
-    signal.set_wakeup_fd(writer, warn_on_full_buffer=False)
-    thread = threading.Thread(target=wait_for_signal, name='signals', daemon=True)
-    thread.start()
-    try:
-        yield
-    finally:
-        _on_signals(signal.SIG_IGN)
-        signal.set_wakeup_fd(-1)
-        os.write(writer, b'\0')
-        thread.join()
-        os.close(reader)
-        os.close(writer)

@@ -1,12 +1,14 @@
-"""The base of every node: its parameters, its process, its clock, its diagnostics."""
+"""The base of every node: parameters, clock, threads, and what it says of its health."""
 
 from __future__ import annotations
 
 import concurrent.futures
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
@@ -17,11 +19,16 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError
+from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
     declare_parameters,
 )
+
+OK = DiagnosticStatus.OK
+WARN = DiagnosticStatus.WARN
+ERROR = DiagnosticStatus.ERROR
 
 
 class PaintNode(Node):
@@ -160,3 +167,62 @@ class PaintNode(Node):
         self.values |= new
         if self.configured:
             self._changed(set(new))
+
+
+@dataclass(frozen=True)
+class Status:
+    """One task's state: `level` is OK, WARN or ERROR (single bytes), values are printed as is."""
+
+    level: bytes
+    message: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+Task = Callable[[], Status]
+
+
+class Diagnostics:
+    """Publishes the status of every task of a node on /diagnostics.
+
+    `tasks` maps a task's name to the function that gives its `Status` each period. The
+    period runs on the steady clock: a simulated clock that stands still must not silence it.
+    """
+
+    def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
+        self._node = node
+        self._tasks = dict(tasks)
+        self._publisher = node.create_publisher(
+            DiagnosticArray, '/diagnostics', topics.DIAGNOSTICS
+        )
+        self._timer = node.create_steady_timer(period_s, self.publish)
+
+    def show(self, tasks: Mapping[str, Task]) -> None:
+        """Report these tasks from now on."""
+        self._tasks = dict(tasks)
+
+    def show_only(self, name: str, why: str) -> None:
+        """Report this task alone, and why the others have nothing to report.
+
+        An aggregator takes a status that is no longer sent for that of a node that is gone.
+        """
+        for other in self._tasks.keys() - {name}:
+            self._tasks[other] = lambda: Status(OK, why)
+
+    def publish(self) -> None:
+        message = DiagnosticArray()
+        message.header.stamp = self._node.get_clock().now().to_msg()
+        full_name = self._node.get_fully_qualified_name()
+        for name, task in self._tasks.items():
+            status = task()
+            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            message.status.append(
+                DiagnosticStatus(
+                    level=status.level,
+                    # With the namespace: an aggregator distinguishes two cells by it.
+                    name=f'{full_name.lstrip("/")}: {name}',
+                    message=status.message,
+                    hardware_id=full_name,
+                    values=values,
+                )
+            )
+        self._publisher.publish(message)
