@@ -56,18 +56,18 @@ def campaign(tmp_path):
 @pytest.mark.slow
 def test_points_are_written_for_people_and_robots(measured):
     folder, done = measured
-    told = json.loads((folder / 'measure.json').read_text())
+    figures = json.loads((folder / 'measure.json').read_text())
     rows, poses = rows_of(folder / 'points.csv'), rows_of(folder / 'poses.csv')
-    assert [row['point'] for row in rows] == [p['point'] for p in told['points']] + told[
+    assert [row['point'] for row in rows] == [p['point'] for p in figures['points']] + figures[
         'read_twice'
     ]
-    assert len(poses) == len(told['points']) == 30
+    assert len(poses) == len(figures['points']) == 30
     assert 'detected with a probability' in done.stdout
-    for pose, point in zip(poses, told['points'], strict=True):
+    for pose, point in zip(poses, figures['points'], strict=True):
         turn = Rotation.from_quat([float(pose[q]) for q in ('qx', 'qy', 'qz', 'qw')])
         np.testing.assert_allclose(turn.apply([0, 0, 1]), -np.array(point['normal']), atol=1e-6)
     module = (folder / 'points.mod').read_text()
-    first = told['points'][0]
+    first = figures['points'][0]
     assert f'[[{1e3 * first["x_m"]:.3f},{1e3 * first["y_m"]:.3f}' in module
     assert module.count('9E9,9E9,9E9,9E9,9E9,9E9') == 30
     with Image.open(folder / 'points.png') as picture:
@@ -109,10 +109,10 @@ def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
         '--repeats', 0, '--max-pose-gap-s', 1, '--json', '-o', tmp_path / 'out',
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    figures = json.loads(done.stdout)
     first = rows_of(tmp_path / 'out/poses.csv')[0]
-    assert float(first['x_m']) == pytest.approx(1.0 - told['points'][0]['x_m'], abs=1e-5)
-    assert told['read_twice'] == []
+    assert float(first['x_m']) == pytest.approx(1.0 - figures['points'][0]['x_m'], abs=1e-5)
+    assert figures['read_twice'] == []
     assert 'PERS wobjdata wobjPart' in (tmp_path / 'out/points.mod').read_text()
 
 

@@ -130,7 +130,7 @@ def test_paint_that_is_dear_is_kept_off_the_air(panel, even):
 
 @pytest.mark.slow
 def test_flow_that_lags_behind_the_trigger_is_followed(panel, even):
-    """What is foretold comes true although the flow depends on the time since the opening."""
+    """The predicted film is laid although the flow depends on the time since the opening."""
     lagging = NARROW.with_effect(TriggerLag(rise_s=0.15, fall_s=0.1))
     better = pd.improve(panel, even.trajectory, lagging)
     assert better.after.sigma_n < better.before.sigma_n

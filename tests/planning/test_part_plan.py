@@ -66,7 +66,7 @@ def test_the_motion_has_no_jump_and_keeps_clear(planned):
 
 @pytest.mark.slow
 def test_files_read_back_to_the_same_film(planned, tmp_path):
-    write_plan(tmp_path, planned, planned.surface)
+    write_plan(tmp_path, planned)
     bag = film_of(planned, read_recording(tmp_path / 'trajectory'))
     program = film_of(planned, read_recording(tmp_path / 'passes.mod'))
     peak = planned.film_um.max()
@@ -104,14 +104,14 @@ def test_faces_follow_each_other_with_least_travel():
 
 def test_between_faces_the_gun_is_drawn_back_until_it_is_clear():
     faces = [FacePasses((level_pass(y),), STYLE) for y in (0.0, 1.0)]
-    asked = []
+    heights_m = []
 
     def clear_at_the_third(way) -> bool:
-        asked.append(way.positions_m[:, 2].max())
-        return len(asked) == 3
+        heights_m.append(way.positions_m[:, 2].max())
+        return len(heights_m) == 3
 
     motion, _ = motion_over(faces, 'part', clear_at_the_third)
-    np.testing.assert_allclose(asked, [0.3, 0.4, 0.6])
+    np.testing.assert_allclose(heights_m, [0.3, 0.4, 0.6])
     assert motion.positions_m[:, 2].max() == pytest.approx(0.6)
     seconds = 1e-9 * motion.trigger_stamps_ns
     assert np.all(np.diff(seconds) > 0.0)

@@ -108,7 +108,7 @@ def test_impossible_plans_say_why(bowed, what, words):
 
 
 def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
-    files = write_plan(tmp_path, planned, bowed, {'mesh': 'sheet'})
+    files = write_plan(tmp_path, planned, {'mesh': 'sheet'})
     assert all(path.exists() for path in files)
     recorded = read_trajectory(tmp_path / 'trajectory', state_topic='atomizer/state')
     np.testing.assert_array_equal(recorded.stamps_ns, planned.trajectory.stamps_ns)
@@ -123,12 +123,12 @@ def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
     assert len(list(tmp_path.glob('.*'))) == 0
 
 
-def test_writing_again_replaces_the_plan_but_no_stranger(bowed, planned, tmp_path):
-    write_plan(tmp_path, planned, bowed)
-    write_plan(tmp_path, planned, bowed)
+def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):
+    write_plan(tmp_path, planned)
+    write_plan(tmp_path, planned)
     (tmp_path / 'trajectory' / 'notes.txt').write_text('mine')
     with pytest.raises(Exception, match='no planned bag; move it away'):
-        write_plan(tmp_path, planned, bowed)
+        write_plan(tmp_path, planned)
     assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'
 
 

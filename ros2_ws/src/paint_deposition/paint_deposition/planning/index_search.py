@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -92,10 +91,7 @@ def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
 
 
 def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
-    """The index to recommend.
-
-    Without a tolerance it is the deepest minimum in the range. With one it lies in the window of
-    widest index, for that takes the fewest passes: at the deepest minimum in there.
+    """The index to recommend, see ``recommend``.
 
     Raises:
         PlanError: nothing in the range keeps to the tolerance; names what comes closest.
@@ -124,19 +120,10 @@ def index_drift_m(
 ) -> tuple[float, float]:
     """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
     least, most = (
-        _farthest_known(parallel, np.linspace(index_m, share * index_m, STEPS + 1), tolerance)
+        _farthest(parallel.sigma_n, index_m, share * index_m, tolerance, STEPS, PRECISION_M)
         for share in (LEAST, MOST)
     )
     return least, most
-
-
-def _farthest_known(parallel: ParallelPasses, index_m: np.ndarray, tolerance: float) -> float:
-    """How far one may go along indexes (N,) [m], the first of them good, within a tolerance."""
-    beyond = np.flatnonzero(parallel.sigma_n_at(index_m[1:]) > tolerance)
-    if not len(beyond):
-        return float(index_m[-1])
-    last, first_beyond = index_m[beyond[0] : beyond[0] + 2].tolist()
-    return _crossing_at(parallel.sigma_n, last, first_beyond, tolerance)
 
 
 def standoff_drift_m(
@@ -159,18 +146,32 @@ def standoff_drift_m(
         distance = here + model.projection.emission_offset_m
         nearer = distance * (index_m / index_drift[1] - 1.0)
         return max(nearer, -here), distance * (index_m / index_drift[0] - 1.0)
+    one_way = setup.one_way or parallel.alike
 
-    both_ways = not parallel.alike
-
-    @cache  # the search for a crossing asks for its ends again
     def sigma_n(standoff_m: float) -> float:
-        there = replace(setup, standoff_m=standoff_m, one_way=setup.one_way or not both_ways)
-        return there.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
+        other = replace(setup, standoff_m=standoff_m, one_way=one_way)
+        return other.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
 
     nearest, farthest = (
-        _farthest_within(sigma_n, here, share * here, tolerance) for share in (LEAST, MOST)
+        _farthest(sigma_n, here, share * here, tolerance, STEPS_WITH_EFFECTS, STANDOFF_PRECISION_M)
+        for share in (LEAST, MOST)
     )
     return nearest - here, farthest - here
+
+
+def _farthest(
+    sigma_n: Callable[[float], float],
+    start: float,
+    end: float,
+    tolerance: float,
+    steps: int,
+    precision_m: float,
+) -> float:
+    """How far a value may go from a good start toward an end within a tolerance [m]."""
+    for low, high in pairwise(np.linspace(start, end, steps + 1).tolist()):
+        if sigma_n(high) > tolerance:
+            return _crossing_at(sigma_n, low, high, tolerance, precision_m)
+    return float(end)
 
 
 def _crossing_at(
@@ -182,15 +183,3 @@ def _crossing_at(
 ) -> float:
     """Where a function passes the tolerance between two places on either side of it."""
     return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=precision_m))
-
-
-def _farthest_within(
-    sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float
-) -> float:
-    """How far the standoff may go from a good start toward a limit within a tolerance [m]."""
-    value = start
-    for further in np.linspace(start, limit, STEPS_WITH_EFFECTS + 1)[1:].tolist():
-        if sigma_n(further) > tolerance:
-            return _crossing_at(sigma_n, value, further, tolerance, STANDOFF_PRECISION_M)
-        value = further
-    return limit

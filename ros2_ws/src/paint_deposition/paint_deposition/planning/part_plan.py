@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -36,7 +37,7 @@ class PartPlan:
     """Passes on all faces of a part with the film that the model predicts.
 
     Attributes:
-        surface: the part. request: what was asked for. faces: sprayed, the largest first.
+        surface: the part. request: as given. faces: sprayed, the largest first.
         margin_m: by how much each face is sprayed less far than its seams.
         passes: in running order. moves: the same as a robot program. trajectory: timed.
         film_um: (V,) film on the refined part. painted: (V,) bool, the faces.
@@ -189,8 +190,11 @@ def plan_faces(
             f'closest is {sigma_n:.4f}: allow that much, or narrower faces (--face-angle-deg)'
         )
     progress('one raster', 0.0)
-    anyhow = request.model_copy(update={'tolerance': None})
-    raster = _one_raster(surface, model, anyhow, painted, area)
+    raster = (math.nan, math.nan)
+    with suppress(PlanError):
+        one = plan(surface, model, request.model_copy(update={'tolerance': None})).film_um
+        covered = film_statistics(one[painted], area[painted], 1.0).coverage
+        raster = evenness(one, area)[1], covered
     statistics = planned_statistics(film[painted], area[painted], paint.emitted_cm3, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
@@ -209,19 +213,3 @@ def _of_the_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ..
     if not kept:
         raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     return kept
-
-
-def _one_raster(
-    surface: Surface,
-    model: DepositionModel,
-    request: PlanRequest,
-    painted: np.ndarray,
-    area: np.ndarray,
-) -> tuple[float, float]:
-    """sigma_n and coverage of the plan for the whole part at once, on the same surface."""
-    try:
-        film_um = plan(surface, model, request).film_um
-    except PlanError:
-        return math.nan, math.nan
-    statistics = film_statistics(film_um[painted], area[painted], 1.0)
-    return evenness(film_um, area)[1], statistics.coverage

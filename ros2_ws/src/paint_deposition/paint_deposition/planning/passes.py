@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -221,8 +222,7 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
     return moves
 
 
-@dataclass(frozen=True)
-class _Leg:
+class _Leg(NamedTuple):
     """A timed stretch: samples with their times, and how long it takes."""
 
     stamps_s: np.ndarray

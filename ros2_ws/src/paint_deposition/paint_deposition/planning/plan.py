@@ -24,7 +24,7 @@ from paint_deposition.planning.passes import (
     planned_moves,
     trajectory_of,
 )
-from paint_deposition.planning.placing import Placing, centred, place_passes
+from paint_deposition.planning.placing import Placing, place_passes, placed
 from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
@@ -55,7 +55,7 @@ class Plan:
     """Passes on a part with the film that the model predicts.
 
     Attributes:
-        surface: the part. request: what was asked for. style: how passes are run.
+        surface: the part. request: as given. style: how passes are run.
         placing: number, index and place of the passes, with sigma_n of the search.
         passes: in running order. trajectory: their timed poses and trigger.
         film_um: (V,) film on the refined part. painted: (V,) bool, the side that is painted.
@@ -206,7 +206,7 @@ def plan(
     )  # fmt: skip
     placing = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
-    on_part = centred(films, ends, count, plane.index_m)
+    on_part = placed(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     # Level passes go from the top down, vertical ones from the left to the right.
     lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
     target = None if request.speed_m_per_s else request.target_um

@@ -63,7 +63,7 @@ class PassSetup:
             'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad, 'fineness': fineness,
         }  # fmt: skip
         first = sampled_collapse(model, speed_m_per_s, **options)
-        # An effect may tell forth from back, or up from down.
+        # An effect may depend on the way: forth or back, up or down.
         if self.one_way or not (self.gun_turns or model.effects):
             return ParallelPasses.one_way(first)
         second = sampled_collapse(
