@@ -8,10 +8,17 @@ import subprocess
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from booth import LOOKING_ALONG_Y
 from paint_deposition.cli.main import run
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.report.outputs import OUTPUTS
+from scenes import straight_pass
+
+TRIGGER = ('--state-topic', '/atomizer/state')
+COARSE = ('--max-edge-length-m', 0.05)
 
 # The kind of JSON that each command prints.
 KINDS = {
@@ -78,3 +85,14 @@ def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:
     assert lines[0].startswith('paint: ')
     for word in words:
         assert word in lines[0], lines[0]
+
+
+def level_pass(**changes) -> Trajectory:
+    """One pass of 3 s over the panel, 0.25 m before it."""
+    line = (np.arange(0.0, 3.0, 0.02), (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y)
+    return straight_pass(*line, **changes)
+
+
+def film_in(folder: Path) -> np.ndarray:
+    """The film of a folder of results [um]."""
+    return np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)['thickness_um']

@@ -65,7 +65,6 @@ def test_wrong_options_are_refused_in_a_line():
 
 
 @pytest.mark.slow
-@pytest.mark.slow
 def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
     pipe = tmp_path / 'readings.csv'
     os.mkfifo(pipe)

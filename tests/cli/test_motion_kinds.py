@@ -195,20 +195,6 @@ def test_campaigns_take_every_kind(kind, panel, expected, tmp_path):
     assert (('note', 'panel', PROGRAMMED) in said) == (kind in ('module', 'passes'))
 
 
-@pytest.mark.slow
-def test_compare_says_that_a_motion_is_only_programmed(panel, expected, tmp_path):
-    (tmp_path / 'bell.yaml').write_text('effects: []\n')
-    done = paint(
-        'compare', campaign_of('module', panel, tmp_path), '--model', tmp_path / 'bell.yaml',
-        '-o', tmp_path / 'out',
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.startswith(f'model: {tmp_path / "bell.yaml"} (')
-    assert f'note: panel: {PROGRAMMED}' in done.stderr.splitlines()
-    rows = np.genfromtxt(tmp_path / 'out' / 'residuals.csv', delimiter=',', names=True)
-    assert np.abs(np.sort(rows['predicted_um']) - np.sort(expected[2])).max() < 0.02
-
-
 def test_a_real_module_is_taken_as_motion(shared_data):
     """Ten moves over three metres at 0.1 m/s, without a gun."""
     read = read_recording(shared_data / 'rapid' / 'ECL_Grey_T_ROB1.mod')

@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from cli.command import assert_refused, paint
+from cli.command import paint
 from paint_deposition.cli.results_folder import MARKER, results_in
 from paint_deposition.errors import PaintError
 
@@ -92,9 +92,3 @@ def test_the_working_directory_may_be_the_folder(tmp_path):
         assert paint(*RECOMMEND, cwd=tmp_path).returncode == 0
     assert names_in(tmp_path) == ['recommendation.json', 'uniformity.png']
     assert os.stat(tmp_path).st_ino == inode
-
-
-def test_a_tolerance_in_percent_is_refused_with_the_share(tmp_path):
-    done = paint(*RECOMMEND, '--tolerance', 5, '-o', tmp_path / 'out')
-    assert_refused(done, 'tolerance is 5, which is 500 %', '0.05 for 5 %')
-    assert not (tmp_path / 'out').exists()

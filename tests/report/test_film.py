@@ -14,8 +14,7 @@ from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.report.pictures.chart import new_figure
-from paint_deposition.report.pictures.film import draw_film, film_picture, write_film_picture
+from paint_deposition.report.pictures.film import film_picture, write_film_picture
 from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import BELOW, HIGH, WITHIN
 
@@ -47,14 +46,6 @@ def test_the_view_is_the_guns(outward, down, right, labels):
     assert view.up @ down <= 1e-9
 
 
-def test_a_slanting_part_is_seen_along_its_normal():
-    outward = np.array([0.6, -0.64, 0.48])
-    view = View.of_front(outward, -Z)
-    assert np.allclose(view.toward, outward)
-    assert view.labels == ('right [m]', 'up [m]')
-    assert view.up[2] > 0.5
-
-
 def draw(tmp_path, film_um, path, **options):
     surface = door()
     statistics = film_statistics(film_um, surface.vertex_areas_m2, 10.0, **options)
@@ -75,22 +66,6 @@ def test_the_film_is_coloured_and_bare_metal_is_grey(tmp_path):
     assert 0.02 < colourful.mean() < 0.6
     grey = (np.ptp(picture, axis=2) < 4) & (np.abs(picture[:, :, 0] - BARE_RGB[0]) < 60)
     assert grey.mean() > 0.1
-
-
-def test_a_bare_part_is_drawn_too(tmp_path):
-    picture = draw(tmp_path, np.zeros(len(door().vertices_m)), SprayPath.empty())
-    assert (np.ptp(picture, axis=2) < 4).mean() > 0.8
-
-
-def test_labels_on_contours_are_level():
-    surface = door()
-    figure = new_figure(9.0, 6.0)
-    axes = figure.subplots()
-    draw_film(axes, surface, 30.0 - 20.0 * surface.vertices_m[:, 0], SprayPath.empty(), 1.0)
-    figure.canvas.draw()
-    labels = [text for text in axes.texts if text.get_text().isdigit()]
-    assert len(labels) > 1
-    assert all(label.get_rotation() == 0.0 for label in labels)
 
 
 def figure_of(surface, film_um, path=None, **target):

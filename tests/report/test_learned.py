@@ -11,8 +11,12 @@ from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.learned import learned_figure, nearest_law
-from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
+from paint_deposition.report.page.learned import (
+    footprint_figure,
+    learned_figure,
+    map_figure,
+    nearest_law,
+)
 from small_campaign import small_campaign
 
 KNOTS = 24

@@ -22,14 +22,13 @@ from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.measuring_points import MeasuringPoints
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.film import point_rows
 from paint_deposition.report.page.report import write_report
+from paint_deposition.report.page.tables import point_rows
 from paint_deposition.report.words import learned_range
 from small_campaign import small_campaign
 
@@ -181,19 +180,6 @@ def test_part_batch_and_target_of_the_campaign_lead_the_page(tmp_path, diagnosis
     assert shares in page.text
 
 
-def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, comparisons):
-    first, *others = diagnosis.study.campaign.experiments
-    name = '</script><b>panel'
-    renamed = replace(first, name=name)
-    campaign = replace(diagnosis.study.campaign, experiments=(renamed, *others))
-    study = replace(diagnosis.study, campaign=campaign)
-    renamed = tuple(replace(comparison, study=study) for comparison in comparisons)
-    write_report(tmp_path / 'report.html', ReportData(renamed))
-    page = page_of(tmp_path / 'report.html')
-    assert page.clashes == []
-    assert name in page.text
-
-
 def other_verdicts(diagnosis):
     base = {'accepted': (), 'classes': (), 'history': diagnosis.history[:1]}
     two = tuple(
@@ -269,25 +255,6 @@ def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnos
         f'model as given, fitted anew door.yaml {errors[0]} {floor} '
         f'+ air drift door.yaml {errors[1]} {floor}'
     ) in page_of(tmp_path / 'report.html').text
-
-
-def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_path):
-    campaign = small_campaign(tmp_path, truth=None, amplitude=None)
-    done = refit(campaign, DepositionModel(), AirDrift)
-    write_report(tmp_path / 'report.html', ReportData.of(done))
-    assert [effect.id for effect in done.model.effects] == ['air_drift']
-    text = page_of(tmp_path / 'report.html').text
-    assert 'Added as asked' in text
-    assert ('run the diagnosis' in text) == (done.p_value < ALPHA)
-    assert 'Air drift was added with' in text
-    assert 'no effect was added' not in text
-
-
-def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, comparisons):
-    write_report(tmp_path / 'report.html', ReportData.of(comparisons[0]))
-    page = page_of(tmp_path / 'report.html')
-    assert 'Comparison' in page.text
-    assert 'Run the diagnosis' in page.text
 
 
 # A visitor: turns the part, then presses every button and unticks the passes.

@@ -17,7 +17,7 @@ from paint_deposition.report.words import (
     number,
     parameter_words,
     step_words,
-    sureness,
+    probability_words,
 )
 
 
@@ -101,6 +101,6 @@ def test_a_learned_law_says_where_it_is_neutral():
 
 
 def test_a_law_that_was_kept_for_what_it_predicts_has_no_probability():
-    assert sureness(EffectClass(('learned:time_s',), 1.0, 'learned:time_s')) == 'kept'
-    assert sureness(EffectClass(('learned:time_s',), 0.7, 'learned:time_s')) == '70 %'
-    assert sureness(EffectClass(('edge_build',), 1.0, 'edge_build')) == '> 99 %'
+    assert probability_words(EffectClass(('learned:time_s',), 1.0, 'learned:time_s')) == 'kept'
+    assert probability_words(EffectClass(('learned:time_s',), 0.7, 'learned:time_s')) == '70 %'
+    assert probability_words(EffectClass(('edge_build',), 1.0, 'edge_build')) == '> 99 %'

@@ -96,7 +96,7 @@ def compare_models(
         progress: called with a line for each step.
 
     Raises:
-        PaintError: there are fewer than two, or more than can be told apart in a picture.
+        PaintError: there are fewer than two, or more than a picture can show.
     """
     if not 2 <= len(models) <= MOST_MODELS:
         raise PaintError(f'{len(models)} models to compare; give 2 to {MOST_MODELS}')
@@ -126,7 +126,7 @@ def diagnose(
     Args:
         campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
-        posterior: what another job told of the model, as its file or its calibration has it:
+        posterior: what another job found of the model, as its file or its calibration has it:
             the prior of the fit. Default: that of the campaign's model, if it is that.
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.

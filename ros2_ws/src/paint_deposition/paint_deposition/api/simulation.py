@@ -183,9 +183,10 @@ def simulate(
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
-    given, told = models, [by_set_points(m, its) for m, its in zip(motions, models, strict=True)]
-    motions, models = [motion for motion, _ in told], [its for _, its in told]
-    for motion, its_model in told:
+    given = models
+    pairs = [by_set_points(motion, its) for motion, its in zip(motions, models, strict=True)]
+    motions, models = [motion for motion, _ in pairs], [its for _, its in pairs]
+    for motion, its_model in pairs:
         require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
@@ -245,10 +246,10 @@ def _painted(
     before, steps = 0, sum(len(gun.path) for gun in seen)
     for gun, model in zip(seen, models, strict=True):
 
-        def tell(done: int, before: int = before) -> None:
+        def report(done: int, before: int = before) -> None:
             progress('painting', (before + done) / steps)
 
         integrators.append(FilmIntegrator(points, model, precision, surface.occluder))
-        integrators[-1].add(gun.path, tell)
+        integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))

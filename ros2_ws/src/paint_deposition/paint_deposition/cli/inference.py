@@ -270,7 +270,12 @@ def _diagnose(
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.effects.learned.law import LearnedLaw
-    from paint_deposition.report.words import apart_words, effect_name, learned_words, sureness
+    from paint_deposition.report.words import (
+        effect_name,
+        learned_words,
+        probability_words,
+        separation_words,
+    )
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -278,7 +283,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
-        yield f'  {label}{effects.best}: {sureness(effects)}{others}'
+        yield f'  {label}{effects.best}: {probability_words(effects)}{others}'
         law = diagnosis.model.effect(effects.best)
         if isinstance(law, LearnedLaw):
             shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
@@ -300,7 +305,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
         todo = f'spray {spray.what}, and measure {spray.readings} points'
-        yield f'next: {todo}: {apart_words(spray)}'
+        yield f'next: {todo}: {separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import importlib
 import os
 import sys
@@ -15,8 +14,6 @@ from paint_deposition.errors import PaintError, did_you_mean
 # As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
 # be set before NumPy is loaded.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
-OBJECTS_BETWEEN_SEARCHES = 100_000
 
 # Command, the module with its function, COMMAND_command, and what the list of commands says.
 # Modules are only loaded when their command is used, so that help comes at once.
@@ -87,7 +84,7 @@ def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 def paint(context: click.Context) -> None:
     """Film build of robotic bells: from recordings and gauge readings to a model that fits.
 
-    Lengths are in metres, film in micrometres. `paint COMMAND --help` tells more.
+    Lengths are in metres, film in micrometres. `paint COMMAND --help` says more.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -95,12 +92,7 @@ def paint(context: click.Context) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command: exit code 0, 2 with one line on stderr for bad input, 130 for Ctrl-C."""
-    # Nearly all that a command makes lives to its end: looking for cycles would find none.
-    gc.set_threshold(OBJECTS_BETWEEN_SEARCHES)
-    code = run(arguments)
-    # Else Python looks through all that is loaded once more before it ends: for half a second.
-    gc.freeze()
-    sys.exit(code)
+    sys.exit(run(arguments))
 
 
 def run(arguments: list[str] | None = None) -> int:

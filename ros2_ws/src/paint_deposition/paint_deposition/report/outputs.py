@@ -29,9 +29,14 @@ class Figures(BaseModel):
     model_config = ConfigDict(strict=True, extra='allow')
 
 
+def each(kind: Any, names: str) -> dict[str, Any]:
+    """Fields of one type."""
+    return dict.fromkeys(names.split(), kind)
+
+
 def figures(numbers: str = '', /, *bases: Any, **fields: Any) -> Any:
     """A JSON object with these numbers, which may be null, and fields of other types."""
-    kinds = dict.fromkeys(numbers.split(), Number) | fields
+    kinds = each(Number, numbers) | fields
     required = {name: (kind, ...) for name, kind in kinds.items()}
     return create_model('Figures', __base__=bases or (Figures,), **required)  # type: ignore
 
@@ -57,12 +62,11 @@ Paint = figures(
     spraying_time_s_by_brush=dict[str, float],
 )
 Poses = figures(
-    **dict.fromkeys(
-        'received repeated_stamps backward_stamps not_finite not_unit_quaternions restarts gaps '
-        'longest_gap_ns late_triggers rejected'.split(),
-        int,
+    **each(
+        int, 'received repeated_stamps backward_stamps not_finite not_unit_quaternions restarts '
+        'gaps longest_gap_ns late_triggers rejected'
     )
-)
+)  # fmt: skip
 Noise = figures('sigma_um texture_share', source=str, texture_source=str)
 Region = figures('mean_residual_um', description=str, experiment=str, readings=int)
 BeforeAfter = figures('before after')
@@ -189,9 +193,9 @@ output(
 output(
     'improvement',
     'target_um tolerance target_region_m2 area_m2 sigma_n_of_path program_difference',
-    **dict.fromkeys(
-        'mean_um sigma_n min_um max_um within paint_cm3 on_part_cm3 spraying_s cycle_s'.split(),
+    **each(
         BeforeAfter,
+        'mean_um sigma_n min_um max_um within paint_cm3 on_part_cm3 spraying_s cycle_s',
     ),
     sigma_n_interval=figures(before=Pair, after=Pair) | None,
     binding_limits=list[figures('sigma_n', name=str)],
@@ -244,4 +248,4 @@ output(
 
 
 if __name__ == '__main__':
-    print(json.dumps(OUTPUTS[sys.argv[1]].model_json_schema(), indent=2))
+    json.dump(OUTPUTS[sys.argv[1]].model_json_schema(), sys.stdout, indent=2)

@@ -16,8 +16,7 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
-from paint_deposition.report.pictures.part import PartPicture
-from paint_deposition.report.pictures.tool_path import draw_tool_path
+from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].

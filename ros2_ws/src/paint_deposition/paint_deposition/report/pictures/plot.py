@@ -15,10 +15,9 @@ from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.calibration import draw_agreement
 from paint_deposition.report.pictures.film import draw_film
-from paint_deposition.report.pictures.measuring_points import draw_points
-from paint_deposition.report.pictures.uniformity import draw_curve
+from paint_deposition.report.pictures.inference import draw_agreement, draw_points
+from paint_deposition.report.pictures.planning import draw_curve
 
 
 def plot(result: Any, ax: Axes | None = None) -> Axes:

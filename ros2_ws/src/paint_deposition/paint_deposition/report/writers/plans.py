@@ -16,11 +16,13 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan, TradeOffPoint
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import write_film_picture
-from paint_deposition.report.pictures.geometry import write_geometry_picture
-from paint_deposition.report.pictures.improvement import write_improvement_picture
-from paint_deposition.report.pictures.measuring_points import write_measuring_picture
-from paint_deposition.report.pictures.trade_off import write_trade_off
-from paint_deposition.report.pictures.uniformity import write_uniformity
+from paint_deposition.report.pictures.inference import write_measuring_picture
+from paint_deposition.report.pictures.motion import write_geometry_picture
+from paint_deposition.report.pictures.planning import (
+    write_improvement_picture,
+    write_trade_off,
+    write_uniformity,
+)
 from paint_deposition.report.writers.measuring import write_chosen_readings
 from paint_deposition.report.writers.passes import (
     write_plan,
