@@ -189,7 +189,8 @@ def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
         for either in product(*ways)
         for order in permutations(range(len(faces)))
     )
-    return min(tried, key=_travel_m)
+    # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
+    return min(tried, key=lambda order: round(_travel_m(order), 6))
 
 
 def motion_over(

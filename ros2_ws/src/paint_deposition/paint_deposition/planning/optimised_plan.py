@@ -32,7 +32,7 @@ from paint_deposition.planning.placing import Placing
 from paint_deposition.planning.plan import Plan, planned_statistics
 
 # A pass more must save this share of the cost; a change of the lines this one.
-WORTH_A_PASS, WORTH_A_CHANGE = 0.05, 1e-3
+WORTH_A_PASS, WORTH_A_CHANGE = 0.05, 1e-4
 # Candidates per width of the pattern across, and nodes per width along.
 LINES_PER_SIGMA, NODES_PER_SIGMA = 3.0, 1.5
 COARSEST_M = 0.06
