@@ -19,9 +19,8 @@ from scipy.optimize import Bounds, minimize
 from paint_deposition.errors import PlanError
 from paint_deposition.planning.films import (
     FilmAtPoints,
-    evenness,
     line_motion,
-    simulated,
+    predicted,
 )
 from paint_deposition.planning.improvement.nodes import Nodes
 from paint_deposition.planning.improvement.programme import Programme, moves_of
@@ -29,7 +28,7 @@ from paint_deposition.planning.improvement.quadratic_program import SLOPE_M
 from paint_deposition.planning.improvement.retiming import may_be_closed, retime_for_evenness
 from paint_deposition.planning.passes import PassStyle, plan_passes, trajectory_of
 from paint_deposition.planning.placing import Placing
-from paint_deposition.planning.plan import Plan, planned_statistics
+from paint_deposition.planning.plan import Plan
 
 # A pass more must save this share of the cost; a change of the lines this one.
 WORTH_A_PASS, WORTH_A_CHANGE = 0.05, 1e-4
@@ -144,18 +143,15 @@ def _along(
     retimed = retime_for_evenness(
         surface, plain.painted, programme, [plain.model], wanted, progress, explained=False
     ).programme
-    trajectory = retimed.trajectory()
-    film, paint = simulated(
-        surface, plain.model, trajectory, lambda share: progress('film', share)
-    )
-    area = surface.vertex_areas_m2[plain.painted]
-    sigma_n = evenness(film[plain.painted], area)[1]
+    found = predicted(
+        surface, plain.model, request, plain.painted, retimed.trajectory(),
+        lambda share: progress('film', share),
+    )  # fmt: skip
     index = float(np.diff(lines.lines_m).mean()) if len(passes) > 1 else 0.0
     return replace(
-        plain, style=style, passes=passes, trajectory=trajectory, film_um=film, sigma_n=sigma_n,
-        placing=Placing(len(passes), index, float(lines.lines_m.mean()), sigma_n),
-        statistics=planned_statistics(film[plain.painted], area, paint.emitted_cm3, request),
-        moves=tuple(moves_of(retimed, wanted)), plain=plain, paint=paint,
+        plain, **found, style=style, passes=passes, moves=tuple(moves_of(retimed, wanted)),
+        placing=Placing(len(passes), index, float(lines.lines_m.mean()), found['sigma_n']),
+        plain=plain,
     )  # fmt: skip
 
 
