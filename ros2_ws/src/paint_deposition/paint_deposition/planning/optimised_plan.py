@@ -249,7 +249,7 @@ class LineSearch:
                         found.append(tuple(map(tuple, some.tolist())))
         return found or [now]
 
-    def _style(self, candidate: Candidate) -> PassStyle:
+    def _style_of(self, candidate: Candidate) -> PassStyle:
         _, standoff, lean = candidate
         return replace(
             self._style,
@@ -259,7 +259,7 @@ class LineSearch:
 
     def _laid_by(self, candidate: Candidate) -> _Laid:
         if candidate not in self._laid:
-            style, line = self._style(candidate), float(self._lines_m[candidate[0]])
+            style, line = self._style_of(candidate), float(self._lines_m[candidate[0]])
             motion = line_motion(self._map, line, style, self._at_points.step_m)
             programme = Programme.of(motion)
             nodes = Nodes.of(programme.openings, self._spacing_m)
@@ -292,7 +292,7 @@ class LineSearch:
         cost += request.time_weight * len(some) * turn_s / self._given_s
         speeds = np.maximum(metres, 1e-3) / np.maximum(seconds, 1e-3)
         styles = tuple(
-            replace(self._style(candidate), speed_m_per_s=float(speed))
+            replace(self._style_of(candidate), speed_m_per_s=float(speed))
             for candidate, speed in zip(some, speeds, strict=True)
         )
         lines = self._lines_m[[line for line, _, _ in some]]

@@ -14,7 +14,7 @@ from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.part.axes import across_axis
-from paint_deposition.report.writers.film import writable
+from paint_deposition.report.writers.write import writable
 
 COLUMNS = (
     'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',

@@ -24,7 +24,8 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan, TradeOffPoint
-from paint_deposition.report.writers.film import writable, write_film
+from paint_deposition.report.writers.film import write_film
+from paint_deposition.report.writers.write import writable
 
 BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
 COLUMNS = (
