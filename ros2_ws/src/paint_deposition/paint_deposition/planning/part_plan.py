@@ -123,8 +123,8 @@ def plan_faces(
     painted[np.concatenate([face.vertices for face in faces])] = True
     area = np.where(painted, surface.vertex_areas_m2, 0.0)
     each = request.model_copy(update={'outward': None, 'tolerance': None})
-    blended = blend(surface, model, each, faces, area, progress)
-    running = in_order(blended.faces)
+    margin_m, laid, unblended = blend(surface, model, each, faces, area, progress)
+    running = in_order(laid)
     progress('motion', 0.0)
     trajectory, moves = motion_over(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
@@ -150,8 +150,8 @@ def plan_faces(
         raster = evenness(one, area)[1], covered
     return PartPlan(
         **found, passes=tuple(planned for face in running for planned in face.passes),
-        moves=moves, faces=faces, margin_m=blended.margin_m,
-        sigma_n_unblended=blended.sigma_n_before, sigma_n_one_raster=raster[0],
+        moves=moves, faces=faces, margin_m=margin_m,
+        sigma_n_unblended=unblended, sigma_n_one_raster=raster[0],
         coverage_one_raster=raster[1], contacts=contacts(surface, trajectory, envelope),
         envelope=envelope,
     )  # fmt: skip

@@ -10,6 +10,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
+from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import (
     PassStyle,
     plan_passes,
@@ -17,7 +18,6 @@ from paint_deposition.planning.passes import (
     trajectory_of,
 )
 from paint_deposition.planning.placing import Placing, place_passes, placed
-from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes

@@ -13,14 +13,12 @@ from paint_deposition.planning.index_search import (
     SEARCHED,
     IndexCurve,
     Minimum,
-    choose,
-    index_drift_m,
-    standoff_drift_m,
-)
-from paint_deposition.planning.plane_passes import (
     PassSetup,
+    choose,
     cycle_time_s,
+    index_drift_m,
     passes_to_cover,
+    standoff_drift_m,
     variation_over_width,
 )
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
