@@ -5,7 +5,7 @@ import json
 import pytest
 
 from booth import SAMPLES
-from cli.command import assert_refused, installed_paint, paint
+from cli.command import assert_refused, paint
 from files.recorded import straight_pass
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 
@@ -29,29 +29,12 @@ def test_inspect_a_real_bag(shared_data):
     assert '95 gaps, longest interval 2.041 s' in line
 
 
-@pytest.mark.slow
-def test_inspect_as_json(tmp_path):
-    written = straight_pass(300)
-    folder = write_pose_bag(tmp_path / 'pass', written)
-    done = installed_paint('inspect', folder, '--json', '--max-pose-gap-s', '0.02')
-    figures = json.loads(done.stdout)
-    (stream,) = figures['pose_streams']
-    assert (stream['topic'], stream['poses'], stream['frame_id']) == (
-        '/atomizer/pose',
-        300,
-        'door',
-    )
-    assert stream['gaps'] == sum(written.stamps_ns[1:] - written.stamps_ns[:-1] > 20_000_000)
-    assert figures['triggers'] == ['/atomizer/state']
-
-
-def test_inspect_an_unfinished_run(cut_run):
+def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     done = paint('inspect', cut_run)
     assert_refused(done)
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
-
-
-def test_recover_does_what_inspect_says(cut_run, tmp_path):
+    figures = json.loads(paint('recover', cut_run, '-o', tmp_path / 'whole', '--json').stdout)
+    assert figures['messages'] == sum(figures['topics'].values()) > 2_000
     done = paint('recover', cut_run)
     assert done.returncode == 0
     assert done.stderr == ''
@@ -61,21 +44,6 @@ def test_recover_does_what_inspect_says(cut_run, tmp_path):
     assert len(read_trajectory(tmp_path / 'run_recovered')) > 2_000
     again = paint('recover', cut_run)
     assert_refused(again, 'run_recovered already exists; choose another name')
-
-
-@pytest.mark.slow
-def test_recover_as_json(cut_run, tmp_path):
-    done = installed_paint('recover', cut_run / 'run_0.mcap', '-o', tmp_path / 'whole', '--json')
-    figures = json.loads(done.stdout)
-    assert figures['folder'] == str(tmp_path / 'whole')
-    assert figures['messages'] == sum(figures['topics'].values()) > 2_000
-    assert figures['damaged_chunks'] == 0
-
-
-@pytest.mark.parametrize('value', ['nan', 'inf', '0'])
-def test_a_gap_that_is_no_time_is_refused(tmp_path, value):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
-    assert_refused(paint('inspect', folder, '--max-pose-gap-s', value), '--max-pose-gap-s', value)
 
 
 def test_a_gap_longer_than_clocks_count_is_none(tmp_path):

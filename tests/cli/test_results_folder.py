@@ -72,12 +72,6 @@ def test_a_marker_names_nothing_outside_its_folder(tmp_path):
     assert (tmp_path / 'mine.txt').exists()
 
 
-def test_a_new_folder_has_the_access_rights_of_any_other(tmp_path):
-    write(tmp_path / 'out', 'film.csv')
-    (tmp_path / 'usual').mkdir()
-    assert (tmp_path / 'out').stat().st_mode == (tmp_path / 'usual').stat().st_mode
-
-
 def test_two_commands_into_one_folder_do_not_mix(tmp_path):
     write(tmp_path / 'out', 'film.csv', 'film.png')
     done = paint(*RECOMMEND, '-o', tmp_path / 'out')

@@ -133,25 +133,6 @@ def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_p
     assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
 
 
-@pytest.mark.slow
-def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_path):
-    inside_out = trimesh.load_mesh(panel, process=False)
-    inside_out.invert()
-    inside_out.export(tmp_path / 'inside_out.stl')
-    films = []
-    for number, mesh in enumerate((panel, tmp_path / 'inside_out.stl')):
-        done = paint(
-            'simulate', '--mesh', mesh, '--trajectory', one_pass, *COARSE, '--json',
-            '-o', tmp_path / str(number),
-        )  # fmt: skip
-        assert done.returncode == 0
-        films.append((json.loads(done.stdout)['painted_volume_cm3'], done.stderr))
-    assert films[1][0] == pytest.approx(films[0][0], rel=1e-6)
-    assert films[0][1] == ''
-    assert 'note: ' in films[1][1]
-    assert 'turned round' in films[1][1]
-
-
 def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
     log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
     bag = write_pose_bag(tmp_path / 'pass', log)

@@ -16,8 +16,8 @@ from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 

@@ -13,14 +13,12 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from booth import SAMPLES
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.files.measuring_points import MeasuringPoints
-from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.gauge_readings import MeasuringPoints
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
@@ -360,26 +358,6 @@ def colourful_share(picture: Path) -> float:
     """Share of pixels that are clearly red or blue: the residual on the part."""
     rgb = np.asarray(Image.open(picture).convert('RGB'), dtype=int)[600:]
     return float(np.mean(np.abs(rgb[:, :, 0] - rgb[:, :, 2]) > 40))
-
-
-def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
-    tmp_path, diagnosis, comparisons
-):
-    wake = load_effect_file(SAMPLES / 'my_effect.py')
-    found = EffectClass(
-        ('wake_loss',), 0.98, 'wake_loss', {'loss_per_m_per_s': Interval(2e-9, 1e-9, 3e-9)}
-    )
-    other = replace(
-        diagnosis, verdict='undecided', accepted=(), classes=(found,), not_testable=(),
-        detectable={'wake_loss': {'loss_per_m_per_s': 0.05}}, history=diagnosis.history[:1],
-        library={wake.id: wake},
-    )  # fmt: skip
-    tell(tmp_path / 'report.html', other, comparisons[:1])
-    text = page_of(tmp_path / 'report.html').text
-    assert text.count(wake.__doc__) == 2
-    assert f'How it shows: {wake.signature}.' in text
-    assert 'loss 2 × 10⁻⁹ per m/s (1 × 10⁻⁹ to 3 × 10⁻⁹)' in text
-    assert 'loss 0.05 per m/s' in text
 
 
 def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):

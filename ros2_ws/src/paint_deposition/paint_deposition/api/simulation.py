@@ -19,8 +19,11 @@ from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints

@@ -56,9 +56,9 @@ def sweep_command(
     a sweep with more cases.
     """
     require_libraries('paint sweep', MANY)
-    from paint_deposition.batch.cluster.finished import NAME, Finished
-    from paint_deposition.batch.cluster.run import finish
-    from paint_deposition.batch.cluster.workers import require_alone
+    from paint_deposition.batch.cases import FOLDER as FINISHED
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
     from paint_deposition.batch.sweep.case import computed
     from paint_deposition.batch.sweep.job import Job
     from paint_deposition.batch.sweep.result import Sweep, write_sweep
@@ -68,9 +68,9 @@ def sweep_command(
     with Progress('sweep') as show:
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
-        finished = Finished(output / NAME)
+        finished = ResultCache(output / FINISHED)
         say_all('note', job.notes)
-        done, workers = finish(scheduler, count, computed, job.cases, job.inputs, finished, show)
+        done, workers = compute(scheduler, count, computed, job.cases, job.inputs, finished, show)
         workers = workers or 'none: every case had been finished'
         say_all('note', [f'workers: {workers}'])
         show('writing and drawing')
@@ -107,20 +107,20 @@ def line_command(
     folder `finished` of the output: the next time only new runs are computed.
     """
     require_libraries('paint line', MANY)
-    from paint_deposition.batch.cluster.finished import NAME, Finished
-    from paint_deposition.batch.cluster.run import finish
-    from paint_deposition.batch.cluster.workers import require_alone
-    from paint_deposition.batch.line.job import line_cases, shared_files
+    from paint_deposition.batch.cases import FOLDER as FINISHED
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
+    from paint_deposition.batch.line.output import write_line
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
-    from paint_deposition.batch.line.writing import write_line
+    from paint_deposition.batch.line.runs import line_cases, shared_files
 
     require_alone(scheduler, count)
     with Progress('line') as show:
         show('reading')
         cases, file, model, strays = line_cases(folder)
-        finished, digests = Finished(output / NAME), [case.digest for case in cases]
-        done, workers = finish(scheduler, count, computed, cases, {}, finished, show)
+        finished, digests = ResultCache(output / FINISHED), [case.digest for case in cases]
+        done, workers = compute(scheduler, count, computed, cases, {}, finished, show)
         workers = workers or 'none: every run had been finished'
         say_all('note', [f'workers: {workers}'])
         show('pooling')

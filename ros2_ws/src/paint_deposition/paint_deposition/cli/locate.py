@@ -19,7 +19,7 @@ from paint_deposition.cli.options import (
 from paint_deposition.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from paint_deposition.motion.touched_points import PartPlace
+    from paint_deposition.motion.part_location import PartPlace
 
 
 @click.command('locate')

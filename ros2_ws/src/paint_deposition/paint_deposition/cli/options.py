@@ -49,8 +49,7 @@ PICTURES = click.option(
 )  # fmt: skip
 PARETO = click.option(
     '--pareto', is_flag=True,
-    help='Also weigh paint from nothing to heavily: pareto.csv and a picture of evenness over '
-    'paint.',
+    help='Sweep the weight of the paint and plot the Pareto front of evenness over paint.',
 )  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 

@@ -105,14 +105,9 @@ def _show_contents(
 ) -> None:
     """Print what a RAPID module, a table of poses or a bag holds."""
     from paint_deposition.files.motion_source import MotionSource
-    from paint_deposition.files.pose_tables.reading import (
-        PoseLayout,
-        is_pose_table,
-        read_pose_table,
-    )
-    from paint_deposition.files.rapid.motion import is_rapid, program_as_text
-    from paint_deposition.files.rapid.program import read_program
+    from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
+    from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 
     figures: dict[str, Any]
     if is_rapid(path):

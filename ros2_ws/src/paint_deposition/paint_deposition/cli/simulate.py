@@ -109,7 +109,7 @@ def simulate_command(
         require_libraries('--parquet')
     with Progress('simulate') as show:
         show('loading')
-        from paint_deposition.files.gun_motions import read_gun_motions
+        from paint_deposition.files.motion_files import read_gun_motions
         from paint_deposition.files.motion_source import MotionSource
         from paint_deposition.files.refusals import checked
 

@@ -14,15 +14,18 @@ from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource, Number, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.files.tables.layout import Layout
-from paint_deposition.files.tables.words import UNITS_M, words_of
+from paint_deposition.files.tables.headings import length_of
+from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Readings are matched to the surface; a finer mesh only helps where the surface is strongly
 # curved.
@@ -65,8 +68,7 @@ class _File(BaseModel, extra='forbid'):
     @property
     def head(self) -> dict[str, str]:
         """What is said of part and batch, by key."""
-        told = {key: getattr(self, key) for key in HEAD}
-        return {key: text for key, text in told.items() if text}
+        return {key: text for key in HEAD if (text := getattr(self, key))}
 
 
 class _Files(BaseModel):
@@ -256,10 +258,10 @@ def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
     """The path with the brush that the campaign names for it."""
     if number is None:
         return path
-    told = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
-    if told:
+    named = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
+    if named:
         raise ReadingsError(
-            f'brush is {number}, and the recording names {listed(told)}; leave it out'
+            f'brush is {number}, and the recording names {listed(named)}; leave it out'
         )
     return path.with_(brush=np.full(len(path), number))
 
@@ -267,7 +269,7 @@ def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
 def _layout(entry: _Entry) -> Layout:
     return Layout(
         columns=entry.columns,
-        unit={kind: UNITS_M[words_of(unit)[0]] for kind, unit in entry.unit.items()},
+        unit={kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
         decimal={None: '', 'comma': ',', 'point': '.'}[entry.decimal],
         sheet=entry.sheet or '',
     )

@@ -4,6 +4,9 @@ Lengths are in m, times in s, angles in rad unless the name says otherwise, film
 number that is not known. ``python -m paint_deposition.report.outputs stats`` prints a JSON schema.
 """
 
+# The types are made by functions, which mypy cannot follow.
+# mypy: ignore-errors
+
 import json
 import sys
 from typing import Annotated, Any, Literal
@@ -38,7 +41,7 @@ def figures(numbers: str = '', /, *bases: Any, **fields: Any) -> Any:
     """A JSON object with these numbers, which may be null, and fields of other types."""
     kinds = each(Number, numbers) | fields
     required = {name: (kind, ...) for name, kind in kinds.items()}
-    return create_model('Figures', __base__=bases or (Figures,), **required)  # type: ignore
+    return create_model('Figures', __base__=bases or (Figures,), **required)
 
 
 def output(name: str, numbers: str = '', /, *bases: Any, **fields: Any) -> Any:

@@ -241,8 +241,8 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
     if data.names:
-        named = zip(data.names, data.comparisons, strict=True)
-        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in named] + [floor]
+        models = zip(data.names, data.comparisons, strict=True)
+        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in models] + [floor]
     if diagnosis is None:
         rmse_um = data.comparisons[-1].points.rmse_um
         return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition import __version__
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.version import git_version
 from paint_deposition.film.statistics import CPK_MEANS
@@ -92,7 +93,7 @@ def report_html(data: ReportData) -> str:
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
         pattern=tables.pattern_rows(data),
-        learned=[words.learned_range(e) for e in data.model.effects if words.is_learned(e.id)],
+        learned=[words.learned_range(e) for e in data.model.effects if isinstance(e, LearnedLaw)],
         left_out=data.study.left_out,
         noise=tables.noise_rows(data),
         levels=data.diagnosis.random_effects if data.diagnosis else (),

@@ -144,9 +144,9 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     axes = top.subplots(1, 2, sharex=True, sharey=True)
     scale = _scale(result)
     films = zip(axes, result.paths, (result.before, result.after), strict=True)
-    for name, (one, path, laid) in zip(('before', 'after'), films, strict=True):
+    for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
         part.dress(one, low, high)
-        _draw_film(one, part, scale, path, laid)
+        _draw_film(one, part, scale, driven, laid)
         one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
     bar = top.colorbar(

@@ -43,7 +43,7 @@ def _write_simulation(
         files.append(write_film_table(table, result.surface, result.film_um))
     if result.readings is not None and result.predicted_um is not None:
         files.append(folder / 'predicted.csv')
-        write_predictions(files[-1], result.readings.source, result.predicted_um)
+        write_predictions(files[-1], result.readings, result.predicted_um)
     mesh, motion, model = (
         Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')
     )
