@@ -5,7 +5,6 @@ import json
 import numpy as np
 import pytest
 import trimesh
-from paint_deposition.planning.index_request import Request
 from PIL import Image
 
 from booth import SAMPLES
