@@ -15,8 +15,8 @@ from typing import Any
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
+from paint_deposition.planning.requests import IndexRequest
 
 RAY_EFFECTS = (
     'incidence_attraction', 'standoff_efficiency', 'pattern_spread', 'air_drift', 'tcp_tilt',
@@ -32,7 +32,7 @@ REQUESTS = {
 def milliseconds(model: DepositionModel, asked: dict[str, float]) -> float:
     """Of one answer."""
     began = time.perf_counter()
-    recommend(model, Request(**asked))
+    recommend(model, IndexRequest(**asked))
     return 1e3 * (time.perf_counter() - began)
 
 

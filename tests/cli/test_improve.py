@@ -26,13 +26,13 @@ def improved(tmp_path_factory):
 
 @pytest.mark.slow
 def test_files_and_figures(improved):
-    folder, told = improved
-    assert told['sigma_n']['after'] < 0.8 * told['sigma_n']['before']
-    assert told['mean_um']['after'] == pytest.approx(told['mean_um']['before'], rel=0.01)
-    assert told['program_difference'] < 2e-3
-    assert [one['number'] for one in told['passes']] == [1, 2, 3]
-    assert 'm/s between x = ' in told['passes'][0]['sentence']
-    assert {'mesh', 'trajectory'} <= {file['what'] for file in told['provenance']['files']}
+    folder, figures = improved
+    assert figures['sigma_n']['after'] < 0.8 * figures['sigma_n']['before']
+    assert figures['mean_um']['after'] == pytest.approx(figures['mean_um']['before'], rel=0.01)
+    assert figures['program_difference'] < 2e-3
+    assert [one['number'] for one in figures['passes']] == [1, 2, 3]
+    assert 'm/s between x = ' in figures['passes'][0]['sentence']
+    assert {'mesh', 'trajectory'} <= {file['what'] for file in figures['provenance']['files']}
     for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
         assert (folder / name).exists()
     with Image.open(folder / 'improvement.png') as image:
@@ -42,13 +42,13 @@ def test_files_and_figures(improved):
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['trajectory', 'passes.mod', 'passes.csv'])
 def test_the_film_is_that_of_the_written_files(improved, name, tmp_path):
-    folder, told = improved
+    folder, figures = improved
     done = paint('simulate', '--mesh', DOOR, '--trajectory', folder / name, *COARSE, '--json',
                  '-o', tmp_path / 'film')  # fmt: skip
     assert done.returncode == 0, done.stderr
     film = np.genfromtxt(tmp_path / 'film/film.csv', delimiter=',', names=True)['thickness_um']
     expected = np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)['thickness_um']
-    exact = 1e-5 if name == 'trajectory' else told['program_difference'] + 1e-4
+    exact = 1e-5 if name == 'trajectory' else figures['program_difference'] + 1e-4
     assert np.abs(film - expected).max() < exact * expected.max()
     assert json.loads(done.stdout)['model_file'].endswith('model.yaml')
 
@@ -56,7 +56,7 @@ def test_the_film_is_that_of_the_written_files(improved, name, tmp_path):
 @pytest.mark.slow
 def test_a_robot_program_is_improved_in_the_robots_frame(improved, tmp_path):
     """What was improved has hardly anything left; a module in, a module out, in one frame."""
-    folder, told = improved
+    folder, figures = improved
     pose = (1.8, -0.3, 0.7, 0.0, 0.0, 0.6, 0.8)
     words = ('--mesh', DOOR, *COARSE, '--paint-weight', 0)
     done = paint(
@@ -64,7 +64,7 @@ def test_a_robot_program_is_improved_in_the_robots_frame(improved, tmp_path):
     )
     assert done.returncode == 0, done.stderr
     again = json.loads(done.stdout)
-    assert again['sigma_n']['before'] == pytest.approx(told['sigma_n']['after'], rel=0.01)
+    assert again['sigma_n']['before'] == pytest.approx(figures['sigma_n']['after'], rel=0.01)
     assert again['sigma_n']['after'] > 0.85 * again['sigma_n']['before']
     done = paint('plan', '--mesh', DOOR, *COARSE, '--speed', 0.3, '--part-pose', *pose,
                  '-o', tmp_path / 'robot')  # fmt: skip
@@ -80,7 +80,7 @@ def test_a_robot_program_is_improved_in_the_robots_frame(improved, tmp_path):
     ('more', 'words'),
     [
         (('--speed-min', 0.5, '--speed-max', 0.2), ('speed_min_m_per_s is 0.5', 'swap')),
-        (('--flow', 0, 1), ('flow_min is 0',)),
+        (('--flow', 0, 1), ('--flow', '0.0')),
         (('--acceleration', 'fast'), ('fast',)),
         (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),
     ],
@@ -104,39 +104,32 @@ def fender(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_an_optimised_plan_wastes_less_on_a_fender(fender, tmp_path):
-    done = paint(
-        'plan', '--mesh', fender, '--target-um', 20, '--optimise', '--max-edge-length-m', 0.06,
-        '--json', '-o', tmp_path,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
-    plain, film = told['plain'], told['film']
-    assert told['passes'] <= plain['passes']
-    assert film['emitted_volume_cm3'] < 0.9 * plain['paint_cm3']
-    assert film['capture_fraction'] > 1.1 * plain['capture_fraction']
-    assert film['mean_um'] == pytest.approx(20.0, rel=0.01)
-    assert told['sigma_n'] < 0.06
-
-
-@pytest.mark.slow
-def test_standoffs_and_leans_of_their_own_waste_less_still(fender, tmp_path):
+def test_optimised_plans_waste_less_with_standoffs_and_leans_of_their_own_less_still(
+    fender, tmp_path
+):
     options = ('--target-um', 20, '--optimise', '--max-edge-length-m', 0.06, '--json')
     free = ('--standoff-min', 0.2, '--standoff-max', 0.3, '--lean-max-deg', 20)
-    told = []
+    plans = []
     for more in ((), free):
         done = paint('plan', '--mesh', fender, *options, *more, '-o', tmp_path / str(len(more)))
         assert done.returncode == 0, done.stderr
-        told.append(json.loads(done.stdout))
-    assert set(told[0]['standoffs_m']) == {0.25}
-    assert set(told[0]['leans_deg']) == {0.0}
-    assert all(0.2 <= standoff <= 0.3 for standoff in told[1]['standoffs_m'])
-    assert all(abs(lean) <= 20.0 for lean in told[1]['leans_deg'])
+        plans.append(json.loads(done.stdout))
+    plain, films = plans[0]['plain'], [plan['film'] for plan in plans]
+    assert plans[0]['passes'] <= plain['passes']
+    assert films[0]['emitted_volume_cm3'] < 0.9 * plain['paint_cm3']
+    assert films[0]['capture_fraction'] > 1.1 * plain['capture_fraction']
+    assert films[1]['emitted_volume_cm3'] < 0.9 * films[0]['emitted_volume_cm3']
+    for plan, film in zip(plans, films, strict=True):
+        assert film['mean_um'] == pytest.approx(20.0, rel=0.01)
+        assert plan['sigma_n'] < 0.06
+    assert set(plans[0]['standoffs_m']) == {0.25}
+    assert set(plans[0]['leans_deg']) == {0.0}
+    assert all(0.2 <= standoff <= 0.3 for standoff in plans[1]['standoffs_m'])
+    assert all(abs(lean) <= 20.0 for lean in plans[1]['leans_deg'])
     # The outermost guns look inwards: coordinates across grow from the first pass to the last.
-    assert told[1]['leans_deg'][0] > 0.0 > told[1]['leans_deg'][-1]
-    film = [plan['film'] for plan in told]
-    assert film[1]['emitted_volume_cm3'] < 0.9 * film[0]['emitted_volume_cm3']
-    assert told[1]['sigma_n'] < 1.1 * told[0]['sigma_n']
+    assert plans[1]['leans_deg'][0] > 0.0 > plans[1]['leans_deg'][-1]
+    # No pass more than is worth its paint: sets that cost nearly the same count as equal.
+    assert plans[1]['passes'] == 3
 
 
 def test_a_range_of_standoffs_without_the_one_of_the_even_passes_is_refused(fender, tmp_path):

@@ -10,8 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from booth import SAMPLES
 from cli.command import assert_refused, installed_paint, paint
+from paint_deposition.errors import ReadingsError
 from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.motion.part_frame import Rigid
 
 DOOR = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.03)
 PAINTED = (*DOOR, '--trajectory', SAMPLES / 'door_horizontal')
@@ -42,8 +44,7 @@ def filled(folder, path, noise_um: float = 0.0):
     return path
 
 
-def campaign(tmp_path, folder):
-    filled(folder, tmp_path / 'readings.csv', 0.7)
+def campaign(tmp_path):
     path = tmp_path / 'campaign.yaml'
     path.write_text(
         f'experiments:\n  - {{name: door, mesh: {SAMPLES / "door.stl"}, '
@@ -55,18 +56,18 @@ def campaign(tmp_path, folder):
 @pytest.mark.slow
 def test_points_are_written_for_people_and_robots(measured):
     folder, done = measured
-    told = json.loads((folder / 'measure.json').read_text())
+    figures = json.loads((folder / 'measure.json').read_text())
     rows, poses = rows_of(folder / 'points.csv'), rows_of(folder / 'poses.csv')
-    assert [row['point'] for row in rows] == [p['point'] for p in told['points']] + told[
+    assert [row['point'] for row in rows] == [p['point'] for p in figures['points']] + figures[
         'read_twice'
     ]
-    assert len(poses) == len(told['points']) == 30
+    assert len(poses) == len(figures['points']) == 30
     assert 'detected with a probability' in done.stdout
-    for pose, point in zip(poses, told['points'], strict=True):
+    for pose, point in zip(poses, figures['points'], strict=True):
         turn = Rotation.from_quat([float(pose[q]) for q in ('qx', 'qy', 'qz', 'qw')])
         np.testing.assert_allclose(turn.apply([0, 0, 1]), -np.array(point['normal']), atol=1e-6)
     module = (folder / 'points.mod').read_text()
-    first = told['points'][0]
+    first = figures['points'][0]
     assert f'[[{1e3 * first["x_m"]:.3f},{1e3 * first["y_m"]:.3f}' in module
     assert module.count('9E9,9E9,9E9,9E9,9E9,9E9') == 30
     with Image.open(folder / 'points.png') as picture:
@@ -74,36 +75,18 @@ def test_points_are_written_for_people_and_robots(measured):
 
 
 @pytest.mark.slow
-def test_the_filled_table_is_gauge_readings(measured, tmp_path):
+def test_the_filled_table_is_gauge_readings_and_the_empty_one_is_refused(measured, tmp_path):
     folder, _ = measured
-    data = read_campaign(campaign(tmp_path, folder))
+    path = campaign(tmp_path)
+    (tmp_path / 'readings.csv').write_text((folder / 'points.csv').read_text())
+    with pytest.raises(ReadingsError, match="'thickness_um' is empty"):
+        read_campaign(path)
+    filled(folder, tmp_path / 'readings.csv', 0.7)
+    data = read_campaign(path)
     (door,) = data.experiments
     assert len(door.readings) == 38
     assert len(door) == 30
     assert door.off_surface_m.max() < 1e-3
-    done = paint('compare', tmp_path / 'campaign.yaml', '--json', '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    assert {one['experiment'] for one in json.loads(done.stdout)['misfits']} == {'door'}
-
-
-@pytest.mark.slow
-def test_the_table_serves_as_measuring_points(measured, tmp_path):
-    """A gauge that stores labels and films only: the coordinates come from the table."""
-    folder, _ = measured
-    gauge = tmp_path / 'gauge.csv'
-    gauge.write_text('point,thickness_um\nP03,24.5\nP01,20.1\n')
-    readings = read_readings(gauge, folder / 'points.csv')
-    told = json.loads((folder / 'measure.json').read_text())['points']
-    assert readings.positions_m[0, 0] == pytest.approx(told[2]['x_m'], abs=1e-4)
-
-
-@pytest.mark.slow
-def test_an_empty_table_is_refused_in_a_line(measured, tmp_path):
-    path = campaign(tmp_path, measured[0])
-    (tmp_path / 'readings.csv').write_text((measured[0] / 'points.csv').read_text())
-    done = paint('compare', path, '-o', tmp_path / 'out')
-    assert done.returncode == 2
-    assert "readings.csv: no readings below the header, 'thickness_um' is empty" in done.stderr
 
 
 @pytest.mark.slow
@@ -111,9 +94,6 @@ def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
     pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
     table = tmp_path / 'moved.csv'
     # The same motion, given in the robot's frame: the part is turned by half a turn there.
-    from paint_deposition.files.recordings.bags import read_trajectory
-    from paint_deposition.motion.part_frame import Rigid
-
     motion, part = read_trajectory(SAMPLES / 'door_horizontal'), Rigid.of(pose)
     lines = ['time_s,x_m,y_m,z_m,qx,qy,qz,qw']
     for stamp, *one in zip(
@@ -129,10 +109,10 @@ def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
         '--repeats', 0, '--max-pose-gap-s', 1, '--json', '-o', tmp_path / 'out',
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    figures = json.loads(done.stdout)
     first = rows_of(tmp_path / 'out/poses.csv')[0]
-    assert float(first['x_m']) == pytest.approx(1.0 - told['points'][0]['x_m'], abs=1e-5)
-    assert told['read_twice'] == []
+    assert float(first['x_m']) == pytest.approx(1.0 - figures['points'][0]['x_m'], abs=1e-5)
+    assert figures['read_twice'] == []
     assert 'PERS wobjdata wobjPart' in (tmp_path / 'out/points.mod').read_text()
 
 

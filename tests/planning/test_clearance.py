@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from booth import panel, panel_with_screen, serpentine
-from paint_deposition.errors import PlanError
-from paint_deposition.planning.clearance import GunEnvelope, contacts
+from paint_deposition.planning.clearance import contacts
+from paint_deposition.planning.requests import GunEnvelope
 
 # The gun runs along x at 0.25 m before the panel; the screen stands 0.1 m before it at |x| < 0.05.
 SPEED, HALF = 0.3, 0.45
@@ -13,11 +13,11 @@ MOTION = serpentine(speed_m_per_s=SPEED, half_width_m=HALF)
 
 
 def test_nothing_is_near():
-    assert contacts(panel(), MOTION, GunEnvelope(0.08, 0.4, 0.1)) == ()
+    assert contacts(panel(), MOTION, GunEnvelope()) == ()
 
 
 def test_a_screen_before_the_gun_is_met_while_it_passes():
-    (contact,) = contacts(panel_with_screen(), MOTION, GunEnvelope(0.04, 0.4, 0.2))
+    (contact,) = contacts(panel_with_screen(), MOTION, GunEnvelope(radius_m=0.04, before_m=0.2))
     assert not contact.by_gun
     # By 200 mm of cylinder over the 150 mm from the TCP to the screen; aside no further than 40.
     assert contact.depth_m == pytest.approx(0.04, abs=0.01)
@@ -31,11 +31,6 @@ def test_a_gun_in_the_part_is_told_from_a_near_part():
     through = type(motion)(
         motion.stamps_ns, motion.positions_m + np.array([0.0, 0.2, 0.0]), motion.quaternions_xyzw
     )
-    (contact,) = contacts(panel_with_screen(), through, GunEnvelope(0.04, 0.4, 0.0))
+    (contact,) = contacts(panel_with_screen(), through, GunEnvelope(radius_m=0.04, before_m=0.0))
     assert contact.by_gun
     assert 'touches' in str(contact)
-
-
-def test_an_envelope_has_a_size():
-    with pytest.raises(PlanError, match='gun_radius_m'):
-        GunEnvelope(radius_m=0.0)

@@ -29,8 +29,8 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
+from paint_deposition.planning.requests import IndexRequest
 
 NARROW = DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
 
@@ -66,7 +66,9 @@ def ask(ros_context, spin, wait_until):
 def test_answer_is_the_recommendation(planner, ask):
     planner()
     answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
-    expected = recommend(DepositionModel(), Request(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
+    expected = recommend(
+        DepositionModel(), IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
+    )
     assert answer.success
     assert answer.index_m == expected.index_m
     assert answer.sigma_n == expected.sigma_n

@@ -1,4 +1,4 @@
-"""A programme's speeds, flows and triggers chosen anew for a more even film."""
+"""A programme's speeds, flows and triggers, chosen for a more even film."""
 
 from __future__ import annotations
 

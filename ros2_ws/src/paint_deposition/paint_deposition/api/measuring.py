@@ -40,7 +40,7 @@ def choose_readings(
         surface: the part; it is turned round, with a note, if the gun looks at its back.
         trajectory: the motion that paints it, in the frame of the mesh.
         model: what the gun sprays, as far as it is known; default: a 50 mm bell.
-        posterior: what earlier readings told of the model; default: little is known of it.
+        posterior: what earlier readings say of the model; default: little is known of it.
         own_effects: to look for beside the catalogue's.
         max_pose_gap_s: a longer time between two poses counts as gun off [s].
         progress: called with a line for each step.

@@ -78,7 +78,7 @@ def improve_command(
 ) -> None:
     """Make the film of a given programme more even; its path stays as it is.
 
-    Speeds along the passes, flows and the places where the gun opens and closes are chosen anew,
+    Speeds along the passes, flows and the places where the gun opens and closes are chosen
     through the whole model. What changes is printed pass by pass; the bag and the robot program
     are read back, and all figures are of their film.
     """

@@ -74,6 +74,7 @@ def measure_command(
     mesh_scale: float,
     body: str | None,
     max_edge_length_m: float,
+    max_pose_gap_s: float,
     down: np.ndarray | None,
     pictures: str,
     as_json: bool,
@@ -104,8 +105,9 @@ def measure_command(
             warnings = recorded.warnings
         posterior = chosen.file.posterior if chosen.file else None
         result = pd.choose_readings(
-            surface, recorded, chosen.model, posterior=posterior, progress=show, **dict(request)
-        )
+            surface, recorded, chosen.model, posterior=posterior, max_pose_gap_s=max_pose_gap_s,
+            progress=show, **dict(request),
+        )  # fmt: skip
         made_from = {
             'mesh_file': str(mesh),
             'trajectory': str(trajectory or ''),

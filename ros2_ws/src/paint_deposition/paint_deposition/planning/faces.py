@@ -68,21 +68,6 @@ class FacePasses:
 
 
 @dataclass(frozen=True)
-class Blend:
-    """The faces with their passes, blended.
-
-    Attributes:
-        margin_m: by how much each face is sprayed less far than its seams.
-        faces: their passes, each at its speed.
-        sigma_n_before: of the film without margin, each face for itself.
-    """
-
-    margin_m: float
-    faces: tuple[FacePasses, ...]
-    sigma_n_before: float
-
-
-@dataclass(frozen=True)
 class _Laid:
     """Passes on every face for one margin, and the film of each pass on the whole part."""
 
@@ -99,8 +84,11 @@ def blend(
     faces: tuple[Face, ...],
     area_m2: np.ndarray,
     progress: Callable[[str, float], None],
-) -> Blend:
+) -> tuple[float, tuple[FacePasses, ...], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
+
+    Returns the margin, by how much each face is sprayed less far than its seams [m], the passes of
+    the faces, each at its speed, and sigma_n without margin, each face for itself.
 
     Args:
         surface: the part. model: what the gun sprays. request: for each face.
@@ -121,7 +109,7 @@ def blend(
     ]
     best = int(np.argmin(sigmas))
     _, before = evenness(tried[0].films_um.sum(axis=0), area_m2)
-    return Blend(tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before)
+    return tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before
 
 
 def _laid(
@@ -189,7 +177,8 @@ def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
         for either in product(*ways)
         for order in permutations(range(len(faces)))
     )
-    return min(tried, key=_travel_m)
+    # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
+    return min(tried, key=lambda order: round(_travel_m(order), 6))
 
 
 def motion_over(

@@ -2,6 +2,9 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -9,15 +12,18 @@ from scipy.interpolate import CubicSpline
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator, settled_um
-from paint_deposition.film.paint_used import PaintUsed
+from paint_deposition.film.paint_used import PaintUsed, paint_figures
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement.nodes import Nodes
 from paint_deposition.planning.improvement.programme import Programme
-from paint_deposition.planning.passes import PassStyle, plan_pass, trajectory_of
+from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_pass, trajectory_of
+from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
 
 MOST_POINTS = 1500
@@ -40,6 +46,101 @@ def simulated(
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     integrator.add(path, lambda done: progress(done / len(path)))
     return integrator.film_um, integrator.used
+
+
+def predicted(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    painted: np.ndarray,
+    trajectory: Trajectory,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, Any]:
+    """The film of a planned motion and its figures, as fields of a ``PlannedFilm``.
+
+    Within a tenth of the target, if there is one, it is good.
+    """
+    film, paint = simulated(surface, model, trajectory, progress)
+    area, target = surface.vertex_areas_m2[painted], request.target_um or 0.0
+    statistics = film_statistics(
+        film[painted], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target
+    )
+    return {
+        'surface': surface, 'model': model, 'request': request, 'painted': painted,
+        'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,
+        'sigma_n': evenness(film[painted], area)[1],
+    }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedFilm:
+    """Passes on a part with the film that the model predicts.
+
+    Attributes:
+        surface: the part. model: what the gun sprays. request: as given.
+        painted: (V,) bool, the side or the faces that are painted.
+        passes: in running order. trajectory: their timed poses and trigger.
+        moves: of a robot program along them.
+        film_um: (V,) film on the refined part. paint: that is sprayed.
+        statistics: of the film on the painted part.
+        sigma_n: standard deviation over mean there, bare metal included.
+    """
+
+    surface: Surface
+    model: DepositionModel
+    request: PlanRequest
+    painted: np.ndarray
+    passes: tuple[PlannedPass, ...]
+    trajectory: Trajectory
+    moves: tuple[Move, ...]
+    film_um: np.ndarray
+    paint: PaintUsed
+    statistics: FilmStatistics
+    sigma_n: float
+
+    @property
+    def mean_um(self) -> float:
+        """Mean film on the painted part, bare metal included [um]."""
+        area = self.surface.vertex_areas_m2[self.painted]
+        return evenness(self.film_um[self.painted], area)[0]
+
+    @property
+    def cycle_time_s(self) -> float:
+        """From the first pose to the last [s]."""
+        return self.trajectory.duration_s
+
+    @property
+    def sprayed_speeds_m_per_s(self) -> list[float]:
+        """Of the moves that spray."""
+        return [move.speed_m_per_s for move in self.moves if move.spraying]
+
+    @cached_property
+    def path(self) -> SprayPath:
+        """The motion cut into sub-steps."""
+        return spray_path(self.trajectory)[0]
+
+    @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        return (
+            f'mean film {self.statistics.mean_um:.1f} µm, sigma_n {100 * self.sigma_n:.1f} %, '
+            f'{self.cycle_time_s:.1f} s'
+        )
+
+    def __repr__(self) -> str:
+        return f'{type(self).__name__}({self.sentence})'
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the plan."""
+        return {
+            'direction': self.request.direction,
+            'passes': len(self.passes),
+            'cycle_time_s': self.cycle_time_s,
+            'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
+            'sigma_n': self.sigma_n,
+            'film': self.statistics.to_dict(),
+            'paint': paint_figures(self),
+        }
 
 
 def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:

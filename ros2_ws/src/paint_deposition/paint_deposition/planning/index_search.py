@@ -1,19 +1,31 @@
-"""Evenness over the index: its curve and minima, and how far a tolerance lets it drift."""
+"""Parallel passes over a plane: how the gun runs along them, their evenness over the index.
+
+Minima of the curve, how far a tolerance lets index and standoff drift, how many passes cover a
+width, and how long they take.
+"""
 
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import lru_cache
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq, minimize_scalar
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.uniformity import ParallelPasses
-from paint_deposition.planning.plane_passes import PassSetup
+from paint_deposition.film.pass_film import sampled_collapse
+from paint_deposition.model.collapse import Collapse
+from paint_deposition.model.uniformity import ParallelPasses, Variation, variation
 
+# Passes that differ by less than this share of their peak are taken for the same.
+ALIKE = 1e-9
+# Passes that are kept for requests that differ in tolerance or width only.
+PASSES_KEPT = 64
+# Share by which the film at the part's edge may fall below the least film inside.
+EDGE_LOSS = 0.05
 FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
 # Where a window ends, and the standoff that is still good, are found to this [m].
@@ -26,6 +38,106 @@ STEPS = 100
 # sub-steps and samples, which is good to 1e-5 of sigma_n.
 STEPS_WITH_EFFECTS = 6
 SEARCHED = 0.25
+
+
+@dataclass(frozen=True)
+class PassSetup:
+    """Square to a plane, in parallel passes.
+
+    A gun that keeps its orientation lays one profile whichever way it travels, so alternating
+    passes are as good as one-way ones. Turned by half a turn for every way back it lays the
+    mirrored profile, and an asymmetric pattern makes an uneven pair.
+
+    Attributes:
+        standoff_m: TCP to plane [m].
+        travel_rad: direction of the first pass in the tool's x-y frame, from x to y [rad].
+        one_way: every pass runs in the direction of the first; else they alternate.
+        gun_turns: on the way back the gun is turned by half a turn about its axis.
+    """
+
+    standoff_m: float
+    travel_rad: float = 0.0
+    one_way: bool = False
+    gun_turns: bool = False
+
+    @property
+    def travel(self) -> str:
+        """'one_way' or 'alternating'."""
+        return 'one_way' if self.one_way else 'alternating'
+
+    @property
+    def assumption(self) -> str:
+        """What is assumed about the gun, in words."""
+        if self.one_way:
+            return 'all passes run the same way with the gun held alike'
+        if self.gun_turns:
+            return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
+        return 'passes alternate and the gun keeps its orientation: all lay the same profile'
+
+    @lru_cache(maxsize=PASSES_KEPT)  # noqa: B019  (a setup is a few numbers)
+    def parallel_passes(
+        self, model: DepositionModel, speed_m_per_s: float, fineness: float = 1.0
+    ) -> ParallelPasses:
+        """Endlessly many of these passes at a speed [m/s]; fineness as for their collapse."""
+        options: dict[str, Any] = {
+            'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad, 'fineness': fineness,
+        }  # fmt: skip
+        first = sampled_collapse(model, speed_m_per_s, **options)
+        # An effect may depend on the way: forth or back, up or down.
+        if self.one_way or not (self.gun_turns or model.effects):
+            return ParallelPasses.one_way(first)
+        second = sampled_collapse(
+            model, speed_m_per_s, backwards=True, turned=self.gun_turns, **options
+        )
+        difference = np.abs(second.film_um - first.film_um).max()
+        if difference <= ALIKE * first.film_um.max():
+            return ParallelPasses.one_way(first)
+        return ParallelPasses(first, second)
+
+
+def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) -> int:
+    """Fewest passes, set evenly about the middle, that cover a width to its edges.
+
+    Covered is where the film is at most EDGE_LOSS below the least of endlessly many passes.
+    """
+    period = np.linspace(0.0, parallel.period_m(index_m), 65)
+    enough = (1.0 - EDGE_LOSS) * parallel.thickness_um(index_m, period).min()
+    across = np.linspace(-0.5 * width_m, 0.5 * width_m, 65)
+    reach = max(parallel.first.reach_m, parallel.second.reach_m)
+    most = math.ceil((width_m + 2.0 * reach) / index_m) + 2
+    for count in range(max(1, math.floor(width_m / index_m)), most):
+        film = np.zeros(len(across))
+        for collapse, line_m in _laid_evenly(parallel, index_m, count):
+            film += collapse.thickness_um(across - line_m)
+        if film.min() >= enough:
+            return count
+    return most
+
+
+def variation_over_width(
+    parallel: ParallelPasses, index_m: float, passes: int, width_m: float
+) -> Variation:
+    """Mean and sigma_n over the whole width, its edges included, of so many passes."""
+    return variation(_laid_evenly(parallel, index_m, passes), -0.5 * width_m, 0.5 * width_m)
+
+
+def _laid_evenly(
+    parallel: ParallelPasses, index_m: float, passes: int
+) -> list[tuple[Collapse, float]]:
+    """Collapse and line of each pass, about the middle."""
+    lines = (np.arange(passes) - 0.5 * (passes - 1)) * index_m
+    return [
+        (parallel.second if number % 2 else parallel.first, float(line))
+        for number, line in enumerate(lines)
+    ]
+
+
+def cycle_time_s(
+    passes: int, length_m: float, index_m: float, speed_m_per_s: float, one_way: bool
+) -> float:
+    """Time from the first opening of the gun to its last closing, at an even speed [s]."""
+    between = math.hypot(length_m, index_m) if one_way else index_m
+    return (passes * length_m + (passes - 1) * between) / speed_m_per_s
 
 
 @dataclass(frozen=True)
@@ -92,10 +204,7 @@ def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
 
 
 def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
-    """The index to recommend.
-
-    Without a tolerance it is the deepest minimum in the range. With one it lies in the window of
-    widest index, for that takes the fewest passes: at the deepest minimum in there.
+    """The index to recommend, see ``recommend``.
 
     Raises:
         PlanError: nothing in the range keeps to the tolerance; names what comes closest.
@@ -124,19 +233,10 @@ def index_drift_m(
 ) -> tuple[float, float]:
     """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
     least, most = (
-        _farthest_known(parallel, np.linspace(index_m, share * index_m, STEPS + 1), tolerance)
+        _farthest(parallel.sigma_n, index_m, share * index_m, tolerance, STEPS, PRECISION_M)
         for share in (LEAST, MOST)
     )
     return least, most
-
-
-def _farthest_known(parallel: ParallelPasses, index_m: np.ndarray, tolerance: float) -> float:
-    """How far one may go along indexes (N,) [m], the first of them good, within a tolerance."""
-    beyond = np.flatnonzero(parallel.sigma_n_at(index_m[1:]) > tolerance)
-    if not len(beyond):
-        return float(index_m[-1])
-    last, first_beyond = index_m[beyond[0] : beyond[0] + 2].tolist()
-    return _crossing_at(parallel.sigma_n, last, first_beyond, tolerance)
 
 
 def standoff_drift_m(
@@ -159,18 +259,32 @@ def standoff_drift_m(
         distance = here + model.projection.emission_offset_m
         nearer = distance * (index_m / index_drift[1] - 1.0)
         return max(nearer, -here), distance * (index_m / index_drift[0] - 1.0)
+    one_way = setup.one_way or parallel.alike
 
-    both_ways = not parallel.alike
-
-    @cache  # the search for a crossing asks for its ends again
     def sigma_n(standoff_m: float) -> float:
-        there = replace(setup, standoff_m=standoff_m, one_way=setup.one_way or not both_ways)
-        return there.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
+        other = replace(setup, standoff_m=standoff_m, one_way=one_way)
+        return other.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
 
     nearest, farthest = (
-        _farthest_within(sigma_n, here, share * here, tolerance) for share in (LEAST, MOST)
+        _farthest(sigma_n, here, share * here, tolerance, STEPS_WITH_EFFECTS, STANDOFF_PRECISION_M)
+        for share in (LEAST, MOST)
     )
     return nearest - here, farthest - here
+
+
+def _farthest(
+    sigma_n: Callable[[float], float],
+    start: float,
+    end: float,
+    tolerance: float,
+    steps: int,
+    precision_m: float,
+) -> float:
+    """How far a value may go from a good start toward an end within a tolerance [m]."""
+    for low, high in pairwise(np.linspace(start, end, steps + 1).tolist()):
+        if sigma_n(high) > tolerance:
+            return _crossing_at(sigma_n, low, high, tolerance, precision_m)
+    return float(end)
 
 
 def _crossing_at(
@@ -182,15 +296,3 @@ def _crossing_at(
 ) -> float:
     """Where a function passes the tolerance between two places on either side of it."""
     return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=precision_m))
-
-
-def _farthest_within(
-    sigma_n: Callable[[float], float], start: float, limit: float, tolerance: float
-) -> float:
-    """How far the standoff may go from a good start toward a limit within a tolerance [m]."""
-    value = start
-    for further in np.linspace(start, limit, STEPS_WITH_EFFECTS + 1)[1:].tolist():
-        if sigma_n(further) > tolerance:
-            return _crossing_at(sigma_n, value, further, tolerance, STANDOFF_PRECISION_M)
-        value = further
-    return limit

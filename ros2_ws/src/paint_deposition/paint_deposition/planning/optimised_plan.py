@@ -10,8 +10,8 @@ order is taken: fewer passes before more, and a set that is found before its nei
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import Bounds, minimize
@@ -19,10 +19,8 @@ from scipy.optimize import Bounds, minimize
 from paint_deposition.errors import PlanError
 from paint_deposition.planning.films import (
     FilmAtPoints,
-    LineFilms,
-    evenness,
     line_motion,
-    simulated,
+    predicted,
 )
 from paint_deposition.planning.improvement.nodes import Nodes
 from paint_deposition.planning.improvement.programme import Programme, moves_of
@@ -30,11 +28,10 @@ from paint_deposition.planning.improvement.quadratic_program import SLOPE_M
 from paint_deposition.planning.improvement.retiming import may_be_closed, retime_for_evenness
 from paint_deposition.planning.passes import PassStyle, plan_passes, trajectory_of
 from paint_deposition.planning.placing import Placing
-from paint_deposition.planning.plan import Plan, planned_statistics
-from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.plan import Plan
 
 # A pass more must save this share of the cost; a change of the lines this one.
-WORTH_A_PASS, WORTH_A_CHANGE = 0.05, 1e-3
+WORTH_A_PASS, WORTH_A_CHANGE = 0.05, 1e-4
 # Candidates per width of the pattern across, and nodes per width along.
 LINES_PER_SIGMA, NODES_PER_SIGMA = 3.0, 1.5
 COARSEST_M = 0.06
@@ -66,24 +63,14 @@ def optimised(
         plain: as ``plan`` makes it.
         progress: called with what is done and its share, 0 to 1.
     """
-    request, films = plain.request, plain.line_films
+    request = plain.request
     target = request.target_um or plain.mean_um
     wanted_cm3 = target * float(plain.surface.vertex_areas_m2[plain.painted].sum())
-    every = max(1, len(films.rows) // POINTS)
-    search = LineSearch(
-        films, FilmAtPoints(plain.surface, films.rows[::every], plain.model), plain.style, target,
-        request.improvement(
-            plain.style.overspray_m, target, paint_weight=request.paint_weight,
-            time_weight=request.time_weight,
-        ),
-        wanted_cm3 / plain.model.planar.K1_cm3_per_s, plain.cycle_time_s,
-        _standoffs_m(plain), np.unique(request.lean_max_rad * np.linspace(-1.0, 1.0, LEANS)),
-    )  # fmt: skip
-    low, high = films.surface_map.extent_m[1].tolist()
+    search = LineSearch(plain, target, wanted_cm3)
     found = []
     for count in range(1, len(plain.passes) + 2):
         progress('lines', count / (len(plain.passes) + 2))
-        found.append(search.best(count, low, high))
+        found.append(search.best(count))
     enough = min(lines.cost for lines in found) / (1.0 - WORTH_A_PASS)
     fewest = next(lines for lines in found if lines.cost <= enough)
     styles = tuple(planned.style for planned in plain.passes)
@@ -156,18 +143,15 @@ def _along(
     retimed = retime_for_evenness(
         surface, plain.painted, programme, [plain.model], wanted, progress, explained=False
     ).programme
-    trajectory = retimed.trajectory()
-    film, paint = simulated(
-        surface, plain.model, trajectory, lambda share: progress('film', share)
-    )
-    area = surface.vertex_areas_m2[plain.painted]
-    sigma_n = evenness(film[plain.painted], area)[1]
+    found = predicted(
+        surface, plain.model, request, plain.painted, retimed.trajectory(),
+        lambda share: progress('film', share),
+    )  # fmt: skip
     index = float(np.diff(lines.lines_m).mean()) if len(passes) > 1 else 0.0
     return replace(
-        plain, style=style, passes=passes, trajectory=trajectory, film_um=film, sigma_n=sigma_n,
-        placing=Placing(len(passes), index, float(lines.lines_m.mean()), sigma_n),
-        statistics=planned_statistics(film[plain.painted], area, paint.emitted_cm3, request),
-        moves=tuple(moves_of(retimed, wanted)), plain=plain, paint=paint,
+        plain, **found, style=style, passes=passes, moves=tuple(moves_of(retimed, wanted)),
+        placing=Placing(len(passes), index, float(lines.lines_m.mean()), found['sigma_n']),
+        plain=plain,
     )  # fmt: skip
 
 
@@ -186,8 +170,7 @@ class Lines:
     cost: float
 
 
-@dataclass(frozen=True)
-class _Laid:
+class _Laid(NamedTuple):
     """What the nodes of a candidate lay.
 
     Attributes:
@@ -200,56 +183,44 @@ class _Laid:
     open_ends: np.ndarray
 
 
-@dataclass(frozen=True)
 class LineSearch:
     """Chooses lines by the film that the best speeds along them would lay.
 
-    Attributes:
-        films: of single passes, with the part's smoothed surface.
-        at_points: films at points of the part.
-        style: how passes are run. target_um: film wanted.
-        request: of robot and film; the weights are per paint and time of the next two.
-        wanted_s, given_s: paint wanted on the part as time sprayed, and a usual cycle time [s].
-        standoffs_m: (S,) to choose from. leans_rad: (L,) to choose from.
+    Args:
+        plain: even passes, with their films and what was asked for.
+        target_um: film wanted. wanted_cm3: paint wanted on the part.
     """
 
-    films: LineFilms
-    at_points: FilmAtPoints
-    style: PassStyle
-    target_um: float
-    request: ImproveRequest
-    wanted_s: float
-    given_s: float
-    standoffs_m: np.ndarray
-    leans_rad: np.ndarray
-    _laid: dict[Candidate, _Laid] = field(default_factory=dict)
-    _known: dict[tuple[Candidate, ...], Lines] = field(default_factory=dict)
+    def __init__(self, plain: Plan, target_um: float, wanted_cm3: float) -> None:
+        request, films, planar = plain.request, plain.line_films, plain.model.planar
+        self._map, self._style, self._target_um = films.surface_map, plain.style, target_um
+        self._request = request.improvement(
+            plain.style.overspray_m, target_um, paint_weight=request.paint_weight,
+            time_weight=request.time_weight,
+        )  # fmt: skip
+        every = max(1, len(films.rows) // POINTS)
+        self._at_points = FilmAtPoints(plain.surface, films.rows[::every], plain.model)
+        self._wanted_s = wanted_cm3 / planar.K1_cm3_per_s
+        self._given_s = plain.cycle_time_s
+        self._standoffs_m = _standoffs_m(plain)
+        self._leans_rad = np.unique(request.lean_max_rad * np.linspace(-1.0, 1.0, LEANS))
+        narrow = min(planar.sigma1_m, planar.sigma2_m)
+        self._spacing_m = min(narrow / NODES_PER_SIGMA, COARSEST_M)
+        step = min(narrow / LINES_PER_SIGMA, COARSEST_M)
+        count = int(np.ceil((films.high_m - films.low_m) / step)) + 1
+        self._lines_m = np.linspace(films.low_m, films.high_m, count)
+        self._laid: dict[Candidate, _Laid] = {}
+        self._known: dict[tuple[Candidate, ...], Lines] = {}
 
-    @cached_property
-    def _width_m(self) -> float:
-        planar = self.at_points.model.planar
-        return min(planar.sigma1_m, planar.sigma2_m)
-
-    @cached_property
-    def _spacing_m(self) -> float:
-        """Of nodes along a pass."""
-        return min(self._width_m / NODES_PER_SIGMA, COARSEST_M)
-
-    @cached_property
-    def lines_m(self) -> np.ndarray:
-        """(K,) coordinates across of the candidates [m]."""
-        low, high = self.films.low_m, self.films.high_m
-        step = min(self._width_m / LINES_PER_SIGMA, COARSEST_M)
-        return np.linspace(low, high, int(np.ceil((high - low) / step)) + 1)
-
-    def best(self, passes: int, low_m: float, high_m: float) -> Lines:
-        """The best lines for so many passes, from even ones between two ends of the part [m]."""
-        even = low_m + (np.arange(passes) + 0.5) / passes * (high_m - low_m)
-        lines = [int(np.abs(self.lines_m - line).argmin()) for line in even]
+    def best(self, passes: int) -> Lines:
+        """The best lines for so many passes, from even ones."""
+        low, high = self._map.extent_m[1]
+        even = low + (np.arange(passes) + 0.5) / passes * (high - low)
+        lines = [int(np.abs(self._lines_m - line).argmin()) for line in even]
         if len(set(lines)) < passes:
-            return Lines(even, (self.style,) * passes, np.inf)
-        standoff = int(np.abs(self.standoffs_m - self.style.standoff_m).argmin())
-        upright = int(np.abs(self.leans_rad).argmin())
+            return Lines(even, (self._style,) * passes, np.inf)
+        standoff = int(np.abs(self._standoffs_m - self._style.standoff_m).argmin())
+        upright = int(np.abs(self._leans_rad).argmin())
         now = tuple((line, standoff, upright) for line in lines)
         step = FIRST_MOVE
         while step:
@@ -266,7 +237,7 @@ class LineSearch:
         ways = [np.ones(len(now), int), *np.eye(len(now), dtype=int)]
         if len(now) > 1:
             ways.append(np.rint(np.linspace(-1.0, 1.0, len(now))).astype(int))
-        counts = np.array([len(self.lines_m), len(self.standoffs_m), len(self.leans_rad)])
+        counts = np.array([len(self._lines_m), len(self._standoffs_m), len(self._leans_rad)])
         found = []
         for respect, much in enumerate((step, 1, 1)):
             for way in ways:
@@ -278,24 +249,24 @@ class LineSearch:
                         found.append(tuple(map(tuple, some.tolist())))
         return found or [now]
 
-    def _style(self, candidate: Candidate) -> PassStyle:
+    def _style_of(self, candidate: Candidate) -> PassStyle:
         _, standoff, lean = candidate
         return replace(
-            self.style,
-            standoff_m=float(self.standoffs_m[standoff]),
-            lean_rad=float(self.leans_rad[lean]),
+            self._style,
+            standoff_m=float(self._standoffs_m[standoff]),
+            lean_rad=float(self._leans_rad[lean]),
         )
 
     def _laid_by(self, candidate: Candidate) -> _Laid:
         if candidate not in self._laid:
-            style, line = self._style(candidate), float(self.lines_m[candidate[0]])
-            motion = line_motion(self.films.surface_map, line, style, self.at_points.step_m)
+            style, line = self._style_of(candidate), float(self._lines_m[candidate[0]])
+            motion = line_motion(self._map, line, style, self._at_points.step_m)
             programme = Programme.of(motion)
             nodes = Nodes.of(programme.openings, self._spacing_m)
             even = np.full(len(nodes), 1.0 / style.speed_m_per_s)
-            laid = self.at_points.of_nodes(programme, nodes, even)
-            open_ends = may_be_closed(nodes, programme.openings, self.request)
-            self._laid[candidate] = _Laid(laid / self.target_um, nodes.weights_m, open_ends)
+            laid = self._at_points.of_nodes(programme, nodes, even)
+            open_ends = may_be_closed(nodes, programme.openings, self._request)
+            self._laid[candidate] = _Laid(laid / self._target_um, nodes.weights_m, open_ends)
         return self._laid[candidate]
 
     def _lines(self, some: tuple[Candidate, ...]) -> Lines:
@@ -307,9 +278,9 @@ class LineSearch:
         lengths = np.concatenate([one.lengths_m for one in laid])
         open_ends = np.concatenate([one.open_ends for one in laid])
         number = np.repeat(np.arange(len(some)), [len(one.lengths_m) for one in laid])
-        request = self.request
+        request = self._request
         price = lengths * (
-            request.paint_weight / self.wanted_s + request.time_weight / self.given_s
+            request.paint_weight / self._wanted_s + request.time_weight / self._given_s
         )
         density = self._densities(films, number, open_ends, price)
         error = density @ films - 1.0
@@ -317,14 +288,14 @@ class LineSearch:
         metres = np.bincount(number, lengths * (density > 0.5 / request.speed_max_m_per_s))
         cost = float(np.mean(error**2) + price @ density)
         # Between passes the robot turns and comes back to speed.
-        turn_s = 2.0 * self.style.speed_m_per_s / self.style.acceleration_m_per_s2
-        cost += request.time_weight * len(some) * turn_s / self.given_s
+        turn_s = 2.0 * self._style.speed_m_per_s / self._style.acceleration_m_per_s2
+        cost += request.time_weight * len(some) * turn_s / self._given_s
         speeds = np.maximum(metres, 1e-3) / np.maximum(seconds, 1e-3)
         styles = tuple(
-            replace(self._style(candidate), speed_m_per_s=float(speed))
+            replace(self._style_of(candidate), speed_m_per_s=float(speed))
             for candidate, speed in zip(some, speeds, strict=True)
         )
-        lines = self.lines_m[[line for line, _, _ in some]]
+        lines = self._lines_m[[line for line, _, _ in some]]
         self._known[some] = Lines(lines, styles, cost)
         return self._known[some]
 
@@ -338,19 +309,19 @@ class LineSearch:
             number, open_ends: (n,) its line, and whether the gun may be closed there.
             price: (n,) what a density costs, beside evenness and smoothness.
         """
-        count, usual = len(films), self._spacing_m / SLOPE_M / self.style.speed_m_per_s
+        count, usual = len(films), self._spacing_m / SLOPE_M / self._style.speed_m_per_s
         matrix = 2.0 / films.shape[1] * films @ films.T
         linear = price - 2.0 / films.shape[1] * films.sum(axis=1)
         pairs = np.flatnonzero(number[1:] == number[:-1])
         change = np.zeros((len(pairs), count))
         change[np.arange(len(pairs)), pairs] = -1.0 / usual
         change[np.arange(len(pairs)), pairs + 1] = 1.0 / usual
-        matrix += 2.0 * self.request.smoothness / len(pairs) * change.T @ change
-        least = np.where(open_ends, 0.0, 1.0 / self.request.speed_max_m_per_s)
+        matrix += 2.0 * self._request.smoothness / len(pairs) * change.T @ change
+        least = np.where(open_ends, 0.0, 1.0 / self._request.speed_max_m_per_s)
         # A search among many sets of lines: quick rather than exact.
         answer = minimize(
             lambda y: (0.5 * y @ (found := matrix @ y) + linear @ y, found + linear),
             np.maximum(least, 2.0 * usual), jac=True, method='L-BFGS-B',
-            bounds=Bounds(least, 1.0 / self.request.speed_min_m_per_s), options={'ftol': 1e-8},
+            bounds=Bounds(least, 1.0 / self._request.speed_min_m_per_s), options={'ftol': 1e-8},
         )  # fmt: skip
         return answer.x

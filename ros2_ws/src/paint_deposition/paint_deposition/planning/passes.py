@@ -3,11 +3,11 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
-from paint_deposition.errors import PlanError, require_above_zero
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH
@@ -50,17 +50,6 @@ class PassStyle:
     one_way: bool = False
     lean_rad: float = 0.0
     brush: int = ONLY_BRUSH
-
-    def __post_init__(self) -> None:
-        require_above_zero(
-            standoff_m=self.standoff_m,
-            speed_m_per_s=self.speed_m_per_s,
-            acceleration_m_per_s2=self.acceleration_m_per_s2,
-        )
-        for name in ('overspray_m', 'band_m'):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0.0):
-                raise PlanError(f'{name} is {value:g}; give 0 or more')
 
     @property
     def lead_m(self) -> float:
@@ -221,8 +210,7 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
     return moves
 
 
-@dataclass(frozen=True)
-class _Leg:
+class _Leg(NamedTuple):
     """A timed stretch: samples with their times, and how long it takes."""
 
     stamps_s: np.ndarray

@@ -77,13 +77,10 @@ def place_passes(
     return good[0]
 
 
-def centred(
-    films: LineFilms, extent_m: tuple[float, float], passes: int, index_m: float
-) -> Placing:
-    """Passes about the middle of the part, as one would lay them on a plane."""
-    middle = 0.5 * (extent_m[0] + extent_m[1])
-    sigma = films.sigma_n(lines_of(passes, index_m, middle))
-    return Placing(passes, index_m, middle, float(sigma))
+def placed(films: LineFilms, passes: int, index_m: float, middle_m: float) -> Placing:
+    """Lines with sigma_n of their film."""
+    sigma_n = float(films.sigma_n(lines_of(passes, index_m, middle_m)))
+    return Placing(passes, index_m, middle_m, sigma_n)
 
 
 def _best_of(
@@ -105,7 +102,8 @@ def _best_of(
     if not inside.any():
         return None
     sigma = np.where(inside, films.sigma_n(lines), np.inf)
-    start = int(np.argmin(sigma))
+    # On a symmetric part two offsets are as good: the first, whatever the last digit says.
+    start = int(np.argmin(np.round(sigma, 6)))
 
     def objective(x: np.ndarray) -> float:
         there = float(np.clip(x[0], low, high))
@@ -123,5 +121,4 @@ def _best_of(
         options={'xatol': 1e-4, 'fatol': 1e-5, 'maxfev': 200, 'initial_simplex': first + aside},
     )
     there = float(np.clip(found.x[0], low, high))
-    centre = middle + float(found.x[1]) * there
-    return Placing(passes, there, centre, float(films.sigma_n(lines_of(passes, there, centre))))
+    return placed(films, passes, there, middle + float(found.x[1]) * there)

@@ -3,29 +3,21 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, paint_figures
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import LineFilms, evenness, simulated
+from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
+from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import (
     PassStyle,
-    PlannedPass,
     plan_passes,
     planned_moves,
     trajectory_of,
 )
-from paint_deposition.planning.placing import Placing, centred, place_passes
-from paint_deposition.planning.plane_passes import passes_to_cover
+from paint_deposition.planning.placing import Placing, place_passes, placed
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
@@ -50,74 +42,36 @@ class TradeOffPoint:
     passes: int
 
 
-@dataclass(frozen=True)
-class Plan:
-    """Passes on a part with the film that the model predicts.
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Plan(PlannedFilm):
+    """Passes over one side of a part, with the film that the model predicts.
 
     Attributes:
-        surface: the part. request: what was asked for. style: how passes are run.
+        style: how passes are run.
         placing: number, index and place of the passes, with sigma_n of the search.
-        passes: in running order. trajectory: their timed poses and trigger.
-        film_um: (V,) film on the refined part. painted: (V,) bool, the side that is painted.
-        statistics: of the film on the painted side.
-        sigma_n: standard deviation over mean of the film on the painted side, bare metal
-            included.
         plane: recommendation for a plane of the part's size.
         plane_on_part: its passes laid about the middle of this part.
-        model: what the gun sprays.
         line_films: films of single passes, for other placings.
-        moves: of a robot program along the passes.
         plain: of an optimised plan, the one that it began with; else None.
-        paint: that is sprayed.
-        cycle_time_s: from the first pose to the last.
     """
 
-    surface: Surface
-    request: PlanRequest
     style: PassStyle
     placing: Placing
-    passes: tuple[PlannedPass, ...]
-    trajectory: Trajectory
-    film_um: np.ndarray
-    painted: np.ndarray
-    statistics: FilmStatistics
-    sigma_n: float
     plane: Recommendation
     plane_on_part: Placing
-    model: DepositionModel
     line_films: LineFilms
-    moves: tuple[Move, ...]
     plain: 'Plan | None' = None
-    paint: PaintUsed = NO_PAINT
-
-    @property
-    def mean_um(self) -> float:
-        """Mean film on the painted side, bare metal included [um]."""
-        area = self.surface.vertex_areas_m2[self.painted]
-        return evenness(self.film_um[self.painted], area)[0]
-
-    @property
-    def cycle_time_s(self) -> float:
-        """From the first pose to the last [s]."""
-        return self.trajectory.duration_s
-
-    @cached_property
-    def path(self) -> SprayPath:
-        """The motion cut into sub-steps."""
-        return spray_path(self.trajectory)[0]
 
     @property
     def sentence(self) -> str:
         """The plan in a sentence."""
         speeds = f'{self.style.speed_m_per_s:.3g} m/s'
         if self.plain:
-            sprayed = [move.speed_m_per_s for move in self.moves if move.spraying]
+            sprayed = self.sprayed_speeds_m_per_s
             speeds = f'{min(sprayed):.3g} to {max(sprayed):.3g} m/s'
         return (
-            f'{self.placing.passes} {self.request.direction} passes at '
-            f'{self.placing.index_m * 1e3:.0f} mm, {speeds}: mean film '
-            f'{self.statistics.mean_um:.1f} µm, sigma_n {self.sigma_n * 100:.1f} %, '
-            f'{self.cycle_time_s:.1f} s'
+            f'{len(self.passes)} {self.request.direction} passes at '
+            f'{self.placing.index_m * 1e3:.0f} mm, {speeds}: {super().sentence}'
         )
 
     @property
@@ -129,9 +83,6 @@ class Plan:
             f'{100 * self.plane_on_part.sigma_n:.1f} %'
         )
 
-    def __repr__(self) -> str:
-        return f'Plan({self.sentence})'
-
     @property
     def point(self) -> TradeOffPoint:
         """The plan in a trade-off."""
@@ -142,9 +93,7 @@ class Plan:
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
-        return {
-            'direction': self.request.direction,
-            'passes': self.placing.passes,
+        return super().to_dict() | {
             'index_m': self.placing.index_m,
             'lines_m': [planned.across_m for planned in self.passes],
             'standoffs_m': [planned.style.standoff_m for planned in self.passes],
@@ -156,11 +105,6 @@ class Plan:
             'overspray_m': self.style.overspray_m,
             'acceleration_m_per_s2': self.style.acceleration_m_per_s2,
             'smoothing_radius_m': self.request.smoothing_radius_m,
-            'cycle_time_s': self.cycle_time_s,
-            'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
-            'sigma_n': self.sigma_n,
-            'film': self.statistics.to_dict(),
-            'paint': paint_figures(self),
             'plain': self.plain
             and {
                 **{k: v for k, v in vars(self.plain.point).items() if k != 'paint_weight'},
@@ -194,7 +138,7 @@ def plan(
     """
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
-    painted, area = surface_map.painted, surface.vertex_areas_m2[surface_map.painted]
+    area = surface.vertex_areas_m2[surface_map.painted]
     (left, right), ends = surface_map.extent_m.tolist()
     height = ends[1] - ends[0]
     plane = recommend(model, request.for_plane(height, right - left))
@@ -206,24 +150,24 @@ def plan(
     )  # fmt: skip
     placing = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
-    on_part = centred(films, ends, count, plane.index_m)
+    on_part = placed(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     # Level passes go from the top down, vertical ones from the left to the right.
     lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
     target = None if request.speed_m_per_s else request.target_um
     for round_ in range(TARGET_ROUNDS):
         passes = plan_passes(surface_map, lines, [style] * len(lines))
-        trajectory = trajectory_of(passes, style, frame_id)
-        film, paint = simulated(surface, model, trajectory, lambda share: progress('film', share))
-        mean, sigma_n = evenness(film[painted], area)
+        found = predicted(
+            surface, model, request, surface_map.painted,
+            trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
+        )  # fmt: skip
+        mean, _ = evenness(found['film_um'][surface_map.painted], area)
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
-    statistics = planned_statistics(film[painted], area, paint.emitted_cm3, request)
     return Plan(
-        surface, request, style, placing, passes, trajectory, film, painted,
-        statistics, sigma_n, plane, on_part, model, films, tuple(planned_moves(passes, style)),
-        paint=paint,
+        **found, passes=passes, moves=tuple(planned_moves(passes, style)), style=style,
+        placing=placing, plane=plane, plane_on_part=on_part, line_films=films,
     )  # fmt: skip
 
 
@@ -252,13 +196,3 @@ def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, fl
         return request.index_m, request.index_m
     low, high = (share * plane.index_m for share in INDEX_SHARES)
     return request.index_min_m or low, request.index_max_m or high
-
-
-def planned_statistics(
-    film_um: np.ndarray, area_m2: np.ndarray, emitted_cm3: float, request: PlanRequest
-) -> FilmStatistics:
-    """Of a planned film; within a tenth of the target, if there is one, it is good."""
-    target = request.target_um or 0.0
-    return film_statistics(
-        film_um, area_m2, emitted_cm3, target_um=target, target_tolerance_um=0.1 * target
-    )

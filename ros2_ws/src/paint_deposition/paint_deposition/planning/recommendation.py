@@ -13,14 +13,12 @@ from paint_deposition.planning.index_search import (
     SEARCHED,
     IndexCurve,
     Minimum,
-    choose,
-    index_drift_m,
-    standoff_drift_m,
-)
-from paint_deposition.planning.plane_passes import (
     PassSetup,
+    choose,
     cycle_time_s,
+    index_drift_m,
     passes_to_cover,
+    standoff_drift_m,
     variation_over_width,
 )
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
@@ -136,7 +134,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         )
     setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
     speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
-    # A speed that is only a guess is computed anew at the end.
+    # A speed that is only a guess is replaced at the end.
     guessed = request.speed_m_per_s is None and bool(model.effects)
     parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
     width = half_width_m(parallel.first)
@@ -152,10 +150,10 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         standoff_drift = standoff_drift_m(
             model, setup, speed, curve.parallel, best.index_m, tolerance, index_drift
         )
-    passes = cycle_time = length = over_width = None
-    if request.width_m is not None:
+    passes = cycle_time = over_width = None
+    length = request.width_m and (request.length_m or request.width_m)
+    if request.width_m is not None and length is not None:
         passes = passes_to_cover(curve.parallel, best.index_m, request.width_m)
-        length = request.length_m or request.width_m
         cycle_time = cycle_time_s(passes, length, best.index_m, speed, request.one_way)
         over_width = variation_over_width(
             curve.parallel, best.index_m, passes, request.width_m

@@ -36,7 +36,7 @@ class FilmBuild(Request):
 
 
 class PassRequest(FilmBuild):
-    """What all passes are asked for."""
+    """How passes run and what they lay."""
 
     index_min_m: float | None = given(
         None, 'Least index [m].', '--index-min', least=0.001, most=10.0
@@ -122,7 +122,7 @@ class Limits(Request):
             raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
 
 
-class PlanRequest(PassRequest, Limits):
+class PlanRequest(Limits, PassRequest):
     """Passes on a part; the speeds along them are chosen for ``optimise`` only."""
 
     direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')

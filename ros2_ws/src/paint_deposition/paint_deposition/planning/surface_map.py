@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
-from paint_deposition.errors import PlanError, require_above_zero
+from paint_deposition.errors import PlanError
 from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
@@ -67,10 +67,8 @@ def pass_axes(
         outward: from the part to the gun, any length; default: the mean normal.
 
     Raises:
-        PlanError: the direction is another, or the part has no side to paint from.
+        PlanError: the part has no side to paint from.
     """
-    if direction not in ('horizontal', 'vertical'):
-        raise PlanError(f"direction is '{direction}'; give horizontal or vertical")
     if outward is None:
         outward = surface.vertex_areas_m2 @ surface.normals
         if np.linalg.norm(outward) < LEAST_SIDE * surface.area_m2:
@@ -79,8 +77,6 @@ def pass_axes(
                 '(outward)'
             )
     side = np.asarray(outward, dtype=float)
-    if not np.linalg.norm(side) > 0.0:
-        raise PlanError('outward is a vector of length 0; give the direction to the gun')
     side = side / np.linalg.norm(side)
     toward = across_axis if direction == 'horizontal' else downhill_axis
     travel = toward(side, surface.down)
@@ -100,7 +96,6 @@ class SurfaceMap:
     """
 
     def __init__(self, surface: Surface, axes: PassAxes, radius_m: float) -> None:
-        require_above_zero(smoothing_radius_m=radius_m)
         self.axes = axes
         self.radius_m = radius_m
         facing = surface.normals @ axes.outward

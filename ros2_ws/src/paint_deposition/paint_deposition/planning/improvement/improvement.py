@@ -9,13 +9,16 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import evenness
+from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT
 from paint_deposition.planning.improvement.programme import Programme, speed_along
+from paint_deposition.planning.improvement.quadratic_program import WORDS
 from paint_deposition.planning.improvement.retiming import Retiming
 from paint_deposition.planning.plan import TradeOffPoint
 from paint_deposition.planning.requests import ImproveRequest
@@ -189,6 +192,19 @@ class Improvement:
         """Relative difference from the target that counts as good."""
         return self.request.tolerance or DEFAULT_TOLERANCE
 
+    @property
+    def film_um(self) -> np.ndarray:
+        """(V,) of the improved programme [um]."""
+        return self.after.film_um
+
+    @cached_property
+    def statistics(self) -> FilmStatistics:
+        """Of that film on the whole part."""
+        return film_statistics(
+            self.film_um, self.surface.vertex_areas_m2, self.after.paint_cm3,
+            target_um=self.target_um, target_tolerance_um=self.tolerance * self.target_um,
+        )  # fmt: skip
+
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
         """What changes, pass by pass."""
@@ -205,16 +221,19 @@ class Improvement:
         found = list(self.odd)
         off = self.after.mean_um / self.target_um - 1.0
         if abs(off) > OFF_TARGET:
+            thick = off > 0.0
+            other = (WORDS['slowest'],) if thick else (WORDS[ROBOT], WORDS[BEND], WORDS[LEAD])
+            names = [name for name in self.retiming.binding if name not in other]
             remedy = (
                 'a greater speed (speed_max_m_per_s) or a lower flow (flow)'
-                if off > 0.0
+                if thick
                 else 'a lower speed (speed_min_m_per_s) or a greater flow (flow)'
             )
             found.append(
                 f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
+                f'bound by {" and ".join(names) or "the path"}; '
                 f'{100 * self.before.within:.0f} to {100 * self.after.within:.0f} % of the area '
-                f'lie within the tolerance: {" and ".join(self.retiming.binding) or "the path"} '
-                f'leaves no other; allow {remedy}'
+                f'lie within the tolerance; allow {remedy}'
             )
         if self.program_difference > ALIKE:
             found.append(

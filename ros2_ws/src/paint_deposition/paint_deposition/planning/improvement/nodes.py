@@ -65,24 +65,18 @@ class Nodes:
 
     def hats(self, travel_m: np.ndarray, opening: np.ndarray) -> csr_matrix:
         """(M, n) weights of the nodes at places (M,) within or beyond openings (M,)."""
-        count = len(travel_m)
-        left, share = np.zeros(count, np.int64), np.zeros(count)
+        left, share = np.zeros(len(travel_m), np.int64), np.zeros(len(travel_m))
         for number in range(len(self.openings)):
-            here = opening == number
-            rows = self.rows(number)
+            here, rows = opening == number, self.rows(number)
             places = self.travel_m[rows]
             inside = np.clip(travel_m[here], places[0], places[-1])
             cell = np.clip(np.searchsorted(places, inside, side='right') - 1, 0, len(places) - 2)
             left[here] = rows.start + cell
             share[here] = (inside - places[cell]) / (places[cell + 1] - places[cell])
-        index = np.arange(count)
-        return csr_matrix(
-            (
-                np.concatenate([1.0 - share, share]),
-                (np.concatenate([index, index]), np.concatenate([left, left + 1])),
-            ),
-            shape=(count, len(self)),
-        )
+        index = np.tile(np.arange(len(travel_m)), 2)
+        entries = np.concatenate([left, left + 1])
+        weights = np.concatenate([1.0 - share, share])
+        return csr_matrix((weights, (index, entries)), shape=(len(travel_m), len(self)))
 
     def elapsed_s(self, number: int, slowness: np.ndarray, travel_m: np.ndarray) -> np.ndarray:
         """Time from the begin of an opening to places (M,) in it, for slowness (n,) [s/m]."""

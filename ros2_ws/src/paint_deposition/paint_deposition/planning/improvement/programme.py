@@ -72,7 +72,7 @@ class Programme:
         """From a motion as recorded or programmed.
 
         Raises:
-            PlanError: the gun never sprays on a move, or the recording starts anew in between.
+            PlanError: the gun never sprays on a move, or its clock goes back in between.
         """
         screen = PoseScreen(gap_ns(max_pose_gap_s))
         batch = PoseBatch(

@@ -8,10 +8,11 @@ tangent keeps to the limit.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import clarabel
 import numpy as np
-from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, vstack
+from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
 from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes, SpeedBounds
@@ -41,13 +42,12 @@ WORDS = {
 }
 
 
-@dataclass(frozen=True)
-class Rows:
+class Rows(NamedTuple):
     """Constraints matrix @ x <= limit of one name."""
 
     name: str
     matrix: csr_matrix
-    limit: np.ndarray
+    limit: float | np.ndarray = 0.0
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,9 @@ def _step(problem: Problem, now: Density) -> Density:
     count = len(problem.nodes)
     # A multiplier times a density is what its limit costs, in the units of the objective.
     costs = multipliers * float(values[:count].mean())
-    names = np.repeat([rows.name for rows in constraints], [len(r.limit) for r in constraints])
+    names = np.repeat(
+        [rows.name for rows in constraints], [r.matrix.shape[0] for r in constraints]
+    )
     binding = [name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in WORDS]
     flow = values[count:]
     if not problem.request.flow_is_free:
@@ -170,10 +172,11 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     linear[count:] -= request.time_weight * seconds / (now.flow * problem.given_s)
     pairs = nodes.paired
     mean = float(weights @ now.density / weights.sum())
-    slope = _linear('', problem.size, [(pairs + 1, 1.0), (pairs, -1.0)]).matrix.toarray() / mean
+    unit = np.eye(problem.size)
+    slope = (unit[pairs + 1] - unit[pairs]) / mean
     slope *= (SLOPE_M / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
-    # Keeps the problem definite where no film tells, and flows where they are.
+    # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
     matrix[np.arange(count, problem.size), np.arange(count, problem.size)] += 1e-4
     linear[count:] -= 1e-4 * now.flow
@@ -196,65 +199,39 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
 
 
 def _constraints(problem: Problem, now: Density) -> list[Rows]:
-    nodes, limits, count, size = problem.nodes, problem.request, len(problem.nodes), problem.size
-    every = np.arange(count)
-    of_opening = count + nodes.opening
+    nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
+    unit = identity(problem.size, format='csr')
+    # At each node: the density, and the flow of its opening.
+    y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest = problem.bounds.greatest_m_per_s
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
-    rows = []
+    rows = [Rows('slowest', y - diags(1.0 / least) @ f), Rows('positive', -y[closable])]
     for name in (ROBOT, BEND, LEAD):  # y >= f / v
-        some = every[(problem.bounds.named == name) & ~problem.open_ends]
-        rows.append(_linear(name, size, [(some, -1.0), (of_opening[some], 1.0 / greatest[some])]))
-    rows.append(_linear('slowest', size, [(every, 1.0), (of_opening, -1.0 / least)]))
-    rows.append(_linear('positive', size, [(every[problem.open_ends], -1.0)]))
+        some = np.flatnonzero((problem.bounds.named == name) & ~closable)
+        rows.append(Rows(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
     # Nodes from which the gun sprays on to the next one for certain.
     pairs = nodes.paired
-    pairs = pairs[~problem.open_ends[pairs] & ~problem.open_ends[pairs + 1]]
-    step = nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]
-    flow = now.flow[nodes.opening[pairs]]
+    pairs = pairs[~closable[pairs] & ~closable[pairs + 1]]
+    reach = limits.acceleration_m_per_s2 * (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs])
+    rise = y[pairs + 1] - y[pairs]
     for node in (pairs, pairs + 1):
         # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
-        ratio = now.density[node] / flow
-        reach = limits.acceleration_m_per_s2 * step
-        rows += [
-            _linear('acceleration', size, [
-                (pairs + 1, sign), (pairs, -sign), (node, -3.0 * reach * ratio**2),
-                (of_opening[pairs], 2.0 * reach * ratio**3),
-            ])
-            for sign in (1.0, -1.0)
-        ]  # fmt: skip
-    inner = pairs[:-1][np.diff(pairs) == 1] + 1
-    step = 0.5 * (nodes.travel_m[inner + 1] - nodes.travel_m[inner - 1])
-    ratio = now.density[inner] / now.flow[nodes.opening[inner]]
-    reach = limits.jerk_m_per_s3 * step**2
+        ratio = now.slowness(nodes)[node]
+        most = diags(3.0 * reach * ratio**2) @ y[node] - diags(2.0 * reach * ratio**3) @ f[pairs]
+        rows += [Rows('acceleration', rise - most), Rows('acceleration', -rise - most)]
     # y^4 / f^3, for the change of slowness by the jerk alone.
-    rows += [
-        _linear('jerk', size, [
-            (inner + 1, sign), (inner, -2.0 * sign), (inner - 1, sign),
-            (inner, -4.0 * reach * ratio**3), (of_opening[inner], 3.0 * reach * ratio**4),
-        ])
-        for sign in (1.0, -1.0)
-    ]  # fmt: skip
-    flows = count + np.arange(len(nodes.openings))
+    inner = pairs[:-1][np.diff(pairs) == 1] + 1
+    reach = (
+        limits.jerk_m_per_s3 * (0.5 * (nodes.travel_m[inner + 1] - nodes.travel_m[inner - 1])) ** 2
+    )
+    ratio = now.slowness(nodes)[inner]
+    bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
+    most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
+    rows += [Rows('jerk', bend - most), Rows('jerk', -bend - most)]
     given = np.array([opening.flow for opening in nodes.openings])
-    rows.append(_linear('flow', size, [(flows, 1.0)], limits.flow[1] * given))
-    rows.append(_linear('flow', size, [(flows, -1.0)], -limits.flow[0] * given))
-    return [row for row in rows if len(row.limit) and row.name not in problem.without]
-
-
-def _linear(
-    name: str,
-    size: int,
-    terms: Sequence[tuple[np.ndarray, float | np.ndarray]],
-    limit: np.ndarray | None = None,
-) -> Rows:
-    """Sums of coefficients times entries, one row for each, at most the limit, 0 by default."""
-    count = len(terms[0][0])
-    index = np.tile(np.arange(count), len(terms))
-    column = np.concatenate([entries for entries, _ in terms])
-    value = np.concatenate([np.broadcast_to(v, count) for _, v in terms])
-    matrix = coo_matrix((value, (index, column)), shape=(count, size)).tocsr()
-    return Rows(name, matrix, np.zeros(count) if limit is None else limit)
+    rows.append(Rows('flow', unit[count:], limits.flow[1] * given))
+    rows.append(Rows('flow', -unit[count:], -limits.flow[0] * given))
+    return [row for row in rows if row.matrix.shape[0] and row.name not in problem.without]
 
 
 def _minimised(
@@ -263,7 +240,9 @@ def _minimised(
     """The solution and the multipliers of all constraints, or None where none keeps them."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    limit = np.concatenate([rows.limit for rows in constraints])
+    limit = np.concatenate(
+        [np.broadcast_to(rows.limit, rows.matrix.shape[0]) for rows in constraints]
+    )
     solver = clarabel.DefaultSolver(
         csc_matrix(np.triu(matrix)), linear,
         csc_matrix(vstack([rows.matrix for rows in constraints])), limit,

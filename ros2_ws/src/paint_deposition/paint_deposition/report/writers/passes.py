@@ -18,11 +18,9 @@ from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
-from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.surface import Surface
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan, TradeOffPoint
@@ -75,18 +73,18 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
 
 def write_plan(
     folder: str | Path,
-    plan: Plan | PartPlan,
-    surface: Surface,
+    result: Plan | PartPlan | Improvement,
     details: Mapping[str, Any] | None = None,
     part: tuple[str, Rigid] | None = None,
 ) -> list[Path]:
-    """Write ``plan.json``, bag, ``passes.csv``, ``passes.mod``, ``model.yaml`` and the film.
+    """Write figures, bag, ``passes.csv``, ``passes.mod``, ``model.yaml`` and the film.
 
     An older plan in the folder is replaced.
 
     Args:
         folder: where to; made if it is not there.
-        details: more to say in plan.json, such as the files used.
+        result: its figures are in ``plan.json``, those of an improvement in ``improvement.json``.
+        details: more to say in the figures, such as the files used.
         part: the robot's frame and the pose of the part in it; bag and table have their poses
             in that frame then, and the module defines its work object so.
 
@@ -96,50 +94,15 @@ def write_plan(
     Raises:
         PaintError: the folder cannot be written, or holds another folder of the bag's name.
     """
-    folder = Path(folder)
+    folder, improved = Path(folder), isinstance(result, Improvement)
+    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     with writable(folder):
-        names = write_passes(
-            folder, Passes(plan.trajectory, plan.moves, plan.model, 'Planned', part)
-        )
-        told = {**plan.to_dict(), DIGEST: model_digest(plan.model), **(details or {})}
-        write_json(folder / PLAN_FILE, told)
-    film = write_film(folder, surface, plan.film_um, plan.statistics, overwrite=True)
-    names = [PLAN_FILE, *names, *(file.name for file in film)]
-    return [folder / name for name in names]
-
-
-def write_improvement(
-    folder: str | Path,
-    result: Improvement,
-    details: Mapping[str, Any] | None = None,
-    part: tuple[str, Rigid] | None = None,
-) -> list[Path]:
-    """Write ``improvement.json``, bag, ``passes.csv``, ``passes.mod``, model and film.
-
-    Args:
-        folder: where to; made if it is not there.
-        details: more to say in the figures, such as the files used.
-        part: the robot's frame and the pose of the part in it, as for a plan.
-
-    Returns:
-        The paths written.
-
-    Raises:
-        PaintError: the folder cannot be written, or holds another folder of the bag's name.
-    """
-    folder = Path(folder)
-    passes = Passes(result.trajectory, result.moves, result.model, 'Improved', part)
-    with writable(folder):
+        passes = Passes(result.trajectory, result.moves, result.model, made, part)
         names = write_passes(folder, passes)
-        told = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
-        write_json(folder / IMPROVEMENT_FILE, told)
-    off = result.tolerance * result.target_um
-    statistics = film_statistics(
-        result.after.film_um, result.surface.vertex_areas_m2, result.after.paint_cm3,
-        target_um=result.target_um, target_tolerance_um=off,
-    )  # fmt: skip
-    film = write_film(folder, result.surface, result.after.film_um, statistics, overwrite=True)
-    return [folder / name for name in (IMPROVEMENT_FILE, *names)] + film
+        figures = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
+        write_json(folder / name, figures)
+    film = write_film(folder, result.surface, result.film_um, result.statistics, overwrite=True)
+    return [folder / one for one in (name, *names, *(file.name for file in film))]
 
 
 def write_trade_off_table(path: str | Path, points: Sequence[TradeOffPoint]) -> Path:
@@ -192,7 +155,7 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
 
 
 def _in_frame(trajectory: Trajectory, part: tuple[str, Rigid] | None) -> Trajectory:
-    """The poses as the robot tells them."""
+    """The poses in the frame that is written."""
     if part is None:
         return trajectory
     frame_id, place = part

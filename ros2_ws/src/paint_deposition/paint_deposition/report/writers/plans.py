@@ -25,7 +25,6 @@ from paint_deposition.report.pictures.planning import (
 )
 from paint_deposition.report.writers.measuring import write_chosen_readings
 from paint_deposition.report.writers.passes import (
-    write_improvement,
     write_plan,
     write_trade_off_table,
 )
@@ -65,7 +64,7 @@ def _plan(
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_plan(folder, result, result.surface, about, part)
+    files = write_plan(folder, result, about, part)
     film = write_film_picture(
         Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
         result.statistics, 'Planned passes and their film', result.sentence,
@@ -99,7 +98,7 @@ def _improvement(
     notes = {'notes': (*result.surface.notes, *result.given.notes)}
     about = with_provenance(notes | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_improvement(folder, result, about, part)
+    files = write_plan(folder, result, about, part)
     picture = Path(folder) / f'improvement.{pictures}'
     files.append(write_improvement_picture(picture, result))
     if trade_off:
