@@ -34,7 +34,7 @@ _QUANTITIES = ', '.join(get_args(Quantity))
 
 
 Name = Annotated[str, BeforeValidator(str)]
-# Keys that only tell the reader of the report what it is about.
+# Keys for the head of the report only.
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
 
@@ -77,7 +77,7 @@ class _Files(BaseModel):
 
 
 class _Brushed(MotionSource):
-    """A motion, and its brush where the recording does not tell it."""
+    """A motion, and its brush where the recording has none."""
 
     brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
         None, description='the number of the brush, where the recording names none'

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -129,7 +130,7 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
             for name in workbook.sheet_names
             for sheet in [workbook.get_sheet_by_name(name)]
         ]
-    except (CalamineError, zipfile.BadZipFile) as error:
+    except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
         raise ValueError(f'a workbook ({error})') from None
 
 
