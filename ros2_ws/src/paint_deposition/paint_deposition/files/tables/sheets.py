@@ -156,8 +156,9 @@ def _sheet_of_parquet(content: bytes) -> Sheet:
     try:
         file = pq.ParquetFile(BytesIO(content))
         # A few bytes may claim any number of rows.
-        if file.metadata.num_rows * file.metadata.num_columns > MOST_CELLS:
-            raise ValueError(f'more than {MOST_CELLS} values')
+        cells = file.metadata.num_rows * file.metadata.num_columns
+        if cells > MOST_CELLS:
+            raise ValueError(f'{cells} values, more than {MOST_CELLS}')
         table = file.read()
         columns = [
             ['' if value is None or value != value else _cell(value) for value in column]
