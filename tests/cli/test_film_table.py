@@ -68,7 +68,15 @@ def test_a_table_that_claims_too_much_is_refused_before_it_is_read(tmp_path):
     path = tmp_path / 'large.parquet'
     pq.write_table(pa.table({'x_m': zeros, 'thickness_um': zeros}), path)
     assert path.stat().st_size < 100_000
-    with pytest.raises(ReadingsError, match='more than 10000000 values'):
+    with pytest.raises(ReadingsError, match='10000002 values, more than 10000000'):
+        read_readings(path)
+
+
+def test_texts_that_are_none_are_refused(tmp_path):
+    path = tmp_path / 'labels.parquet'
+    pq.write_table(pa.table({'point': ['door'], 'thickness_um': [20.0]}), path, compression='none')
+    path.write_bytes(path.read_bytes().replace(b'door', b'\xff\xfe\xfd\xfc'))
+    with pytest.raises(ReadingsError, match='cannot be read as Parquet'):
         read_readings(path)
 
 

@@ -46,10 +46,10 @@ def changed_readings(folder: Path, change) -> str:
 
 
 def test_the_sample_arrives_whole(repository):
-    told = []
-    campaign = read_campaign(repository / SAMPLE / 'campaign.yaml', told.append)
+    lines = []
+    campaign = read_campaign(repository / SAMPLE / 'campaign.yaml', lines.append)
     assert [e.name for e in campaign.experiments] == ['panel', 'door']
-    assert told[0] == 'reading panel'
+    assert lines[0] == 'reading panel'
     door = campaign.experiments[1]
     assert len(door.readings) == len(campaign.readings) - len(campaign.experiments[0].readings)
     assert len(door.points) == 3 * len(door)  # each with a neighbour up and one down the surface
@@ -72,8 +72,8 @@ def test_down_and_the_model_are_taken_over(campaign, folder):
 
 
 def test_part_batch_and_target_are_taken_over(campaign):
-    told = {'part': 'door', 'batch': 4711, 'date': '2026-11-21', 'target_um': 25}
-    read = read_campaign(campaign(top=told | {'tolerance_um': 3.5}))
+    head = {'part': 'door', 'batch': 4711, 'date': '2026-11-21', 'target_um': 25}
+    read = read_campaign(campaign(top=head | {'tolerance_um': 3.5}))
     assert read.head == {'part': 'door', 'batch': '4711', 'date': '2026-11-21'}
     assert (read.target_um, read.tolerance_um) == (25.0, 3.5)
     without = read.without(np.arange(len(read.readings)) == 0)
@@ -127,7 +127,7 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'top': {'target_um': -1, 'tolerance_um': 1}}, 'target_um is -1; expected the film want'),
     ],
 )
-def test_a_fault_is_told_in_one_line(campaign, changes, message):
+def test_a_fault_is_refused_in_one_line(campaign, changes, message):
     path = campaign(**changes)
     with pytest.raises(PaintError, match=message) as refused:
         read_campaign(path)

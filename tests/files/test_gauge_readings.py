@@ -82,7 +82,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
         ),
     ],
 )
-def test_a_fault_is_told_in_one_line(table, lines, message):
+def test_a_fault_is_refused_in_one_line(table, lines, message):
     path = table(*lines)
     with pytest.raises(ReadingsError, match=message) as refused:
         read_readings(path)
@@ -90,7 +90,7 @@ def test_a_fault_is_told_in_one_line(table, lines, message):
     assert '\n' not in str(refused.value)
 
 
-def test_all_faults_of_a_file_are_told_at_once(table):
+def test_all_faults_of_a_file_are_named_at_once(table):
     path = table(HEADER, '0,a,0,20', '0,0,0,21', '0,0,0,9999', '0,0', '0,0,0,20', 'b,0,0,20')
     with pytest.raises(ReadingsError) as refused:
         read_readings(path)

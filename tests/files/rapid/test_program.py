@@ -246,7 +246,7 @@ def test_what_is_written_is_read_back(tmp_path_factory, moves):
     read = read_program(path).moves
     assert [move.spraying for move in read] == [move.spraying for move in moves]
     for planned, again in zip(moves, read, strict=True):
-        # 0.01 mm is asked for; the module has three decimals.
+        # The module has three decimals.
         np.testing.assert_allclose(again.position_m, planned.position_m, rtol=0, atol=0.6e-6)
         turned = Rotation.from_quat(again.quaternion_xyzw).inv() * Rotation.from_quat(
             planned.quaternion_xyzw

@@ -91,7 +91,7 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
     assert gun.notes == ()
 
 
-def test_a_state_that_sprays_with_flow_0_is_told(tmp_path):
+def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
     messages = Messages()
     entries = pose_entries(straight_pass(triggers=False))
     entries += [('/state', START_NS + 1, messages.state(START_NS, True, 0.0, 60.0))]

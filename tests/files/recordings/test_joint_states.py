@@ -125,7 +125,7 @@ def test_what_is_missing_is_said(given, words, arm, tmp_path):
 
 def test_joints_that_are_not_recorded_are_named(arm, tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of(sweep()[:, :5], JOINTS[:5]))
-    with pytest.raises(RecordingError, match=r'tells nothing of wrist_roll of arm\.urdf'):
+    with pytest.raises(RecordingError, match=r'has nothing of wrist_roll of arm\.urdf'):
         read_recording(bag, urdf=str(arm))
 
 

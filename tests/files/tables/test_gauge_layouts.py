@@ -106,7 +106,7 @@ def file(tmp_path):
 
 
 def require_the_four_readings(readings, within_um=1e-9):
-    """All layouts tell of the same four readings at the same three points."""
+    """All layouts hold the same four readings at the same three points."""
     assert readings.thickness_um == pytest.approx([21.5, 22.1, 24.0, 19.4], abs=within_um)
     assert readings.point.tolist() == ['A1', 'A1', 'A2', 'A3']
     assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
@@ -261,7 +261,7 @@ def test_columns_unit_and_decimals_can_be_named(file):
         read_readings(path, layout=Layout(columns={'thickness': 'clea'}))
 
 
-def test_thousands_are_told_from_decimals(file):
+def test_thousands_differ_from_decimals(file):
     text = 'x [mm];y [mm];z [mm];DFT [µm]\n1.250,5;0,0;-1.000,0;20,25\n'
     readings = read_readings(file('a.csv', text))
     assert readings.positions_m.tolist() == [[1.2505, 0.0, -1.0]]

@@ -216,7 +216,8 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     """
     from tqdm import tqdm
 
-    from paint_deposition.files.recordings.mcap_recovery import mcap_files, recover
+    from paint_deposition.files.recordings.bag_files import mcap_files
+    from paint_deposition.files.recordings.mcap_recovery import recover
 
     output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
     size = sum(file.stat().st_size for file in mcap_files(run))

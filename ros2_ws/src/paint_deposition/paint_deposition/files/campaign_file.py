@@ -39,7 +39,7 @@ _QUANTITIES = ', '.join(get_args(Quantity))
 Name = Annotated[str, BeforeValidator(str)]
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
-# Keys that only tell the reader of the report what it is about.
+# Keys for the head of the report only.
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
 
@@ -82,7 +82,7 @@ class _Files(BaseModel):
 
 
 class _Brushed(MotionSource):
-    """A motion, and its brush where the recording does not tell it."""
+    """A motion, and its brush where the recording has none."""
 
     brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
         None, description='the number of the brush, where the recording names none'

@@ -1,4 +1,4 @@
-"""The bodies in a mesh file, by name, and the unit that the file tells."""
+"""The bodies in a mesh file, by name, and the unit of the file."""
 
 from __future__ import annotations
 
@@ -33,11 +33,11 @@ SHOWN_NAMES = 8
 
 @dataclass(frozen=True)
 class Bodies:
-    """What of a mesh file was asked for.
+    """What was read of a mesh file.
 
     Attributes:
         vertices: (V, 3) in the file's own unit, and precision. faces: (F, 3).
-        unit_m: metres to the unit, 1 where the file tells none.
+        unit_m: metres to the unit, 1 where the file has none.
         notes: what was understood of unit and bodies, for the user.
     """
 
@@ -109,7 +109,7 @@ def _scene(path: Path, kind: str) -> Scene:
         options |= {'validate': False, 'split_objects': True} if kind == '.obj' else {}
         source: Any = BytesIO(content)
     elif kind == '.glb':
-        # A file would be asked for as many bytes at once as its head claims.
+        # A file would be read for as many bytes at once as its head claims.
         source = BytesIO(path.read_bytes())
         options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
     else:
@@ -159,7 +159,7 @@ def _joined(bodies: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray
 
 
 def _unit(path: Path, kind: str, scene: Scene) -> tuple[float, str]:
-    """Metres to the unit of a file that tells it, and how that was understood."""
+    """Metres to the unit of a file that has one, and how that was understood."""
     if kind in ('.gltf', '.glb'):
         return 1.0, 'glTF, in metres by its standard'
     if kind in ('.step', '.stp'):

@@ -40,7 +40,7 @@ def read_mesh(
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
         scale: metres per unit of the file, 0.001 for millimetres. glTF is in metres, and 3MF and
-            STEP tell their unit: there it comes on top, for files whose unit is wrong.
+            STEP have their unit: there it comes on top, for files whose unit is wrong.
         max_edge_length_m: longest edge after refinement [m].
         down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.

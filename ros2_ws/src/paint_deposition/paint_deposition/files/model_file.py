@@ -14,11 +14,12 @@ from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.brushes import read_brushes
 from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
+from paint_deposition.model.brush import MOST, Brush, SetPoints
+from paint_deposition.model.brush_law import BrushLaw
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 
@@ -26,6 +27,8 @@ WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: '
 KEYS = (
     'name', 'planar', 'brushes', 'projection', 'effects', 'uncertainty', 'posterior', 'history',
 )  # fmt: skip
+
+BRUSH_KEYS = ('planar', *SetPoints.model_fields)
 
 LoadEffect = Callable[[Path], type[Effect]]
 
@@ -153,8 +156,51 @@ def _patterns(content: dict[str, Any]) -> DepositionModel:
         return DepositionModel(planar=_section(PlanarPattern, 'planar', content))
     if content.get('planar') is not None:
         raise ModelError('planar and brushes are both given; keep one of them')
-    brushes = read_brushes(_given(dict, 'brushes', content))
+    brushes = _brushes(_given(dict, 'brushes', content))
     return DepositionModel.of_brushes(brushes)
+
+
+def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
+    """The brushes of a section; those without a pattern are interpolated between the others.
+
+    Raises:
+        ModelError: one line that names the brush, the key, its value and the remedy.
+    """
+    if not section:
+        raise ModelError('brushes is empty; give a brush by its number, or planar')
+    for number in section:
+        if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
+            raise ModelError(f'brushes: {number!r} is no number of a brush; give 1, 2 and so on')
+    read = {number: _entry(number, entry) for number, entry in section.items()}
+    calibrated = [_brush(n, planar, at) for n, (planar, at) in read.items() if planar]
+    law = BrushLaw(tuple(calibrated))
+    between = [
+        _brush(n, law.pattern(f'brushes, {n}', at), at, interpolated=True)
+        for n, (planar, at) in read.items()
+        if planar is None
+    ]
+    return [*calibrated, *between]
+
+
+def _brush(number: int, planar: PlanarPattern, at: SetPoints, interpolated: bool = False) -> Brush:
+    return Brush(number=number, planar=planar, interpolated=interpolated, **at.model_dump())
+
+
+def _entry(number: int, entry: Any) -> tuple[PlanarPattern | None, SetPoints]:
+    """Pattern, None where it is to be interpolated, and set-points of an entry."""
+    where = f'brushes, {number}'
+    if not isinstance(entry, dict):
+        raise ModelError(f'{where} is {entry!r}; expected a mapping (key: value)')
+    for key in entry:
+        if key not in BRUSH_KEYS:
+            raise ModelError(f'{where}: unknown key {key!r}; {did_you_mean(key, BRUSH_KEYS)}')
+    settings = {key: value for key, value in entry.items() if key != 'planar'}
+    set_points = checked(SetPoints, where, settings, ModelError)
+    if 'planar' not in entry:
+        return None, set_points
+    if not isinstance(entry['planar'], dict):
+        raise ModelError(f'{where}: planar is {entry["planar"]!r}; expected a mapping')
+    return checked(PlanarPattern, f'{where}: planar', entry['planar'], ModelError), set_points
 
 
 def _section(cls: type[Made], key: str, content: dict[str, Any]) -> Made:

@@ -133,8 +133,8 @@ def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
         )
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
-        topics = f'/{gun}{POSE_TOPIC}', state and state.name
-        return trajectory_of(bag, *topics, source.tf, robot)
+        trigger = state.name if state else None
+        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, source.tf, robot)
     # A plan's bag says itself what its trigger is.
     planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
     trigger = source.state_topic or planned

@@ -56,7 +56,7 @@ class RapidData:
         return expression
 
     def number(self, expression: object, name: str) -> float:
-        """The number that an expression stands for; `name` tells it in the refusal."""
+        """The number that an expression stands for; `name` is for the refusal."""
         value = self.value(expression)
         if not _is_number(value):
             self.fail(f'{name} is {value!r}; a number expected')

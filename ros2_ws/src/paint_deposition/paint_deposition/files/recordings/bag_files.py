@@ -4,6 +4,7 @@ Only the types of the topics that are read are parsed: one exotic topic, such as
 events that rosbags does not understand, does not make the poses beside it unreadable.
 """
 
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import yaml
+from mcap.writer import MCAP0_MAGIC
 from rosbags.interfaces import Connection, MessageDefinitionFormat
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -20,7 +22,6 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_files
 
 # The key of a bag's custom data under which a plan says which topic is its trigger.
 TRIGGER = 'trigger_topic'
@@ -186,6 +187,38 @@ def custom_data(path: Path) -> dict[str, str]:
         return {}
 
 
+def mcap_files(path: Path) -> list[Path]:
+    """The MCAP files of a run: those of the folder in their order, or the one file given.
+
+    Raises RecordingError when the files of a folder belong to several runs.
+    """
+    if path.is_file():
+        return [path]
+    files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=_number)
+    runs = {re.sub(r'_\d+$', '', file.stem) for file in files}
+    if len(runs) > 1:
+        names = ' '.join(file.name for file in files)
+        raise RecordingError(f'{path} holds several recordings; name one of them: {names}')
+    return files
+
+
+def _number(file: Path) -> tuple[int, str]:
+    number = re.search(r'_(\d+)$', file.stem)
+    return (int(number[1]) if number else 0, file.name)
+
+
+def _is_unfinished(path: Path) -> bool:
+    """True for a file that begins as MCAP and does not end as one."""
+    with path.open('rb') as stream:
+        if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+            return False
+        size = stream.seek(0, 2)
+        if size < 2 * len(MCAP0_MAGIC):
+            return True
+        stream.seek(-len(MCAP0_MAGIC), 2)
+        return stream.read() != MCAP0_MAGIC
+
+
 def _refuse_what_is_no_bag(path: Path) -> None:
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
@@ -200,7 +233,7 @@ def _refuse_what_is_no_bag(path: Path) -> None:
     elif path.stat().st_size == 0:
         raise RecordingError(f'{path} is empty')
     for file in mcap_files(path):
-        if is_unfinished(file):
+        if _is_unfinished(file):
             raise RecordingError(_unfinished(path, f'{file.name} has no end'))
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))

@@ -125,7 +125,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
 
 def _other_motion(bag: Bag) -> str:
-    """What else in a bag tells of motion, for a message."""
+    """What else in a bag has a motion, for a message."""
     moves = []
     if bag.topics_of(*TF_TYPES):
         moves.append('transforms (--tf TARGET SOURCE)')

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.mcap_recovery import mcap_files
+from paint_deposition.files.recordings.bag_files import mcap_files
 
 FILM_FILE = 'film.json'
 METADATA_FILE = 'metadata.yaml'

@@ -13,6 +13,6 @@ def stamp_ns(header: Any) -> int:
 
 
 def set_points_of(state: Any) -> tuple[float, ...]:
-    """The set-points of a state, as those of a trajectory; 0 where it does not tell one."""
+    """The set-points of a state, as those of a trajectory; 0 where it has none."""
     known = (abs(float(getattr(state, name, 0.0))) for name in SET_POINTS)
     return tuple(value if math.isfinite(value) else 0.0 for value in known)

@@ -140,7 +140,7 @@ def read_joint_poses(
     missing = [name for name in rows if len(rows[name]) < 2]
     if missing or not rows:
         raise RecordingError(
-            f'{topic.name} in {bag.path} tells nothing of {" ".join(missing) or "any joint"} of '
+            f'{topic.name} in {bag.path} has nothing of {" ".join(missing) or "any joint"} of '
             f'{robot.path.name}; its joints: {" ".join(sorted(seen)) or "none"}'
         )
     columns = {

@@ -1,7 +1,6 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
 import mmap
-import re
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
@@ -25,6 +24,7 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bag_files import mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
@@ -58,18 +58,6 @@ class Recovery:
     @property
     def message_count(self) -> int:
         return sum(self.counts.values())
-
-
-def is_unfinished(path: Path) -> bool:
-    """True for a file that begins as MCAP and does not end as one."""
-    with path.open('rb') as stream:
-        if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            return False
-        size = stream.seek(0, 2)
-        if size < 2 * len(MCAP0_MAGIC):
-            return True
-        stream.seek(-len(MCAP0_MAGIC), 2)
-        return stream.read() != MCAP0_MAGIC
 
 
 def recover(
@@ -114,21 +102,6 @@ def recover(
     return recovery
 
 
-def mcap_files(path: Path) -> list[Path]:
-    """The MCAP files of a run: those of the folder in their order, or the one file given.
-
-    Raises RecordingError when the files of a folder belong to several runs.
-    """
-    if path.is_file():
-        return [path]
-    files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=_number)
-    runs = {re.sub(r'_\d+$', '', file.stem) for file in files}
-    if len(runs) > 1:
-        names = ' '.join(file.name for file in files)
-        raise RecordingError(f'{path} holds several recordings; name one of them: {names}')
-    return files
-
-
 def _refuse_what_is_no_mcap(path: Path, files: list[Path]) -> None:
     if not path.exists():
         raise RecordingError(f'{path} does not exist')
@@ -138,11 +111,6 @@ def _refuse_what_is_no_mcap(path: Path, files: list[Path]) -> None:
         with file.open('rb') as stream:
             if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
                 raise RecordingError(f'{file} is not an MCAP file; nothing to recover')
-
-
-def _number(file: Path) -> tuple[int, str]:
-    number = re.search(r'_(\d+)$', file.stem)
-    return (int(number[1]) if number else 0, file.name)
 
 
 @dataclass

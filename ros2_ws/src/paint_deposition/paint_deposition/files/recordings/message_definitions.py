@@ -15,7 +15,7 @@ from paint_deposition.errors import RecordingError
 SEPARATOR = '=' * 80
 # The layout of messages that this package serialises itself, without a ROS installation.
 STANDARD_STORE = Stores.ROS2_KILTED
-# Messages that tell of motion beside poses.
+# Messages that hold motion beside poses.
 JOINT_TYPE = 'sensor_msgs/msg/JointState'
 TF_TYPES = ('tf2_msgs/msg/TFMessage', 'tf/msg/tfMessage')
 # The state of the atomizer, as `paint_msgs` defines it.

@@ -58,15 +58,15 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
                 pair = transform.header.frame_id.lstrip('/'), transform.child_frame_id.lstrip('/')
                 row = (stamp_ns(transform.header), log_time_ns, _numbers(transform.transform))
                 found.setdefault(pair, []).append(row)
-    for (parent, child), found in parts.items():
-        if len({pose for *_, pose in found}) > 1:
+    for (parent, child), placings in parts.items():
+        if len({pose for *_, pose in placings}) > 1:
             raise RecordingError(
                 f"{bag.path}: '{child}' was placed anew in '{parent}' while the run was recorded; "
                 'give --part-pose'
             )
     # Of a static transform that is sent again, the last holds, as in tf2.
     last = slice(-1, None) if static else slice(None)
-    return [_edge(*pair, found[last]) for pair, found in (parts | rows).items()]
+    return [_edge(*pair, its[last]) for pair, its in (parts | rows).items()]
 
 
 def _numbers(transform: Any) -> tuple[float, ...]:

@@ -17,7 +17,7 @@ from paint_deposition.motion.trajectory import numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
-# What a state tells of the process while the gun sprays.
+# What a state says of the process while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 MOST_FIELDS = 12
 
@@ -28,9 +28,9 @@ class Switching:
 
     Attributes:
         stamps_ns: (M,) int64 times at which the flow changes; flow: (M,) from then on.
-        brush: (M,) int64 number of the brush from then on; empty where nothing tells it.
-        set_points: (M, 4) as those of a trajectory; empty where nothing tells any.
-        settings: median of each setting that the states tell.
+        brush: (M,) int64 number of the brush from then on; empty where it is not recorded.
+        set_points: (M, 4) as those of a trajectory; empty where none are recorded.
+        settings: median of each setting in the states.
         by_log_time: whether the times are those at which messages were logged.
         notes: what was understood, a line each.
     """

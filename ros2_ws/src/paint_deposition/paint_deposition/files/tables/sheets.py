@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import re
 import zipfile
+import zlib
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO, StringIO
@@ -129,7 +130,7 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
             for name in workbook.sheet_names
             for sheet in [workbook.get_sheet_by_name(name)]
         ]
-    except (CalamineError, zipfile.BadZipFile) as error:
+    except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
         raise ValueError(f'a workbook ({error})') from None
 
 
@@ -155,8 +156,9 @@ def _sheet_of_parquet(content: bytes) -> Sheet:
     try:
         file = pq.ParquetFile(BytesIO(content))
         # A few bytes may claim any number of rows.
-        if file.metadata.num_rows * file.metadata.num_columns > MOST_CELLS:
-            raise ValueError(f'more than {MOST_CELLS} values')
+        cells = file.metadata.num_rows * file.metadata.num_columns
+        if cells > MOST_CELLS:
+            raise ValueError(f'{cells} values, more than {MOST_CELLS}')
         table = file.read()
         columns = [
             ['' if value is None or value != value else _cell(value) for value in column]

@@ -27,7 +27,9 @@ SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 
 class Header(Protocol):
     """What is known of the columns under a row of headings."""
 
-    header: int
+    @property
+    def header(self) -> int:
+        """Row of the headings, -1 where there are none."""
 
     @property
     def score(self) -> int:
