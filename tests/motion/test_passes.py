@@ -176,22 +176,6 @@ def test_a_gun_that_opens_again_on_another_track_begins_a_pass(shift_m, passes):
     assert path.spray_pass.max() == passes - 1
 
 
-def test_a_gun_that_opens_at_the_corner_of_the_approach_counts_the_pass_from_zero():
-    rows = [(0.0, -0.5), (0.0, 0.0), (1.0, 0.0), (1.0, 0.3), (0.0, 0.3)]
-    xy, at_m = resampled(rows, 0.003)
-    trajectory = Trajectory(
-        scenes.stamps_ns(at_m / 0.3),
-        np.column_stack([xy, np.full(len(xy), 0.25)]),
-        np.tile(scenes.LOOKING_DOWN, (len(xy), 1)),
-        trigger_stamps_ns=scenes.stamps_ns([0.5 / 0.3]),
-        trigger_flow=np.ones(1),
-    )
-    path, _ = spray_path(trajectory)
-    for number, y in enumerate((0.0, 0.3)):
-        row = np.argmin(np.linalg.norm(path.position_m[:, :2] - [0.5, y], axis=1))
-        assert path.spray_pass[row] == number
-
-
 @pytest.mark.parametrize('angle_deg', [65.0, 90.0, 120.0, 180.0])
 @pytest.mark.parametrize('noise_m', [0.0, 2e-4])
 def test_a_turn_is_placed_where_the_path_turns(angle_deg, noise_m):

@@ -75,12 +75,6 @@ def test_the_trigger_cuts_within_a_segment():
     assert set(path.flow) == {0.0, 0.7, 1.0}
 
 
-def test_without_trigger_the_gun_always_sprays():
-    path, _ = spray_path(scenes.straight_pass(TIMES_S))
-    assert path.spraying_time_s == pytest.approx(TIMES_S[-1], rel=1e-12)
-    assert np.all(path.since_on_s == np.inf)
-
-
 def test_states_that_say_the_same_again_change_no_bit():
     trajectory = scenes.straight_pass(TIMES_S, **TRIGGER)
     every_10_ms = scenes.stamps_ns(np.arange(0.0, 4.0, 0.01))
@@ -205,16 +199,6 @@ def test_a_late_trigger_is_counted_and_holds_from_there_on():
     assert painted == pytest.approx(2.0)
     assert builder.take(finish=True).spraying_time_s == 0.0
     assert builder.counts.late_triggers == 1
-
-
-def test_until_leaves_what_ends_later():
-    trajectory = scenes.straight_pass(TIMES_S)
-    builder = PathBuilder()
-    builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
-    until = int(scenes.stamps_ns(1.0))
-    assert builder.take(until).spraying_time_s == pytest.approx(1.0)
-    assert builder.newest_ns == trajectory.stamps_ns[-1]
-    assert builder.take().spraying_time_s == pytest.approx(TIMES_S[-1] - 1.0)
 
 
 @pytest.mark.parametrize('count', [0, 1])

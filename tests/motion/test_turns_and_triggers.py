@@ -47,19 +47,6 @@ def test_strokes_are_the_straight_legs():
     assert length == pytest.approx([1.2, 0.3, 1.2, 0.3, 1.2], abs=0.02)
 
 
-def test_passes_are_counted_and_links_are_not():
-    path, _ = spray_path(route(SERPENTINE))
-    passes = [set(path.spray_pass[path.stroke == stroke][10:]) for stroke in range(5)]
-    assert passes == [{0}, {0}, {1}, {1}, {2}]
-
-
-def test_no_pass_before_the_gun_opens():
-    path, _ = spray_path(sprayed_serpentine())
-    assert set(path.spray_pass[path.stamp_ns < scenes.stamps_ns(1.0)]) == {-1}
-    sprayed = path.select(path.flow > 0.0)
-    assert [set(sprayed.spray_pass[sprayed.stroke == s]) for s in (0, 2, 4)] == [{0}, {1}, {2}]
-
-
 def test_times_to_the_trigger_are_those_of_the_clock():
     path, _ = spray_path(sprayed_serpentine())
     time_s = (path.stamp_ns - scenes.START_NS) * 1e-9

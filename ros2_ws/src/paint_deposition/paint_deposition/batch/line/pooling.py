@@ -242,13 +242,10 @@ class Weighed:
         misfits: list[tuple[float, float] | None] = [None, *MISFITS]
         scales = Scales(0.02, 1.0, None)
         for _ in range(2):
-            for tried in (
-                [replace(scales, misfit=misfit) for misfit in misfits],
-                [replace(scales, noise=noise) for noise in NOISES],
-                [replace(scales, level=level) for level in LEVELS],
-            ):
+            for name, values in (('misfit', misfits), ('noise', NOISES), ('level', LEVELS)):
                 scales = max(
-                    tried, key=lambda one: LinePosterior(statistics, one).solved(chosen)[2]
+                    (replace(scales, **{name: value}) for value in values),
+                    key=lambda one: LinePosterior(statistics, one).solved(chosen)[2],
                 )
         share = np.log((1.0 - NO_MISFIT) / len(MISFITS))
         return Weighed(
