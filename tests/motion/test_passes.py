@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import scenes
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 SPEED_M_PER_S = 0.5
@@ -90,28 +87,6 @@ def test_the_rate_of_the_poses_does_not_matter(period_s):
         noise_m = 2e-4 if period_s > 0.002 else 2e-5
         path, _ = spray_path(raster(kind, size_m, 'on', noise_m, period_s))
         assert_passes_are_the_rows(path)
-
-
-@given(seed=st.integers(0, 1000), kind=st.sampled_from(['corner', 'semicircle', 'zone']))
-@settings(max_examples=20, deadline=None)
-def test_batches_do_not_matter_in_rounded_turns(seed, kind):
-    trajectory = raster(kind, 0.1, 'on', 2e-4, 0.01)
-    expected, _ = spray_path(trajectory)
-    rng = np.random.default_rng(seed)
-    builder, pieces, start = PathBuilder(whole_strokes=True), [], 0
-    builder.add_trigger(int(trajectory.stamps_ns[0]), 1.0)
-    while start < len(trajectory):
-        rows = slice(start, start + int(rng.integers(1, 200)))
-        builder.add_poses(
-            trajectory.stamps_ns[rows],
-            trajectory.positions_m[rows],
-            trajectory.quaternions_xyzw[rows],
-        )
-        pieces.append(builder.take())
-        start = rows.stop
-    path = SprayPath.joined([*pieces, builder.take(finish=True)])
-    for column in ('stroke', 'spray_pass', 'from_turn_m', 'to_turn_m', 'until_off_s'):
-        assert np.array_equal(getattr(path, column), getattr(expected, column)), column
 
 
 def arc_pass(radius_m, sweep_rad, followed, noise_m=2e-4):

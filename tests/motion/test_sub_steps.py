@@ -123,14 +123,6 @@ def test_a_cut_splits_the_time_exactly(cut_ns):
     assert dwell[~before].sum() == pytest.approx((10_000_000 - cut_ns) * 1e-9, rel=1e-12)
 
 
-def test_a_cut_at_a_pose_cuts_nothing():
-    positions = np.array([[0, 0, 0], [0.001, 0, 0], [0.002, 0, 0]])
-    quaternions = np.tile([0, 0, 0, 1.0], (3, 1))
-    whole = split([0, 10, 20], positions, quaternions)
-    cut = split([0, 10, 20], positions, quaternions, [0, 10, 20])
-    assert all(np.array_equal(a, b) for a, b in zip(whole, cut, strict=True))
-
-
 @pytest.mark.parametrize('away_m', [1e3, 1e30, 1e300])
 def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
     positions = np.array([[0, 0, 0], [away_m, 0, 0], [0.001, 0, 0]])
