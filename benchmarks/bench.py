@@ -1,6 +1,6 @@
 """Everything that `make bench` measures, side by side and as one JSON record.
 
-    python benchmarks/bench.py [--quick] [--output runs/bench]
+    python -m benchmarks.bench [--quick] [--output runs/bench]
 
 Each benchmark runs in a process of its own, one after the other. With --quick the parts are small
 and the runs short, to try it out.
@@ -18,11 +18,8 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.file_to_film import RATE_HZ, exponent  # noqa: E402
-from benchmarks.kernel import cpu_name  # noqa: E402
+from benchmarks.file_to_film import RATE_HZ, exponent
+from benchmarks.kernel import cpu_name
 
 # The arguments of each, thorough and quick.
 BENCHMARKS: dict[str, tuple[list[str], list[str]]] = {
@@ -43,8 +40,7 @@ def measured(name: str, arguments: list[str], folder: Path) -> dict[str, Any]:
     print(f'\n=== {name}', flush=True)
     told = folder / f'{name}.json'
     subprocess.run(
-        [sys.executable, str(ROOT / 'benchmarks' / f'{name}.py'), *arguments, '--json', str(told)],
-        check=True,
+        [sys.executable, '-m', f'benchmarks.{name}', *arguments, '--json', str(told)], check=True
     )
     return json.loads(told.read_text())
 

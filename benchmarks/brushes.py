@@ -6,28 +6,20 @@ several parts. Half of the models are calibrated before, half are fitted anew. R
 line by line, so that a run can be cut off and taken up again.
 """
 
-import os
-import sys
 import tempfile
 from collections import Counter
 from pathlib import Path
 
 import click
+import numpy as np
+from benchmarks.records import add, kept, results_option
+from tests.virtual_paint_shop.files import write
+from tests.virtual_paint_shop.shop import generate
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-import numpy as np  # noqa: E402
-from benchmarks.records import add, kept  # noqa: E402
-from tests.virtual_paint_shop.files import write  # noqa: E402
-from tests.virtual_paint_shop.shop import generate  # noqa: E402
-
-from paint_deposition.api.inference import calibrate, diagnose  # noqa: E402
-from paint_deposition.files.campaign_file import read_campaign  # noqa: E402
-from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
-from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
+from paint_deposition.api.inference import calibrate, diagnose
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.readings.campaign import Campaign
 
 HIDDEN = (
     'edge_build', 'faraday_shielding', 'convex_attraction', 'corner_slowdown', 'flow_drift',
@@ -86,9 +78,7 @@ def table(records: list[dict]) -> str:
 @click.option('--each', default=6, show_default=True, help='Parts with each hidden effect.')
 @click.option('--processes', default=2, show_default=True)
 @click.option('--scheduler', help='Address of a Dask scheduler, instead of processes here.')
-@click.option(
-    '--results', default=ROOT / 'runs' / 'bench-brushes.jsonl', type=click.Path(path_type=Path)
-)
+@results_option('bench-brushes.jsonl')
 def main(draws: int, each: int, processes: int, scheduler: str | None, results: Path) -> None:
     """Count false alarms and effects found on parts that two brushes painted."""
     hidden = [*[None] * draws, *(truth for truth in HIDDEN for _ in range(each))]

@@ -135,12 +135,7 @@ class PaintedCase:
     @cached_property
     def pattern(self) -> DepositionModel:
         """The true pattern, and nothing else."""
-        values = self.truth['pattern']
-        planar = PlanarPattern(**{k: values[k] for k in PlanarPattern.model_fields})
-        projection = Projection(
-            model_plane_m=values['model_plane_m'], emission_offset_m=values['emission_offset_m']
-        )
-        return DepositionModel(planar=planar, projection=projection)
+        return model_of(self.truth['pattern'])
 
     def _slopes_um(self, forward: Forward) -> np.ndarray:
         parameters = FreeParameters.of(self.pattern)
@@ -156,6 +151,13 @@ class PaintedCase:
     def passes(self) -> list[int]:
         """Number of passes over each part."""
         return [int(e.path.spray_pass.max()) + 1 for e in self.campaign.experiments]
+
+
+def model_of(values: dict[str, float]) -> DepositionModel:
+    """The model of a pattern of the shop, by name."""
+    planar = PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields})
+    sizes = {name: values[name] for name in ('model_plane_m', 'emission_offset_m')}
+    return DepositionModel(planar=planar, projection=Projection(**sizes))
 
 
 def name_of(case: Case) -> str:

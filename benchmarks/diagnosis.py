@@ -6,8 +6,6 @@ selection by BIC get the same draws. Results are kept line by line, so that a ru
 and taken up again; `--report-only` prints the table of what is there.
 """
 
-import os
-import sys
 import time
 from collections.abc import Sequence
 from functools import lru_cache
@@ -15,27 +13,19 @@ from pathlib import Path
 
 import click
 import numpy as np
+from benchmarks.amounts import true_amounts
+from benchmarks.campaigns import PaintedCase, name_of
+from benchmarks.records import ROOT, add, kept, results_option
+from benchmarks.rivals import Oracle, Points, stepwise_bic, visible_strength
+from benchmarks.scores import failures, table
+from benchmarks.unseen import oracle_unseen_error, unseen_error
+from tests.virtual_paint_shop.cases import KINDS, PARCELS, Case, draw_case
+from tests.virtual_paint_shop.truths import library
 
-# One thread a process: several campaigns are in work at once, and would wait for each other.
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.amounts import true_amounts  # noqa: E402
-from benchmarks.campaigns import PaintedCase, name_of  # noqa: E402
-from benchmarks.records import add, kept  # noqa: E402
-from benchmarks.rivals import Oracle, Points, stepwise_bic, visible_strength  # noqa: E402
-from benchmarks.scores import failures, table  # noqa: E402
-from benchmarks.unseen import oracle_unseen_error, unseen_error  # noqa: E402
-from tests.virtual_paint_shop.cases import KINDS, PARCELS, Case, draw_case  # noqa: E402
-from tests.virtual_paint_shop.truths import library  # noqa: E402
-
-from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
-from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.diagnosis.procedure import diagnose
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 
 FILMS = ROOT / 'runs' / 'bench-diagnosis'
 # Shares of the kinds of campaigns.
@@ -198,9 +188,7 @@ def amounts(painted: PaintedCase, diagnosis: Diagnosis) -> list[dict]:
 @click.option('--jobs', default=2, show_default=True, help='Processes.')
 @click.option('--scheduler', help='Address of a Dask scheduler, instead of processes here.')
 @click.option('--quick', is_flag=True, help='Ten campaigns of coarse films: five minutes.')
-@click.option(
-    '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
-)
+@results_option('bench-diagnosis.jsonl')
 @click.option('--report-only', is_flag=True, help='Print the table of what is there.')
 @click.option('--failures', 'failed', is_flag=True, help='List what went wrong, too.')
 def main(

@@ -1,6 +1,6 @@
 """How long `paint simulate` takes from the files of a part and a motion to the film, by stages.
 
-    python benchmarks/file_to_film.py [VERTICES ...] [--json FILE] [--no-scaling]
+    python -m benchmarks.file_to_film [VERTICES ...] [--json FILE] [--no-scaling]
 
 The part is the side of a body, 4.5 m by 1.5 m, crowned, with a belt line and a window, meshed
 evenly, as a binary STL; the gun passes over it for 60 s, recorded at 250 Hz. Every size runs in a

@@ -1,6 +1,6 @@
 """How long a diagnosis takes, stage by stage, and what one film of the fit costs.
 
-    python benchmarks/inference.py [CAMPAIGN.yaml] [ROUNDS] [--json FILE]
+    python -m benchmarks.inference [CAMPAIGN.yaml] [ROUNDS] [--json FILE]
 
 Without a campaign: four recordings of the virtual paint shop with a hidden effect, 316 readings.
 Every stage counts with its best round after a warm-up; times of the processor add up all threads.
@@ -11,7 +11,6 @@ import json
 import math
 import os
 import resource
-import sys
 import tempfile
 import time
 import warnings
@@ -22,18 +21,16 @@ from typing import Any
 
 import numba
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
 # One for all of linear algebra: its matrices are small.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
-from paint_deposition.files.campaign_file import read_campaign  # noqa: E402
-from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.run import Run  # noqa: E402
-from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
-from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.inference.diagnosis.procedure import diagnose
+from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.readings.campaign import Campaign
 
 READINGS_A_PART, REPEATS = 79, 12
 MODEL = DepositionModel()

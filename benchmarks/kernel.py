@@ -1,6 +1,6 @@
 """How fast the film is integrated: NumPy, a plain compiled loop and the kernel, side by side.
 
-    python benchmarks/kernel.py [ROUNDS] [--json FILE]
+    python -m benchmarks.kernel [ROUNDS] [--json FILE]
 
 All run in turns in one process, so that they share whatever else the machine does; each counts
 with its best round. A pair is one sub-step of the gun's way and one surface point.
@@ -23,6 +23,7 @@ import numba
 import numpy as np
 from numba import njit, prange
 
+import paint_deposition
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
@@ -33,12 +34,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 
-ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.arithmetic_limit import loop_instructions, multiply_adds_per_s  # noqa: E402
-
-PACKAGE = ROOT / 'ros2_ws/src/paint_deposition'
+PACKAGE = Path(paint_deposition.__file__).parents[1]
 SAMPLES = PACKAGE / 'samples'
 MODEL = DepositionModel()
 # NumPy takes its time: it is measured on so many sub-steps, and checked on all.
@@ -215,19 +211,6 @@ def measure(case: Case, rounds: int) -> dict[str, float]:
     return {name: case.pairs / seconds for name, seconds in best.items()}
 
 
-def measure_limit(pairs_per_s: float) -> float:
-    """Print how near the kernel's one thread comes to what its arithmetic allows."""
-    instructions, rate = loop_instructions(), multiply_adds_per_s()
-    limit = rate / instructions
-    print(
-        f'\narithmetic: {instructions} instructions for each register of points; '
-        f'{rate / 1e9:.1f} G multiply-adds/s in one thread\n'
-        f'allow {limit / 1e6:.0f} M pairs/s, of which the kernel does '
-        f'{100 * pairs_per_s / limit:.0f} %'
-    )
-    return limit
-
-
 START = """
 import time
 begin = time.perf_counter()
@@ -285,10 +268,9 @@ def main() -> None:
         f'{numba.__version__}; best of {given.rounds}'
     )
     rates = {case.name: measure(case, given.rounds) for case in (dense(), sample())}
-    limit = measure_limit(rates['dense']['kernel, single, 1 thread'])
     first_film = measure_start()
     if given.json:
-        record = {'pairs_per_s': rates, 'limit_pairs_per_s': limit, 'first_film_s': first_film}
+        record = {'pairs_per_s': rates, 'first_film_s': first_film}
         given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
 
 

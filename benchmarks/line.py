@@ -18,17 +18,12 @@ from pathlib import Path
 
 import click
 import numpy as np
-
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / 'tests')]
-
-from tests.reference import reference_film_um  # noqa: E402
-from tests.virtual_paint_shop.draw import stream  # noqa: E402
-from tests.virtual_paint_shop.gauge import measure  # noqa: E402
-from tests.virtual_paint_shop.line import (  # noqa: E402
+from benchmarks.campaigns import model_of
+from benchmarks.records import ROOT
+from tests.reference import reference_film_um
+from tests.virtual_paint_shop.draw import stream
+from tests.virtual_paint_shop.gauge import measure
+from tests.virtual_paint_shop.line import (
     LINE_NOISE,
     Hidden,
     film_um,
@@ -36,26 +31,23 @@ from tests.virtual_paint_shop.line import (  # noqa: E402
     taken_on,
     write_line,
 )
-from tests.virtual_paint_shop.shop import Campaign as Job  # noqa: E402
+from tests.virtual_paint_shop.shop import Campaign as Job
 
-from paint_deposition.batch.cases import ResultCache  # noqa: E402
-from paint_deposition.batch.line.changes import (  # noqa: E402
+from paint_deposition.batch.cases import ResultCache
+from paint_deposition.batch.line.changes import (
     changes_of,
     series_of,
 )
-from paint_deposition.batch.line.pooling import (  # noqa: E402
+from paint_deposition.batch.line.pooling import (
     Measured,
     measured_parts,
     pooled,
 )
-from paint_deposition.batch.line.runs import line_cases  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
-from paint_deposition.files.gauge_readings import read_readings  # noqa: E402
-from paint_deposition.files.meshes import read_mesh  # noqa: E402
-from paint_deposition.files.motion_files import read_recording  # noqa: E402
-from paint_deposition.model.pattern import PlanarPattern  # noqa: E402
-from paint_deposition.model.projection import Projection  # noqa: E402
-from paint_deposition.motion.path_builder import spray_path  # noqa: E402
+from paint_deposition.batch.line.runs import line_cases
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.motion.path_builder import spray_path
 
 FOLDER = ROOT / 'runs' / 'bench-line'
 HIDDEN, AMPLITUDE_M, STEP = 'air_drift', 0.02, 0.96
@@ -69,13 +61,7 @@ def smooth(job: Job, aside: Path) -> Job:
     surface = read_mesh(aside / 'door.stl', max_edge_length_m=0.03)
     path, _ = spray_path(read_recording(run, state_topic='/atomizer/state'))
     readings = read_readings(run.with_suffix('.csv'))
-    values = job.truth['pattern']
-    model = DepositionModel(
-        planar=PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields}),
-        projection=Projection(
-            **{name: values[name] for name in ('model_plane_m', 'emission_offset_m')}
-        ),
-    )
+    model = model_of(job.truth['pattern'])
     clean = reference_film_um(surface.at(readings.positions_m), path, model)
     (part,) = job.experiments
     marks = part.readings.expected_um - part.readings.clean_um

@@ -1,6 +1,6 @@
 """A cell of two guns on a large part: what the simulator takes, and how old its figures are.
 
-    python benchmarks/live.py [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
+    python -m benchmarks.live [--vertices 500000] [--seconds 20] [--watch TOPIC ...] [--json FILE]
 
 The simulator, a robot that sends two guns' poses at 250 Hz each, and whoever watches are
 processes of their own on one machine; messages go through the real middleware. The simulator
@@ -24,11 +24,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks import file_to_film as side  # noqa: E402
+from benchmarks import file_to_film as side
 
 GUNS = ('robot_1', 'robot_2')
 RATE_HZ = 250
@@ -86,7 +82,7 @@ def start_node(
 def start_watching(running: ExitStack, topic: str) -> subprocess.Popen:
     """A process that takes a topic as bytes until it is told to stop."""
     process = subprocess.Popen(
-        [sys.executable, __file__, '--watch-only', topic],
+        [sys.executable, '-m', 'benchmarks.live', '--watch-only', topic],
         stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
     )  # fmt: skip
     running.callback(process.kill)

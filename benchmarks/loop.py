@@ -7,8 +7,6 @@ All films are the shop's own. An oracle knows which effects act and has 300 read
 Results are kept line by line, so that a run can be cut off and taken up again.
 """
 
-import os
-import sys
 import tempfile
 import warnings
 from dataclasses import asdict, dataclass, replace
@@ -16,25 +14,18 @@ from pathlib import Path
 
 import click
 import numpy as np
+from benchmarks.records import add, kept, results_option
+from tests.virtual_paint_shop.draw import draw_jobs, stream
+from tests.virtual_paint_shop.files import write
+from tests.virtual_paint_shop.gauge import GaugeNoise, scatter
+from tests.virtual_paint_shop.programme import Evenness, Painted, driven
+from tests.virtual_paint_shop.shop import Campaign, generate
+from tests.virtual_paint_shop.truths import choose
 
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.records import add, kept  # noqa: E402
-from tests.virtual_paint_shop.draw import draw_jobs, stream  # noqa: E402
-from tests.virtual_paint_shop.files import write  # noqa: E402
-from tests.virtual_paint_shop.gauge import GaugeNoise, scatter  # noqa: E402
-from tests.virtual_paint_shop.programme import Evenness, Painted, driven  # noqa: E402
-from tests.virtual_paint_shop.shop import Campaign, generate  # noqa: E402
-from tests.virtual_paint_shop.truths import choose  # noqa: E402
-
-import paint_deposition as pd  # noqa: E402
-from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
-from paint_deposition.files.campaign_file import read_campaign  # noqa: E402
-from paint_deposition.motion.trajectory import Trajectory  # noqa: E402
+import paint_deposition as pd
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.motion.trajectory import Trajectory
 
 # What is hidden, of several times its usual size; the last is half a defect of the gauge, which
 # planning must not follow.
@@ -179,9 +170,7 @@ def table(records: list[dict]) -> str:
 @click.option('--seed', default=640_000, show_default=True, help='For other doors.')
 @click.option('--parcels', default=16_000_000, show_default=True, help='Droplets in a film.')
 @click.option('--processes', default=2, show_default=True)
-@click.option(
-    '--results', default=ROOT / 'runs' / 'bench-loop.jsonl', type=click.Path(path_type=Path)
-)
+@results_option('bench-loop.jsonl')
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
 def main(
     parts: int, seed: int, parcels: int, processes: int, results: Path, only_summary: bool

@@ -7,8 +7,6 @@ Results are kept line by line, so that a run can be cut off and taken up again; 
 prints the tables of what is there.
 """
 
-import os
-import sys
 import warnings
 from dataclasses import dataclass
 from functools import lru_cache
@@ -16,7 +14,15 @@ from pathlib import Path
 
 import click
 import numpy as np
+from benchmarks.campaigns import model_of
+from benchmarks.records import add, kept, results_option
+from tests.virtual_paint_shop.bench import Bench
+from tests.virtual_paint_shop.draw import draw_jobs, stream
+from tests.virtual_paint_shop.gauge import GaugeNoise, measure
+from tests.virtual_paint_shop.jobs import record
+from tests.virtual_paint_shop.truths import choose as choose_truths
 
+<<<<<<< HEAD
 # One thread a process: several doors are at work at once, and would wait for each other.
 for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
     os.environ.setdefault(threads, '1')
@@ -36,19 +42,23 @@ from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
 from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
 from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
 from paint_deposition.inference.diagnosis.reading_choice import (  # noqa: E402
+=======
+from paint_deposition.api.geometry import look_at
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.inference.diagnosis.procedure import diagnose
+from paint_deposition.inference.diagnosis.reading_choice import (
+>>>>>>> h-batch
     ChosenReadings,
     choose,
     power_of,
     usable_places,
 )
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart  # noqa: E402
-from paint_deposition.inference.readings.campaign import Campaign, Experiment  # noqa: E402
-from paint_deposition.inference.readings.readings import Readings  # noqa: E402
-from paint_deposition.model.pattern import PlanarPattern  # noqa: E402
-from paint_deposition.model.projection import Projection  # noqa: E402
-from paint_deposition.motion.trajectory import Trajectory  # noqa: E402
-from paint_deposition.part.gauge_places import grid_places  # noqa: E402
-from paint_deposition.part.surface import Surface  # noqa: E402
+from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.gauge_places import grid_places
+from paint_deposition.part.surface import Surface
 
 WAYS = ('chosen', 'grid', 'random')
 # Effects that a door shows, of every family that tells of places.
@@ -84,14 +94,7 @@ class Door:
             log.stamps_ns, log.positions_m, log.quaternions_xyzw,
             trigger_stamps_ns=log.trigger_stamps_ns, trigger_flow=1.0 * log.trigger_on,
         )  # fmt: skip
-        values = pattern.as_dict()
-        model = DepositionModel(
-            planar=PlanarPattern(**{k: values[k] for k in PlanarPattern.model_fields}),
-            projection=Projection(
-                model_plane_m=values['model_plane_m'],
-                emission_offset_m=values['emission_offset_m'],
-            ),
-        )
+        model = model_of(pattern.as_dict())
         seen = look_at(surface, motion, model)
         part = UnmeasuredPart(seen.surface, seen.path, model, EFFECTS)
         film_um = part.film_um
@@ -200,9 +203,7 @@ def diagnosis_table(records: list[dict]) -> list[str]:
 @click.option('--count', default=40, show_default=True, help='Readings that are diagnosed.')
 @click.option('--first-seed', default=41_000, show_default=True, help='For other doors.')
 @click.option('--processes', default=2, show_default=True)
-@click.option(
-    '--results', default=ROOT / 'runs' / 'bench-measure.jsonl', type=click.Path(path_type=Path)
-)
+@results_option('bench-measure.jsonl')
 @click.option('--report-only', is_flag=True, help='Print what is there.')
 def main(
     doors: int, count: int, first_seed: int, processes: int, results: Path, report_only: bool

@@ -6,8 +6,6 @@ hidden world, and both are diagnosed together. Results are kept line by line, so
 cut off and taken up again; `--summary` prints what is there.
 """
 
-import os
-import sys
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -15,15 +13,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import click
-
-# One thread a process: several campaigns are at work at once, and would wait for each other.
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.records import add, kept  # noqa: E402
+from benchmarks.records import add, kept, results_option
 
 # Effects that are easily taken for another one.
 TRUTHS = (
@@ -194,9 +184,7 @@ def _kept(record: dict) -> bool:
 @click.option('--each', default=10, show_default=True, help='Campaigns of each hidden effect.')
 @click.option('--first-seed', default=930_000, show_default=True, help='For other campaigns.')
 @click.option('--processes', default=2, show_default=True)
-@click.option(
-    '--results', default=ROOT / 'runs' / 'bench-next.jsonl', type=click.Path(path_type=Path)
-)
+@results_option('bench-next.jsonl')
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
 def main(
     truths: str, each: int, first_seed: int, processes: int, results: Path, only_summary: bool

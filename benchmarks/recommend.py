@@ -1,6 +1,6 @@
 """How long the recommendation of an index takes, by the effects along the rays that a model has.
 
-    python benchmarks/recommend.py [ROUNDS] [--json FILE]
+    python -m benchmarks.recommend [ROUNDS] [--json FILE]
 
 The first answer has a new model: nothing of it is known yet, but its kernel is compiled. A request
 that differs in the tolerance only comes second.

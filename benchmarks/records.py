@@ -6,10 +6,19 @@ import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import click
 from distributed import as_completed
 from tqdm import tqdm
 
 from paint_deposition.batch.cluster import workers
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def results_option(name: str) -> Callable[[Callable], Callable]:
+    """The option --results of a benchmark whose records are in runs/NAME."""
+    kind = click.Path(path_type=Path)
+    return click.option('--results', default=ROOT / 'runs' / name, type=kind, show_default=True)
 
 
 def kept(results: Path) -> list[dict]:
@@ -47,5 +56,5 @@ def _importable(run: Callable) -> Callable:
     """The same function where workers find it: in its module, not in the script that runs."""
     if run.__module__ != '__main__':
         return run
-    script = Path(sys.modules['__main__'].__file__)
-    return getattr(importlib.import_module(f'benchmarks.{script.stem}'), run.__name__)
+    module = sys.modules['__main__'].__spec__.name
+    return getattr(importlib.import_module(module), run.__name__)

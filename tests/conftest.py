@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import hypothesis
@@ -21,9 +22,21 @@ os.environ['PAINT_CACHE_DIR'] = ''
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 
+# Nodes need ROS and the messages of the built workspace; the rest of the tests does without.
+HAS_NODES = find_spec('rclpy') is not None and find_spec('paint_msgs') is not None
+collect_ignore_glob = [] if HAS_NODES else ['nodes/*', 'test_security.py']
+
 # The same examples on every run, and no deadline: the first call of a kernel compiles it.
 hypothesis.settings.register_profile('project', deadline=None, derandomize=True)
 hypothesis.settings.load_profile('project')
+
+
+def pytest_report_header() -> str:
+    """Why tests of nodes are left out."""
+    return '' if HAS_NODES else (
+        'tests of nodes are left out: rclpy or paint_msgs is missing; run `make build`, and '
+        'source setup/environment.sh'
+    )  # fmt: skip
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -107,8 +120,8 @@ def wait_until(executor: object) -> Callable[..., None]:
     """`wait_until(condition, what='...')`: run callbacks until it holds.
 
     Fails the test when it does not hold within a minute, which is long even on a machine that is
-    busy with other work. The condition is looked at after every
-    callback and at least every 20 ms, so it may also watch other processes and files.
+    busy with other work. The condition is looked at after every callback and at least every
+    20 ms, so it may also watch other processes and files.
     """
 
     def wait_until(

@@ -25,10 +25,3 @@ def test_the_share_is_that_of_the_gain_of_all_parts():
 def test_a_part_that_got_worse_is_counted():
     text = table([record(1, 0.10, 0.05, 0.05, 0.05), record(2, 0.04, 0.05, 0.04, 0.04)])
     assert 'worse than before after one turn: 50 % of 2 parts' in text
-
-
-def test_a_line_says_what_was_found():
-    text = table([record(1, 0.1, 0.06, 0.05, 0.05, accepted=('air_drift', 'learned:place'))])
-    (line,) = (line for line in text.splitlines() if line.startswith('part 1'))
-    assert line.split('  ')[-1] == 'air_drift, learned:place'
-    assert '10.0 / 50' in line

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.rivals import Oracle, chosen_by_bic, shown_amounts
+from benchmarks.rivals import Oracle, chosen_by_bic
 from scipy.stats import ncx2
 
 DRAWS = 4000
@@ -48,18 +48,6 @@ def test_the_oracle_has_the_power_of_the_likelihood_ratio_test(design):
     amplitude = 2.0 / strength
     power = ncx2.sf(1.959964**2, 1, 4.0)
     assert np.mean(p_values(design, amplitude) < 0.05) == pytest.approx(power, abs=0.025)
-
-
-def test_no_mark_is_no_evidence(design):
-    sigma_um, pattern_um, _ = design
-    assert Oracle.of(sigma_um, pattern_um).p_value(sigma_um, np.zeros(60)) == 1.0
-
-
-def test_shown_amounts_shrink_toward_zero_where_readings_say_little():
-    """One standard normal amount, n readings of noise s: n / (n + s^2) of their mean."""
-    amount, covariance = shown_amounts(np.ones((4, 1)), np.full(4, 3.0), np.full(4, 2.0))
-    assert amount == pytest.approx([0.5 * 3.0])
-    assert covariance[0, 0] == pytest.approx(0.5)
 
 
 def test_bic_chooses_what_is_there_and_stops(design):

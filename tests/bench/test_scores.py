@@ -5,14 +5,10 @@ import pytest
 from benchmarks.amounts import true_amounts
 from benchmarks.scores import (
     Row,
-    failures,
-    groups,
     interval,
     mistakes,
-    named,
     naming,
     reliability,
-    wrong,
 )
 
 
@@ -52,15 +48,6 @@ def found(rows, label):
     return [value for _, value in row.values]
 
 
-def test_groups_are_those_accepted_and_no_learned_laws():
-    assert groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
-    assert groups(LISTED) == []
-    assert groups(WRONG) == [{'sag'}]
-    assert named(WRONG) == {'sag'}
-    assert wrong(RIGHT) == []
-    assert wrong(WRONG) == [{'sag'}]
-
-
 def test_naming_counts_accepted_groups_of_strong_effects():
     rows = naming([RIGHT, LISTED, WRONG, BLAMED, result('e', strength=3.0)])
     assert found(rows, 'effect in the group named, over 8 sd') == [True, False, False]
@@ -91,13 +78,6 @@ def test_mistakes_are_counted_per_campaign():
     assert found(rows, 'unknown cause blamed on an effect') == [True]
 
 
-def test_failures_are_strong_causes_not_named_and_effects_wrongly_accepted():
-    weak = result('e', strength=3.0)
-    crash = {'case': 'f', 'redraw': 1, 'kind': 'clean', 'error': 'ValueError: x'}
-    lines = failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
-    assert [line[0] for line in lines] == ['f', 'b', 'c', 'd']
-
-
 def test_reliability_compares_stated_with_observed():
     lines = reliability([RIGHT, LISTED, WRONG, BLAMED])
     (high,) = (line for line in lines if line.startswith('  0.80 to 0.95'))
@@ -107,14 +87,6 @@ def test_reliability_compares_stated_with_observed():
     assert 'apart by 38 points' in high
     (top,) = (line for line in lines if line.startswith('  0.95 to 1.00'))
     assert '1 in 1' in top
-
-
-def test_redraws_of_one_campaign_do_not_narrow_an_interval():
-    once = [(str(k), float(k % 3 == 0)) for k in range(30)]
-    often = [value for value in once for _ in range(20)]
-    assert interval(once) == interval(often)
-    apart = [(f'{case} {k}', value) for k, (case, value) in enumerate(often)]
-    assert np.ptp(interval(apart)) < 0.35 * np.ptp(interval(once))
 
 
 def test_an_interval_covers_as_often_as_it_says():

@@ -21,12 +21,12 @@ from booth import (
 )
 from paint_deposition.effects.base import Effect, PathContext, Ray
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
-from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.effects.user_effects import read_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import in_precision
 from reference import reference_film_um
 
-ALL = [*EFFECTS.values(), load_effect_file(SAMPLES / 'my_effect.py')]
+ALL = [*EFFECTS.values(), read_effect_file(SAMPLES / 'my_effect.py')]
 AMPLITUDES = [(effect, name) for effect in ALL for name in effect.amplitudes()]
 TWO_SIDED = [
     (effect, name)

@@ -30,12 +30,6 @@ def test_before_the_first_change_the_gun_is_off():
     assert flow_at(flow, [0, 9, 10, 19, 20, 30, 99]).tolist() == [0, 0, 1, 1, 0, 0.5, 0.5]
 
 
-def test_a_gun_that_is_only_told_to_be_off_stays_off():
-    flow = schedule([(10, 0.0)])
-    assert flow
-    assert flow_at(flow, [0, 20]).tolist() == [0.0, 0.0]
-
-
 def test_a_state_that_is_repeated_cuts_nothing():
     flow = schedule([(stamp, 1.0 if stamp >= 30 else 0.0) for stamp in range(0, 100, 10)])
     cuts, flows, _ = flow.steps()
@@ -67,13 +61,6 @@ def test_neither_order_nor_forgetting_matters_later(changes, order, forgotten_un
     assert np.array_equal(flow_at(flow, later), flow_at(expected, later))
 
 
-def test_a_change_that_was_superseded_before_it_came_does_nothing():
-    flow = schedule([(10, 1.0), (20, 0.0)])
-    flow.forget(25)
-    flow.add(15, 1.0)
-    assert flow_at(flow, [26]).tolist() == [0.0]
-
-
 def test_forgetting_keeps_the_memory_small():
     flow = FlowSchedule()
     for stamp in range(10_000):
@@ -89,12 +76,6 @@ def test_beginning_again_keeps_what_came_early_for_it():
     assert flow.restart() == 2
     assert flow_at(flow, [10, 60, 1500]).tolist() == [0.0, 1.0, 1.0]
     assert flow.restart() == 0
-
-
-def test_beginning_again_with_all_changes_known_repeats_them():
-    flow = schedule([(10, 1.0), (20, 0.0)])
-    flow.restart()
-    assert flow_at(flow, [5, 15, 25]).tolist() == [0.0, 1.0, 0.0]
 
 
 def test_beginning_again_after_forgetting_closes_the_gun():

@@ -1,7 +1,5 @@
 """What is kept of a motion, to be followed again."""
 
-import tracemalloc
-
 import numpy as np
 import pytest
 
@@ -74,16 +72,3 @@ def test_the_first_poses_are_found_between_changes():
         log.add(TriggerChange(first, 1.0))
     assert np.array_equal(log.first_poses(7).stamps_ns, np.arange(7))
     assert len(log.first_poses(100)) == 20
-
-
-def test_a_minute_of_poses_takes_less_than_a_megabyte():
-    """At 250 Hz, handed on twenty times a second as a node does."""
-    minutes = 20
-    tracemalloc.start()
-    try:
-        log = _log(*(_poses(first, 12) for first in range(0, minutes * 15_000, 12)))
-        taken, _ = tracemalloc.get_traced_memory()
-    finally:
-        tracemalloc.stop()
-    assert log.poses == minutes * 15_000
-    assert taken < minutes * 1e6

@@ -2,13 +2,10 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 import scenes
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import PathBuilder, spray_path
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 SPEED_M_PER_S = 0.5
@@ -92,28 +89,6 @@ def test_the_rate_of_the_poses_does_not_matter(period_s):
         assert_passes_are_the_rows(path)
 
 
-@given(seed=st.integers(0, 1000), kind=st.sampled_from(['corner', 'semicircle', 'zone']))
-@settings(max_examples=20, deadline=None)
-def test_batches_do_not_matter_in_rounded_turns(seed, kind):
-    trajectory = raster(kind, 0.1, 'on', 2e-4, 0.01)
-    expected, _ = spray_path(trajectory)
-    rng = np.random.default_rng(seed)
-    builder, pieces, start = PathBuilder(whole_strokes=True), [], 0
-    builder.add_trigger(int(trajectory.stamps_ns[0]), 1.0)
-    while start < len(trajectory):
-        rows = slice(start, start + int(rng.integers(1, 200)))
-        builder.add_poses(
-            trajectory.stamps_ns[rows],
-            trajectory.positions_m[rows],
-            trajectory.quaternions_xyzw[rows],
-        )
-        pieces.append(builder.take())
-        start = rows.stop
-    path = SprayPath.joined([*pieces, builder.take(finish=True)])
-    for column in ('stroke', 'spray_pass', 'from_turn_m', 'to_turn_m', 'until_off_s'):
-        assert np.array_equal(getattr(path, column), getattr(expected, column)), column
-
-
 def arc_pass(radius_m, sweep_rad, followed, noise_m=2e-4):
     """There and back over a crowned part: an arc in x-z, the gun square to it or kept upright."""
     angle = np.arange(-0.5 * sweep_rad, 0.5 * sweep_rad, 0.15 * 0.01 / radius_m)
@@ -174,22 +149,6 @@ def test_a_gun_that_opens_again_on_another_track_begins_a_pass(shift_m, passes):
     path, _ = spray_path(trajectory)
     assert path.stroke.max() == 0
     assert path.spray_pass.max() == passes - 1
-
-
-def test_a_gun_that_opens_at_the_corner_of_the_approach_counts_the_pass_from_zero():
-    rows = [(0.0, -0.5), (0.0, 0.0), (1.0, 0.0), (1.0, 0.3), (0.0, 0.3)]
-    xy, at_m = resampled(rows, 0.003)
-    trajectory = Trajectory(
-        scenes.stamps_ns(at_m / 0.3),
-        np.column_stack([xy, np.full(len(xy), 0.25)]),
-        np.tile(scenes.LOOKING_DOWN, (len(xy), 1)),
-        trigger_stamps_ns=scenes.stamps_ns([0.5 / 0.3]),
-        trigger_flow=np.ones(1),
-    )
-    path, _ = spray_path(trajectory)
-    for number, y in enumerate((0.0, 0.3)):
-        row = np.argmin(np.linalg.norm(path.position_m[:, :2] - [0.5, y], axis=1))
-        assert path.spray_pass[row] == number
 
 
 @pytest.mark.parametrize('angle_deg', [65.0, 90.0, 120.0, 180.0])

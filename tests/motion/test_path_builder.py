@@ -75,25 +75,6 @@ def test_the_trigger_cuts_within_a_segment():
     assert set(path.flow) == {0.0, 0.7, 1.0}
 
 
-def test_without_trigger_the_gun_always_sprays():
-    path, _ = spray_path(scenes.straight_pass(TIMES_S))
-    assert path.spraying_time_s == pytest.approx(TIMES_S[-1], rel=1e-12)
-    assert np.all(path.since_on_s == np.inf)
-
-
-def test_states_that_say_the_same_again_change_no_bit():
-    trajectory = scenes.straight_pass(TIMES_S, **TRIGGER)
-    every_10_ms = scenes.stamps_ns(np.arange(0.0, 4.0, 0.01))
-    at = np.searchsorted(TRIGGER['trigger_stamps_ns'], every_10_ms, side='right') - 1
-    stamps = np.concatenate([TRIGGER['trigger_stamps_ns'], every_10_ms])
-    flow = np.concatenate([TRIGGER['trigger_flow'], TRIGGER['trigger_flow'][at]])
-    order = np.argsort(stamps, kind='stable')
-    chatty = scenes.straight_pass(
-        TIMES_S, trigger_stamps_ns=stamps[order], trigger_flow=flow[order]
-    )
-    assert_same_bits(spray_path(chatty)[0], spray_path(trajectory)[0])
-
-
 def test_a_gap_is_gun_off():
     times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.3, 2.0, 0.02)])
     path, counts = spray_path(scenes.straight_pass(times))
@@ -102,15 +83,6 @@ def test_a_gap_is_gun_off():
     assert path.spraying_time_s == pytest.approx(0.98 + 0.68, rel=1e-12)
     within = path.stamp_ns - scenes.stamps_ns(0.0)
     assert not np.any((within > 0.98e9) & (within < 1.3e9))
-
-
-def test_a_gap_closes_the_gun_and_opens_it_again():
-    times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.3, 2.0, 0.02)])
-    path, _ = spray_path(scenes.straight_pass(times))
-    before = np.flatnonzero(path.stroke == 0)[-1]
-    assert path.until_off_s[before] == pytest.approx(0.5 * path.dwell_s[before])
-    assert path.since_on_s[before + 1] == pytest.approx(0.5 * path.dwell_s[before + 1])
-    assert path.stroke[before + 1] == 1
 
 
 def test_the_limit_of_a_gap_can_be_set():
@@ -205,16 +177,6 @@ def test_a_late_trigger_is_counted_and_holds_from_there_on():
     assert painted == pytest.approx(2.0)
     assert builder.take(finish=True).spraying_time_s == 0.0
     assert builder.counts.late_triggers == 1
-
-
-def test_until_leaves_what_ends_later():
-    trajectory = scenes.straight_pass(TIMES_S)
-    builder = PathBuilder()
-    builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
-    until = int(scenes.stamps_ns(1.0))
-    assert builder.take(until).spraying_time_s == pytest.approx(1.0)
-    assert builder.newest_ns == trajectory.stamps_ns[-1]
-    assert builder.take().spraying_time_s == pytest.approx(TIMES_S[-1] - 1.0)
 
 
 @pytest.mark.parametrize('count', [0, 1])

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paint_deposition.motion.pose_stream import FEWEST_OF_A_RESTART, PoseBatch, PoseScreen
+from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 
 GAP_NS = 250
 UNIT = (0.0, 0.0, 0.0, 1.0)
@@ -53,26 +53,9 @@ def test_a_lasting_run_from_an_earlier_time_is_a_restart_of_which_nothing_is_los
     assert (counts.restarts, counts.rejected) == (1, 0)
 
 
-def test_a_run_that_ends_before_it_lasted_is_dropped():
-    streams, counts = followed([1000, 1020, 0, 20, 40])
-    assert streams == [[1000, 1020]]
-    assert (counts.backward_stamps, counts.restarts) == (3, 0)
-
-
-def test_few_poses_far_apart_are_no_restart():
-    assert FEWEST_OF_A_RESTART == 3
-    assert followed([5000, 0, 400])[1].restarts == 0
-    assert followed([5000, 0, 400, 800])[1].restarts == 1
-
-
 def test_gaps_are_counted_with_the_longest():
     _, counts = followed([0, 250, 501, 1000, 1010])
     assert (counts.gaps, counts.longest_gap_ns) == (2, 499)
-
-
-def test_a_restart_is_no_gap():
-    _, counts = followed([10_000, 10_010, *range(0, 300, 20)])
-    assert (counts.restarts, counts.gaps) == (1, 0)
 
 
 def test_numbers_that_are_not_finite_are_dropped():

@@ -12,7 +12,6 @@ from paint_deposition.motion.sub_steps import (
     followed_poses,
     slerp,
     split_segments,
-    write_rotation,
 )
 
 GAP_NS = 250_000_000
@@ -56,14 +55,6 @@ def test_slerp_turns_evenly_the_short_way(angle_rad, t):
         if not half_turn:
             assert (got.inv() * expected).magnitude() < 1e-9
         assert (got.inv() * start).magnitude() == pytest.approx(t * angle_rad, abs=1e-7)
-
-
-def test_the_rotation_is_scipys():
-    matrix = np.empty((3, 3))
-    for seed in range(20):
-        rotation = Rotation.random(rng=seed)
-        write_rotation(matrix, rotation.as_quat())
-        assert np.allclose(matrix, rotation.as_matrix(), rtol=0, atol=1e-15)
 
 
 @given(seed=st.integers(0, 2**32 - 1), cuts=st.lists(st.floats(-0.2, 1.2), max_size=5))
@@ -123,11 +114,6 @@ def test_a_gap_gives_nothing_and_is_told():
     assert np.all((stamp < stamps[1]) | (stamp > stamps[2]))
 
 
-def test_an_interval_as_long_as_the_limit_is_no_gap():
-    _, dwell, *_ = split([0, GAP_NS], np.zeros((2, 3)), np.tile([0, 0, 0, 1.0], (2, 1)))
-    assert dwell.sum() == pytest.approx(0.25)
-
-
 @pytest.mark.parametrize('cut_ns', [1, 3_141_592, 9_999_999])
 def test_a_cut_splits_the_time_exactly(cut_ns):
     positions = np.array([[0, 0, 0], [0.03, 0, 0]])
@@ -135,14 +121,6 @@ def test_a_cut_splits_the_time_exactly(cut_ns):
     before = stamp < cut_ns
     assert dwell[before].sum() == pytest.approx(cut_ns * 1e-9, rel=1e-12)
     assert dwell[~before].sum() == pytest.approx((10_000_000 - cut_ns) * 1e-9, rel=1e-12)
-
-
-def test_a_cut_at_a_pose_cuts_nothing():
-    positions = np.array([[0, 0, 0], [0.001, 0, 0], [0.002, 0, 0]])
-    quaternions = np.tile([0, 0, 0, 1.0], (3, 1))
-    whole = split([0, 10, 20], positions, quaternions)
-    cut = split([0, 10, 20], positions, quaternions, [0, 10, 20])
-    assert all(np.array_equal(a, b) for a, b in zip(whole, cut, strict=True))
 
 
 @pytest.mark.parametrize('away_m', [1e3, 1e30, 1e300])

@@ -3,18 +3,9 @@
 import numpy as np
 import pytest
 
-import scenes
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import relative_flow
-
-
-def test_duration_and_length():
-    trajectory = scenes.straight_pass([0.0, 0.5, 2.0])
-    assert len(trajectory) == 3
-    assert trajectory.duration_s == 2.0
-    empty = Trajectory(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 4)))
-    assert empty.duration_s == 0.0
 
 
 def test_shapes_must_match():

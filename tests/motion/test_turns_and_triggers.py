@@ -47,19 +47,6 @@ def test_strokes_are_the_straight_legs():
     assert length == pytest.approx([1.2, 0.3, 1.2, 0.3, 1.2], abs=0.02)
 
 
-def test_passes_are_counted_and_links_are_not():
-    path, _ = spray_path(route(SERPENTINE))
-    passes = [set(path.spray_pass[path.stroke == stroke][10:]) for stroke in range(5)]
-    assert passes == [{0}, {0}, {1}, {1}, {2}]
-
-
-def test_no_pass_before_the_gun_opens():
-    path, _ = spray_path(sprayed_serpentine())
-    assert set(path.spray_pass[path.stamp_ns < scenes.stamps_ns(1.0)]) == {-1}
-    sprayed = path.select(path.flow > 0.0)
-    assert [set(sprayed.spray_pass[sprayed.stroke == s]) for s in (0, 2, 4)] == [{0}, {1}, {2}]
-
-
 def test_times_to_the_trigger_are_those_of_the_clock():
     path, _ = spray_path(sprayed_serpentine())
     time_s = (path.stamp_ns - scenes.START_NS) * 1e-9
@@ -81,19 +68,6 @@ def test_times_to_the_trigger_are_those_of_the_clock():
     assert np.allclose(path.until_on_s[run_in], (on[0] - time_s)[run_in], atol=2e-9)
 
 
-def test_open_flow_is_that_of_the_last_opening():
-    path, _ = spray_path(
-        route(
-            [(0, 0), (1.2, 0)],
-            trigger_stamps_ns=scenes.stamps_ns([1.0, 1.5, 2.0, 3.0]),
-            trigger_flow=np.array([0.8, 0.0, 1.1, 0.0]),
-        )
-    )
-    time_s = (path.stamp_ns - scenes.START_NS) * 1e-9
-    expected = np.select([time_s < 1.0, time_s < 2.0], [1.0, 0.8], 1.1)
-    assert np.array_equal(path.open_flow, expected)
-
-
 def test_distances_to_turns_add_up_to_the_leg():
     path, _ = spray_path(route(SERPENTINE))
     travelled_m = np.cumsum(path.dwell_s * path.speed_m_per_s)
@@ -109,14 +83,6 @@ def test_distances_to_turns_add_up_to_the_leg():
     # 0.3 m into the first pass.
     row = np.argmin(np.abs(path.position_m[path.stroke == 0, 0] - 0.3))
     assert path.from_turn_m[row] == pytest.approx(0.3, abs=0.005)
-
-
-def test_a_curve_is_one_stroke_and_a_corner_is_not():
-    angle = np.linspace(0.0, np.pi, 400)
-    wide = [(np.sin(a), -np.cos(a)) for a in angle]
-    assert spray_path(route(wide))[0].stroke[-1] == 0
-    sharp = [(0, 0), (0.5, 0), (0.5 + 0.5 * np.cos(1.2), 0.5 * np.sin(1.2))]
-    assert spray_path(route(sharp))[0].stroke[-1] == 1
 
 
 def test_trembling_at_rest_is_no_turn():

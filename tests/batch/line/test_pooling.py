@@ -49,9 +49,10 @@ def test_a_misfit_that_all_parts_share_is_no_effect():
 
 
 def test_level_and_noise_are_estimated():
-    scales = pooled(parts(300, seed=3, level=0.02)).posterior.scales
+    made = [replace(part, sigma_um=part.sigma_um / 1.5) for part in parts(300, 3, level=0.02)]
+    scales = pooled(made).posterior.scales
     assert scales.level == pytest.approx(0.02, rel=0.15)
-    assert scales.noise == pytest.approx(1.0, abs=0.06)
+    assert scales.noise == pytest.approx(1.5, rel=0.06)
 
 
 def test_the_level_of_a_part_is_that_of_its_film():
@@ -104,7 +105,7 @@ def test_one_bad_part_is_an_alarm_and_no_change():
 
 
 def test_the_scales_are_those_beside_the_effects_that_were_found():
-    """By two programmes in turn, whose marks are opposite: without the effect it looks like noise."""
+    """Of two programmes in turn the marks are opposite: unexplained, they look like noise."""
     made = parts(100, seed=8, drift=0.0, points=24)
     for row, part in enumerate(made):
         turned = part.by_effect * (-1.0) ** row

@@ -90,7 +90,8 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
                 'turned about it; add a point beside it'
             )
     pose, apart = _fitted(touched, points)
-    rms, warnings = _rms(apart), ()
+    rms = _rms(apart)
+    warnings: tuple[str, ...] = ()
     if rms > NOTABLE_POINT_M:
         _refuse_other_unit(touched, points)
         mirrored = _rms(_fitted(touched, points * [-1.0, 1.0, 1.0])[1])

@@ -61,8 +61,8 @@ class SprayPath:
         numbers, never = np.zeros(count, np.int64), np.full(count, np.inf)
         return SprayPath(
             stamp_ns, np.full(count, np.nan), dwell_s, flow, position_m, rotation,
-            velocity_m_per_s, np.zeros((count, 2)), *[numbers] * 3, np.ones(count), *[never] * 6,
-            numbers,
+            velocity_m_per_s, np.zeros((count, 2)), numbers, numbers, numbers,
+            np.ones(count), never, never, never, never, never, never, numbers,
         )  # fmt: skip
 
     def __len__(self) -> int:

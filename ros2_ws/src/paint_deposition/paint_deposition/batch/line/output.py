@@ -178,11 +178,12 @@ def _values(line: Line, series: Series) -> dict[str, Any]:
         'marker': {'color': ACCENT, 'size': 5}, 'name': 'part',
         'hovertemplate': '%{text}: %{y:.3g}<extra></extra>',
     }  # fmt: skip
+    centre = np.full(len(times), series.centre)
     data = [
-        *(_level(times, edge, BEFORE, 'dot', 'limit')
-          for edge in (series.centre - limit, series.centre + limit)),
-        _level(times, np.full(len(times), series.centre), INK, 'solid', 'centre'),
-    ]  # fmt: skip
+        _trace(times, centre - limit, BEFORE, 'dot', 'limit'),
+        _trace(times, centre + limit, BEFORE, 'dot', 'limit'),
+        _trace(times, centre, INK, 'solid', 'centre'),
+    ]
     for change in (one for one in line.changes if one.series == series.name):
         level = [change.before, change.after]
         x = _times(np.array([change.time_s, line.times_s[-1]]))
@@ -195,17 +196,18 @@ def _values(line: Line, series: Series) -> dict[str, Any]:
 
 
 def _sums(line: Line, series: Series) -> dict[str, Any]:
-    times, drawn = _times(line.times_s), series.charts
-    count = len(times)
-    data = [
-        _level(times, drawn.ewma, ACCENT, 'solid', 'EWMA'),
-        _level(times, drawn.ewma_limit, ACCENT, 'dot', 'limit of the EWMA'),
-        _level(times, -drawn.ewma_limit, ACCENT, 'dot', 'limit of the EWMA'),
-        _level(times, drawn.high, COMPONENTS[0], 'solid', 'CUSUM, upwards'),
-        _level(times, -drawn.low, COMPONENTS[1], 'solid', 'CUSUM, downwards'),
-        _level(times, np.full(count, drawn.cusum_limit), BEFORE, 'dash', 'limit of the CUSUM'),
-        _level(times, np.full(count, -drawn.cusum_limit), BEFORE, 'dash', 'limit of the CUSUM'),
-    ]
+    drawn = series.charts
+    limit = np.full(len(line.times_s), drawn.cusum_limit)
+    traces = (
+        (drawn.ewma, ACCENT, 'solid', 'EWMA'),
+        (drawn.ewma_limit, ACCENT, 'dot', 'limit of the EWMA'),
+        (-drawn.ewma_limit, ACCENT, 'dot', 'limit of the EWMA'),
+        (drawn.high, COMPONENTS[0], 'solid', 'CUSUM, upwards'),
+        (-drawn.low, COMPONENTS[1], 'solid', 'CUSUM, downwards'),
+        (limit, BEFORE, 'dash', 'limit of the CUSUM'),
+        (-limit, BEFORE, 'dash', 'limit of the CUSUM'),
+    )
+    data = [_trace(_times(line.times_s), *trace) for trace in traces]
     return {'data': data, 'layout': base_layout(
         height=HEIGHT, xaxis=axis(range=_span(line.times_s)), yaxis=axis('standard deviations')
     )}  # fmt: skip
@@ -229,7 +231,7 @@ def _films(line: Line) -> dict[str, Any]:
     return {'data': data, 'layout': layout}
 
 
-def _level(
+def _trace(
     times: list[str], values: np.ndarray, colour: str, dash: str, name: str
 ) -> dict[str, Any]:
     line = {'color': colour, 'width': 1.4, 'dash': dash}

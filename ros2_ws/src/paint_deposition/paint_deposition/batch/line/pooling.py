@@ -151,10 +151,11 @@ class SufficientStatistics:
                 columns.T @ columns, columns.T @ residual, residual @ residual, film @ columns,
                 film @ residual, film @ film,
             ))  # fmt: skip
-        gram, score, square, *of_levels = zip(*rows, strict=True)
+        gram, score, square, *levels = zip(*rows, strict=True)
+        level_gram, level_score, level_square = map(np.array, levels)
         return SufficientStatistics(
-            sum(gram), np.sum(score, axis=0), float(np.sum(square)), *map(np.array, of_levels),
-            sum(map(len, parts)), place_m, pattern.between_jobs,
+            sum(gram), np.sum(score, axis=0), float(np.sum(square)), level_gram, level_score,
+            level_square, sum(map(len, parts)), place_m, pattern.between_jobs,
         )  # fmt: skip
 
     @property
@@ -240,15 +241,13 @@ class Weighed:
     def beside(statistics: SufficientStatistics, chosen: Sequence[int]) -> Weighed:
         """With the level and the noise that are the likeliest beside these amplitudes."""
         misfits: list[tuple[float, float] | None] = [None, *MISFITS]
+        grids: dict[str, Any] = {'misfit': misfits, 'noise': NOISES, 'level': LEVELS}
         scales = Scales(0.02, 1.0, None)
         for _ in range(2):
-            for tried in (
-                [replace(scales, misfit=misfit) for misfit in misfits],
-                [replace(scales, noise=noise) for noise in NOISES],
-                [replace(scales, level=level) for level in LEVELS],
-            ):
+            for name, values in grids.items():
                 scales = max(
-                    tried, key=lambda one: LinePosterior(statistics, one).solved(chosen)[2]
+                    (replace(scales, **{name: value}) for value in values),
+                    key=lambda one: LinePosterior(statistics, one).solved(chosen)[2],
                 )
         share = np.log((1.0 - NO_MISFIT) / len(MISFITS))
         return Weighed(

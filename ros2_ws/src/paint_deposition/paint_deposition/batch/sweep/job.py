@@ -80,8 +80,8 @@ class Job:
     def _case(self, values: Values) -> Case:
         campaign = self._named('campaign', values)
         if campaign:
-            own = ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES)
-            if varied := [name for name in own if name in values]:
+            fixed = ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES)
+            if varied := [name for name in fixed if name in values]:
                 raise ManyError(
                     f'{varied[0]} varies, but a campaign has its own parts and motions; leave one '
                     'out'

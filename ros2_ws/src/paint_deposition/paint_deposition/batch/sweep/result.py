@@ -122,11 +122,11 @@ class Sweep:
                 low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95))
                 yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
         if self.best is not None:
-            values = [
+            texts = [
                 f'{name} {f"{value:.6g}" if isinstance(value, float) else value}'
                 for name, value in self.job.values[self.best].items()
             ]
-            shown = ', '.join(values) or UNCHANGED
+            shown = ', '.join(texts) or UNCHANGED
             yield f'best by {JUDGED[str(self.judged)]}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:

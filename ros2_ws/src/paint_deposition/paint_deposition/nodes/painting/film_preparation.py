@@ -13,8 +13,8 @@ import numpy as np
 
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.pose_stream import BATCH_POSES, MotionLog, PoseBatch, TriggerChange
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
+from paint_deposition.motion.pose_stream import BATCH_POSES, MotionLog, PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.runtime.topics import of_gun

@@ -1,12 +1,12 @@
 """The same content has the same bytes, however it came into memory."""
 
 import numpy as np
-from tests.surfaces import triangulated
 from trimesh import Trimesh
 
 from paint_deposition.batch.cases import content_digest
 from paint_deposition.files import surface_cache
 from paint_deposition.files.meshes import read_mesh
+from surfaces import triangulated
 
 
 def test_a_part_seen_before_has_the_digest_of_the_part_prepared(tmp_path, monkeypatch):

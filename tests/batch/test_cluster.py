@@ -1,6 +1,7 @@
 """Work for many processes: what fails is told and tried again, and the rest is computed."""
 
 import json
+import os
 import subprocess
 import sys
 import time
@@ -38,14 +39,16 @@ def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path):
 @pytest.fixture
 def cluster(tmp_path):
     """A scheduler and a worker as processes of their own, and the address."""
-    told, quiet = tmp_path / 'scheduler.json', {'stderr': subprocess.DEVNULL}
+    contact = tmp_path / 'scheduler.json'
+    found = {'PYTHONPATH': os.pathsep.join(sys.path)}
+    quiet = {'stderr': subprocess.DEVNULL, 'env': os.environ | found}
     dask = [sys.executable, '-m', 'dask']
-    one = ['--no-dashboard', '--scheduler-file', told]
+    one = ['--no-dashboard', '--scheduler-file', contact]
     scheduler = subprocess.Popen([*dask, 'scheduler', '--port', '0', *one], **quiet)
     worker = subprocess.Popen([*dask, 'worker', '--no-nanny', '--nthreads', '1', *one], **quiet)
-    while not told.exists():
+    while not contact.exists():
         time.sleep(0.05)
-    address = json.loads(told.read_text())['address']
+    address = json.loads(contact.read_text())['address']
     with Client(address) as client:
         client.wait_for_workers(1)
     yield {'scheduler': scheduler, 'worker': worker}, address
