@@ -27,16 +27,16 @@ test-fast: build  ## run the tests of less than a second each, none of them with
 	@$(IN_ENVIRONMENT) $(TESTS) -m 'not slow' $(ARGS)
 
 bench: build  ## measure kernel, file to film, diagnosis and live nodes; ARGS=--quick tries it out
-	@$(IN_ENVIRONMENT) python benchmarks/bench.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py bench $(ARGS)
 
 bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
-	@$(IN_ENVIRONMENT) python benchmarks/diagnosis.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py diagnosis $(ARGS)
 
 bench-brushes: build  ## count false alarms and effects found on parts that two brushes painted
-	@$(IN_ENVIRONMENT) python benchmarks/brushes.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py brushes $(ARGS)
 
 bench-measure: build  ## count the readings that chosen points save
-	@$(IN_ENVIRONMENT) python benchmarks/measure.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py measure $(ARGS)
 
 fuzz: build  ## feed changed files to the readers; ARGS='--seconds 600 rapid ply' chooses
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m fuzz.run $(ARGS)
@@ -45,7 +45,7 @@ reliability: build  ## end the nodes at random moments, 50 times each
 	@$(IN_ENVIRONMENT) python benchmarks/reliability.py $(ARGS)
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for as much in less
-	@$(IN_ENVIRONMENT) python benchmarks/soak.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py soak $(ARGS)
 
 numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
 	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)
@@ -54,13 +54,13 @@ lint: build  ## check style, types and the order of the rooms
 	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports
 
 bench-next: build  ## count how often the first proposed spray settles a diagnosis
-	@$(IN_ENVIRONMENT) python benchmarks/next_spray.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py next_spray $(ARGS)
 
 bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
-	@$(IN_ENVIRONMENT) python benchmarks/loop.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py loop $(ARGS)
 
 bench-line: build  ## watch 500 virtual parts for a step and an effect too small for one, a worker killed
-	@$(IN_ENVIRONMENT) python benchmarks/line.py $(ARGS)
+	@$(IN_ENVIRONMENT) python benchmarks/page.py line $(ARGS)
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .
