@@ -1,9 +1,8 @@
 """Draw the pictures of the documentation again, with the commands that the documentation names.
 
-    . setup/environment.sh
-    python docs/draw_images.py             # all pictures
-    python docs/draw_images.py build       # the film as it builds up
-    python docs/draw_images.py layers      # the layers in architecture.svg, from pyproject.toml
+Run it in the project's environment, with nothing behind it for all pictures, or with `build` for
+the film as it builds up, `layers` for the layers in architecture.svg, `results` for the rest:
+`. setup/environment.sh; python docs/draw_images.py build`.
 """
 
 import re
@@ -87,7 +86,9 @@ def frame(door: pd.Surface, motion: pd.Trajectory) -> Image.Image:
     axes.plot(*path.T, color='white', linewidth=3.0)
     axes.plot(*path.T, color='#333333', linewidth=1.0)
     axes.plot(*path[-1], 'o', markersize=15, color='#e4572e' if spraying else '#999999', mec='w')
-    axes.set(xlim=(-0.85, 0.85), ylim=(-0.05, 0.95), aspect='equal', xlabel='x [m]', ylabel='z [m]')
+    axes.set(
+        xlim=(-0.85, 0.85), ylim=(-0.05, 0.95), aspect='equal', xlabel='x [m]', ylabel='z [m]'
+    )
     mean_um = np.average(film_um, weights=door.vertex_areas_m2)
     axes.set_title(f'{motion.duration_s:4.1f} s, mean film {mean_um:4.1f} µm', loc='left')
     figure.colorbar(shown, ax=axes, label='film [µm]', ticks=range(0, 25, 4), shrink=0.85)
@@ -118,10 +119,6 @@ def draw_results() -> None:
     """Run the commands on the samples and keep their pictures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        paint('simulate', '--mesh', SAMPLES / 'door.stl', '--trajectory',
-              SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
-              '-o', folder / 'film')  # fmt: skip
-        keep(Image.open(folder / 'film/film.png'), 'door.png')
         paint('calibrate', SAMPLES / 'panel_study/campaign.yaml', '-o', folder / 'calibration')
         paint('recommend', '--model', folder / 'calibration/model.yaml', '--target-um', 20,
               '--tolerance', 0.05, '--width', 0.9, '-o', folder / 'index')  # fmt: skip
