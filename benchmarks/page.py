@@ -3,7 +3,7 @@
     python benchmarks/page.py diagnosis [ARGUMENTS OF benchmarks/diagnosis.py]
 
 A page holds the output between `<!-- measured: NAME -->` and `<!-- end -->`, with the command, the
-day and the machine. Runs with --quick are only printed.
+day and the machine. Runs with --quick or --only are only printed.
 """
 
 import os
@@ -53,7 +53,7 @@ def main() -> None:
         for line in running.stdout:
             print(line, end='', flush=True)
             shown.append(line)
-    if running.returncode or '--quick' in arguments:
+    if running.returncode or {'--quick', '--only'} & {*arguments}:
         sys.exit(running.returncode)
     output = ''.join(shown).rpartition(RESULT_BEGINS)[2]
     heading = ' '.join(['benchmarks/' + name + '.py', *arguments])

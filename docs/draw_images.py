@@ -103,11 +103,13 @@ def draw_layers() -> None:
     settings = (ROOT / 'pyproject.toml').read_text(encoding='utf-8')
     (held,) = re.findall(r'exhaustive = true\nlayers = \[(.*?)\]', settings, re.DOTALL)
     rows = []
-    for number, layer in enumerate(re.findall(r"'(.+?)'", held)):
+    layers = re.findall(r"'(.+?)'", held)
+    step = 390 // len(layers)
+    for number, layer in enumerate(layers):
         name = ' '.join(layer.split(' | '))
         rows.append(
-            f'    <rect class="layer" y="{32 * number}" width="205" height="27" rx="4"/>'
-            f'<text class="room" x="102" y="{32 * number + 18}">{name}</text>\n'
+            f'    <rect class="layer" y="{step * number}" width="205" height="{step - 5}" rx="4"/>'
+            f'<text class="room" x="102" y="{step * number + step // 2 + 2}">{name}</text>\n'
         )
     path = IMAGES / 'architecture.svg'
     old = path.read_text(encoding='utf-8')
