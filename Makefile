@@ -28,16 +28,16 @@ test-fast: build  ## run the tests of less than a second each, none of them with
 	@$(IN_ENVIRONMENT) $(TESTS) -m 'not slow' $(ARGS)
 
 bench: build  ## measure kernel, file to film, diagnosis and live nodes; ARGS=--quick tries it out
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.bench $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page bench $(ARGS)
 
 bench-diagnosis: build  ## score the diagnosis on campaigns with hidden causes
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.diagnosis $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page diagnosis $(ARGS)
 
 bench-brushes: build  ## count false alarms and effects found on parts that two brushes painted
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.brushes $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page brushes $(ARGS)
 
 bench-measure: build  ## count the readings that chosen points save
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.measure $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page measure $(ARGS)
 
 fuzz: build  ## feed changed files to the readers; ARGS='--seconds 600 rapid ply' chooses
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m fuzz.run $(ARGS)
@@ -46,7 +46,7 @@ reliability: build  ## end the nodes at random moments, 50 times each
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.reliability $(ARGS)
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for as much in less
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.soak $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page soak $(ARGS)
 
 numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
 	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)
@@ -55,13 +55,13 @@ lint: build  ## check style, types and the order of the rooms
 	@$(IN_ENVIRONMENT) ruff check . && ruff format --check . && mypy && lint-imports
 
 bench-next: build  ## count how often the first proposed spray settles a diagnosis
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.next_spray $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page next_spray $(ARGS)
 
 bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.loop $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page loop $(ARGS)
 
 bench-line: build  ## watch 500 virtual parts for a step and an effect too small for one, a worker killed
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.line $(ARGS)
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page line $(ARGS)
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .

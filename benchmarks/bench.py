@@ -38,11 +38,11 @@ PEERS_PAIRS_PER_S = {'CY, C++, 1 thread': 78e6, 'PaintRL': 5.7e6, 'MA_Cobod': 0.
 def measured(name: str, arguments: list[str], folder: Path) -> dict[str, Any]:
     """The record of a benchmark, whose own tables are printed as it runs."""
     print(f'\n=== {name}', flush=True)
-    told = folder / f'{name}.json'
+    kept = folder / f'{name}.json'
     subprocess.run(
-        [sys.executable, '-m', f'benchmarks.{name}', *arguments, '--json', str(told)], check=True
+        [sys.executable, '-m', f'benchmarks.{name}', *arguments, '--json', str(kept)], check=True
     )
-    return json.loads(told.read_text())
+    return json.loads(kept.read_text())
 
 
 def machine() -> dict[str, Any]:
@@ -104,6 +104,22 @@ def print_live(record: dict[str, Any]) -> None:
             f'{one["memory_mb"]:.0f} MB', f'{one["ready_s"]:.2f} s')  # fmt: skip
 
 
+def print_inference(record: dict[str, Any]) -> None:
+    """What a diagnosis takes."""
+    print(f'\na diagnosis of {record["inference"]["readings"]} readings: processor time')
+    for name, stage in record['inference']['stages'].items():
+        row(name, f'{stage["processor_s"]:.2f} s')
+
+
+def print_answers(record: dict[str, Any]) -> None:
+    """How soon an index is recommended."""
+    print('\nrecommend_index, by effects along the rays')
+    row('', 'first', 'again')
+    for one in record['recommend']:
+        row(f'{one["effects"]}, {one["request"]}', f'{one["first_ms"]:.0f} ms',
+            f'{one["again_ms"]:.0f} ms')  # fmt: skip
+
+
 def main() -> None:
     """Measure, print side by side, and keep the record."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -116,18 +132,20 @@ def main() -> None:
         for benchmark in given.only:
             arguments = BENCHMARKS[benchmark][given.quick]
             record[benchmark] = measured(benchmark, arguments, Path(name))
-    print('\n=== side by side')
-    for told, show in (
-        ('kernel', print_rates),
-        ('file_to_film', print_sizes),
-        ('live', print_live),
-    ):
-        if told in record:
-            show(record)
     given.output.mkdir(parents=True, exist_ok=True)
     kept = given.output / time.strftime('%Y%m%d_%H%M%S.json')
     kept.write_text(json.dumps(record, indent=1), encoding='utf-8')
     print(f'\nrecord: {kept}')
+    print('\n=== side by side')
+    for name, show in (
+        ('kernel', print_rates),
+        ('file_to_film', print_sizes),
+        ('live', print_live),
+        ('inference', print_inference),
+        ('recommend', print_answers),
+    ):
+        if name in record:
+            show(record)
 
 
 if __name__ == '__main__':

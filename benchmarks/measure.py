@@ -22,32 +22,10 @@ from tests.virtual_paint_shop.gauge import GaugeNoise, measure
 from tests.virtual_paint_shop.jobs import record
 from tests.virtual_paint_shop.truths import choose as choose_truths
 
-<<<<<<< HEAD
-# One thread a process: several doors are at work at once, and would wait for each other.
-for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
-    os.environ.setdefault(threads, '1')
-
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
-
-from benchmarks.records import add, kept  # noqa: E402
-from tests.virtual_paint_shop.bench import Bench  # noqa: E402
-from tests.virtual_paint_shop.draw import draw_jobs, stream  # noqa: E402
-from tests.virtual_paint_shop.gauge import GaugeNoise, measure  # noqa: E402
-from tests.virtual_paint_shop.jobs import record  # noqa: E402
-from tests.virtual_paint_shop.truths import choose as choose_truths  # noqa: E402
-
-from paint_deposition.api.simulation import look_at  # noqa: E402
-from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
-from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.reading_choice import (  # noqa: E402
-=======
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.reading_choice import (
->>>>>>> h-batch
     ChosenReadings,
     choose,
     power_of,

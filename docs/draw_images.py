@@ -1,14 +1,23 @@
 """Draw the pictures of the documentation again, with the commands that the documentation names.
 
-Run it in the project's environment: `. setup/environment.sh; python docs/draw_images.py`.
+Run it in the project's environment, with nothing behind it for all pictures, or with `build` for
+the film as it builds up, `layers` for the layers in architecture.svg, `results` for the rest:
+`. setup/environment.sh; python docs/draw_images.py build`.
 """
 
+import re
 import shutil
 import subprocess
+import sys
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
+import matplotlib.pyplot as plt
+import numpy as np
 from PIL import Image
+
+import paint_deposition as pd
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'
@@ -16,15 +25,102 @@ IMAGES = ROOT / 'docs/images'
 LARGEST_BYTES = 300_000
 WIDEST_PX = 1250
 
+# The moving picture: frames a second, how much faster than the robot, the last frame's time [s].
+FRAMES_PER_S, SPEED_UP, REST_S = 12, 3.0, 2.5
+LARGEST_FILM_UM = 24.0
+
 
 def main() -> None:
+    """Draw what is named on the command line, or everything."""
+    drawn = {'build': draw_build, 'layers': draw_layers, 'results': draw_results}
+    for name in sys.argv[1:] or drawn:
+        drawn[name]()
+
+
+def draw_build() -> None:
+    """The film on the sample door while the gun moves, from the simulation of each moment."""
+    door = pd.read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.02)
+    motion = pd.read_recording(SAMPLES / 'door_horizontal', state_topic='/atomizer/state')
+    step_ns = round(1e9 * SPEED_UP / FRAMES_PER_S)
+    moments = np.arange(motion.stamps_ns[0] + step_ns, motion.stamps_ns[-1] + step_ns, step_ns)
+    frames = [frame(door, up_to(motion, moment)) for moment in moments]
+    path = IMAGES / 'film-build.gif'
+    frames[0].save(
+        path, save_all=True, append_images=frames[1:], loop=0, optimize=True,
+        duration=[1000 // FRAMES_PER_S] * (len(frames) - 1) + [round(1000 * REST_S)],
+    )  # fmt: skip
+    check_size(path, 1_500_000)
+
+
+def up_to(motion: pd.Trajectory, moment_ns: int) -> pd.Trajectory:
+    """The motion until a moment."""
+    poses = motion.stamps_ns <= moment_ns
+    changes = motion.trigger_stamps_ns <= moment_ns
+    changes[0] = True  # without any change the gun would spray throughout
+    return replace(
+        motion,
+        stamps_ns=motion.stamps_ns[poses],
+        positions_m=motion.positions_m[poses],
+        quaternions_xyzw=motion.quaternions_xyzw[poses],
+        trigger_stamps_ns=motion.trigger_stamps_ns[changes],
+        trigger_flow=motion.trigger_flow[changes],
+        trigger_brush=motion.trigger_brush[changes] if len(motion.trigger_brush) else changes[:0],
+        trigger_set_points=motion.trigger_set_points[changes]
+        if len(motion.trigger_set_points)
+        else motion.trigger_set_points,
+    )
+
+
+def frame(door: pd.Surface, motion: pd.Trajectory) -> Image.Image:
+    """The film at the end of a motion, seen from the gun, with the path and the bell."""
+    try:
+        film_um = pd.simulate(door, motion).film_um
+    except pd.PaintError:  # the gun has not opened yet
+        film_um = np.zeros(len(door.vertices_m))
+    spraying = motion.trigger_flow[-1] > 0.0
+    figure, axes = plt.subplots(figsize=(8.4, 5.0), dpi=100, layout='constrained')
+    x, _, z = door.vertices_m.T
+    levels = np.linspace(0.0, LARGEST_FILM_UM, 33)
+    shown = axes.tricontourf(x, z, door.faces, film_um, levels=levels, extend='max')
+    path = motion.positions_m[:, [0, 2]]
+    axes.plot(*path.T, color='white', linewidth=3.0)
+    axes.plot(*path.T, color='#333333', linewidth=1.0)
+    axes.plot(*path[-1], 'o', markersize=15, color='#e4572e' if spraying else '#999999', mec='w')
+    axes.set(
+        xlim=(-0.85, 0.85), ylim=(-0.05, 0.95), aspect='equal', xlabel='x [m]', ylabel='z [m]'
+    )
+    mean_um = np.average(film_um, weights=door.vertex_areas_m2)
+    axes.set_title(f'{motion.duration_s:4.1f} s, mean film {mean_um:4.1f} µm', loc='left')
+    figure.colorbar(shown, ax=axes, label='film [µm]', ticks=range(0, 25, 4), shrink=0.85)
+    figure.canvas.draw()
+    picture = Image.fromarray(np.asarray(figure.canvas.buffer_rgba())).convert('RGB')
+    plt.close(figure)
+    return picture.quantize(96, dither=Image.Dither.NONE)
+
+
+def draw_layers() -> None:
+    """Put the layers that the linter holds into the picture of the architecture."""
+    settings = (ROOT / 'pyproject.toml').read_text(encoding='utf-8')
+    (held,) = re.findall(r'exhaustive = true\nlayers = \[(.*?)\]', settings, re.DOTALL)
+    rows = []
+    layers = re.findall(r"'(.+?)'", held)
+    step = 390 // len(layers)
+    for number, layer in enumerate(layers):
+        name = ' '.join(layer.split(' | '))
+        rows.append(
+            f'    <rect class="layer" y="{step * number}" width="205" height="{step - 5}" rx="4"/>'
+            f'<text class="room" x="102" y="{step * number + step // 2 + 2}">{name}</text>\n'
+        )
+    path = IMAGES / 'architecture.svg'
+    old = path.read_text(encoding='utf-8')
+    new = re.sub(r'(    <rect class="layer" .*\n)+', lambda _: ''.join(rows), old)
+    path.write_text(new, encoding='utf-8')
+
+
+def draw_results() -> None:
     """Run the commands on the samples and keep their pictures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        paint('simulate', '--mesh', SAMPLES / 'door.stl', '--trajectory',
-              SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
-              '-o', folder / 'film')  # fmt: skip
-        keep(Image.open(folder / 'film/film.png'), 'door.png')
         paint('calibrate', SAMPLES / 'panel_study/campaign.yaml', '-o', folder / 'calibration')
         paint('recommend', '--model', folder / 'calibration/model.yaml', '--target-um', 20,
               '--tolerance', 0.05, '--width', 0.9, '-o', folder / 'index')  # fmt: skip
@@ -80,9 +176,13 @@ def keep(picture: Image.Image, name: str) -> None:
     picture = picture.convert('RGB')
     picture.thumbnail((WIDEST_PX, WIDEST_PX), Image.Resampling.LANCZOS)
     picture.save(path, optimize=True)
-    size = path.stat().st_size
-    if size > LARGEST_BYTES:
-        raise SystemExit(f'{path} has {size} bytes, more than {LARGEST_BYTES}')
+    check_size(path, LARGEST_BYTES)
+
+
+def check_size(path: Path, most_bytes: int) -> None:
+    """Stop where a picture is too large for a page."""
+    if path.stat().st_size > most_bytes:
+        raise SystemExit(f'{path} has {path.stat().st_size} bytes, more than {most_bytes}')
 
 
 if __name__ == '__main__':

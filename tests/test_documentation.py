@@ -1,38 +1,72 @@
-"""Documentation names files and shows layers that are there."""
+"""What the documentation names is there: files, headings, commands with their options, layers."""
 
 import re
+import shlex
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
 
+import click
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGE = ROOT / 'ros2_ws/src/paint_deposition/paint_deposition'
+SHARE = ROOT / 'ros2_ws/src/paint_deposition'
+PACKAGE = SHARE / 'paint_deposition'
 PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md')])
+every_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
+@every_page
 def test_links_lead_to_files_and_headings(page: Path):
+    broken = []
     for target in re.findall(r'\]\((?!https?:)([^)\s]*)\)', page.read_text(encoding='utf-8')):
         name, _, heading = target.partition('#')
         linked = page.parent / name if name else page
-        assert linked.exists(), target
-        assert not heading or heading in headings(linked), target
+        if not linked.exists() or (heading and heading not in headings(linked)):
+            broken.append(target)
+    assert not broken
 
 
-@pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
-def test_modules_that_are_named_are_there(page: Path):
-    rooms = '|'.join(room.name for room in PACKAGE.iterdir() if room.is_dir())
-    text = page.read_text(encoding='utf-8')
-    for module in re.findall(rf'`((?:{rooms})/[\w/]+\.py)`', text):
-        assert (PACKAGE / module).is_file(), module
-    for test in re.findall(r'`(tests/[\w/.]+)`', text):
-        assert (ROOT / test).exists(), test
+@every_page
+def test_files_that_are_named_are_there(page: Path):
+    folders = [folder for folder in (PACKAGE, SHARE, ROOT) if folder.is_dir()]
+    known = {entry.name for folder in folders for entry in folder.iterdir() if entry.is_dir()}
+    known -= {'build', 'install', 'runs', 'results'}
+    text = re.sub(r'```.*?```', '', page.read_text(encoding='utf-8'), flags=re.DOTALL)
+    named = [
+        path for path in re.findall(r'`([\w.-]+/[\w./-]*)`', text) if path.split('/')[0] in known
+    ]
+    assert not [p for p in named if not any((folder / p).exists() for folder in folders)]
+
+
+@every_page
+def test_commands_that_are_shown_have_their_options(page: Path):
+    from paint_deposition.cli.main import COMMANDS, paint
+
+    context = click.Context(paint)
+    unknown = []
+    for line in shown_commands(page):
+        name, *words = shlex.split(line.replace('…', ''), comments=True)
+        if name not in COMMANDS:
+            unknown.append(name)
+            continue
+        command = paint.get_command(context, name)
+        options = {o for parameter in command.params for o in parameter.opts}
+        options |= {o for parameter in command.params for o in parameter.secondary_opts}
+        given = [word for word in words if re.fullmatch(r'--?[a-z][a-z-]*', word)]
+        unknown += [f'{name} {word}' for word in given if word not in {*options, '--help'}]
+    assert not unknown
+
+
+@every_page
+def test_targets_of_make_are_there(page: Path):
+    targets = re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE)
+    named = re.findall(r'`make ([a-z-]+)', page.read_text(encoding='utf-8'))
+    assert not set(named) - set(targets)
 
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason='tomllib comes with Python 3.11')
-def test_the_picture_shows_the_layers_that_the_linter_holds():
+def test_picture_and_table_show_the_rooms_that_the_linter_holds():
     import tomllib
 
     settings = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
@@ -41,10 +75,21 @@ def test_the_picture_shows_the_layers_that_the_linter_holds():
     picture = ElementTree.parse(ROOT / 'docs/images/architecture.svg')
     (drawn,) = picture.iterfind('.//*[@id="layers"]')
     shown = [text.text for text in drawn if text.get('class') == 'room']
-    assert shown == [' '.join(layer.split(' | ')) for layer in held]
+    layers = [layer.split(' | ') for layer in held]
+    assert shown == [' '.join(layer) for layer in layers], 'run docs/draw_images.py layers'
+    page = (ROOT / 'docs/architecture.md').read_text(encoding='utf-8')
+    rooms = [room for layer in layers for room in layer if (PACKAGE / room).is_dir()]
+    assert not [room for room in rooms if f'`{room}/`' not in page]
 
 
 def headings(page: Path) -> set[str]:
     """Anchors of a page as GitHub makes them."""
     lines = re.findall(r'^#+ (.*)$', page.read_text(encoding='utf-8'), re.MULTILINE)
     return {re.sub(r'[^\w\- ]', '', line.lower()).replace(' ', '-') for line in lines}
+
+
+def shown_commands(page: Path) -> list[str]:
+    """Arguments of `paint` in the blocks of a page, each on one line."""
+    blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
+    lines = '\n'.join(blocks).replace('\\\n', ' ')
+    return re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE)
