@@ -11,7 +11,7 @@ import time
 import numpy as np
 from numba import njit
 
-from paint_deposition.kernel.accumulation import compile_kernel
+from paint_deposition.kernel.eq2_flux import compile_kernel
 
 TERMS = 16
 POINTS, REPEATS = 2048, 200

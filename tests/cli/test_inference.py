@@ -10,9 +10,9 @@ import yaml
 from booth import SAMPLES
 from cli.command import assert_refused, installed_paint, paint
 from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.verdict import percent
-from paint_deposition.files.model_file import read_model_file
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
 HIDDEN = 'incidence_attraction'

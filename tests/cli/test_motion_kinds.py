@@ -15,9 +15,9 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.motion.programmed import PROGRAMMED, Move
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.inference.readings.campaign import Campaign
 from robot_arm import JOINTS, sweep, tip_poses, urdf
 from scenes import stamps_ns
 

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from brushes import NARROW, WIDE, switched
-from paint_deposition.effects.base import Effect
+from paint_deposition.effects.base import Effect, SetPointPower
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.incidence_attraction import IncidenceAttraction
 from paint_deposition.effects.library.sag import Sag
-from paint_deposition.effects.set_point_power import SetPointPower
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.provenance import model_digest

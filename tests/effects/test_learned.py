@@ -13,8 +13,7 @@ from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, along_
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
-from paint_deposition.kernel.laws import in_precision
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Ray, in_precision
 from reference import reference_film_um
 
 LAW = pytest.mark.parametrize('law', CURVES.values(), ids=CURVES)

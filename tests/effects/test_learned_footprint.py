@@ -8,8 +8,7 @@ from booth import MODEL, STANDOFF_M, door, in_batches, painted, panel, path_of, 
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.kernel.laws import in_precision
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Ray, in_precision
 from reference import reference_film_um
 
 REACH_M = 0.2

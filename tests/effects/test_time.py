@@ -11,7 +11,7 @@ from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.gun_wake import GunWake
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 
 

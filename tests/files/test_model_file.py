@@ -24,7 +24,7 @@ from paint_deposition.files.model_file import (
     read_model_file,
     write_model,
 )
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 
 @pytest.fixture

@@ -10,11 +10,10 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.interpolated_brushes import by_set_points
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints
-from paint_deposition.model.brush_law import BrushLaw
+from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, BrushLaw, SetPoints
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory

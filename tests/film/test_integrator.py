@@ -13,8 +13,8 @@ from booth import LOOKING_ALONG_Y, SAMPLES
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import flux_um_per_s
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import flux_um_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory

@@ -9,9 +9,9 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import collapse_um, pass_film_um, sampled_collapse
-from paint_deposition.model.collapse import half_width_m
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import flux_um_per_s
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import flux_um_per_s
+from paint_deposition.model.eq3_collapse import half_width_m
 from patterns import PATTERNS, RING
 
 SPEED_M_PER_S = 0.2

@@ -9,7 +9,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from scenes import lying_plane, weaving
 

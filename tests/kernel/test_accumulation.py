@@ -10,7 +10,6 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
 from paint_deposition.film.layout import model_constants, step_rows
-from paint_deposition.kernel.accumulation import within_reach
 from paint_deposition.kernel.blocks import (
     LANES,
     LARGEST_BLOCK,
@@ -18,8 +17,9 @@ from paint_deposition.kernel.blocks import (
     Blocks,
     neighbours_together,
 )
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection, flux_um_per_s
+from paint_deposition.kernel.eq2_flux import within_reach
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection, flux_um_per_s
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from scenes import lying_plane, straight_pass, weaving

@@ -15,7 +15,7 @@ RATE = FACTOR = 2.0
 # Compiles a kernel with a law, or takes it from the cache, and prints which.
 PAINT = """
 import numba, numpy as np
-from paint_deposition.kernel import accumulation as kernel
+from paint_deposition.kernel import eq2_flux as kernel
 
 def law(ray, rate):
     return 1.0 - rate * ray.cos_incidence

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import Brush, SetPoints
-from paint_deposition.model.brush_law import SETTINGS, BrushLaw
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.brush import SETTINGS, Brush, BrushLaw, SetPoints
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 BASE = {
     'flow_cm3_per_min': 200.0, 'shaping_air_l_per_min': 250.0, 'bell_speed_rpm': 40_000.0,

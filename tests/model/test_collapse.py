@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from paint_deposition.model.collapse import ThreeGaussianCollapse
-from paint_deposition.model.line_integral import line_integral_um_m_per_s
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse, line_integral_um_m_per_s
 from patterns import PATTERNS
 
 ACROSS_M = np.linspace(-0.7, 0.7, 57)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 from scipy.integrate import quad
 
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 RINGS = [(0.0, 0.09), (0.02, 0.09), (0.09, 0.09), (0.22, 0.09), (0.22, 0.02), (1.0, 0.005)]
 PATTERNS = st.builds(

@@ -10,8 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import NEAREST_M, Projection, flux_um_per_s
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import NEAREST_M, Projection, flux_um_per_s
 from scenes import rotation_matrix
 
 PLANAR = PlanarPattern()

@@ -10,9 +10,13 @@ from scipy.integrate import quad
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.collapse import ThreeGaussianCollapse
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.uniformity import ParallelPasses, sigma_n_closed_form, variation
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
+from paint_deposition.model.eq4_eq5_uniformity import (
+    ParallelPasses,
+    sigma_n_closed_form,
+    variation,
+)
 
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,

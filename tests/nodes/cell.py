@@ -18,8 +18,8 @@ from rclpy.time import Time
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.recordings.headers import SET_POINTS
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.interpolated_brushes import by_set_points
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.base import PathContext
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface

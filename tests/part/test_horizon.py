@@ -5,8 +5,8 @@ import pytest
 from trimesh.creation import box
 from trimesh.util import concatenate
 
-from paint_deposition.part.horizon import HIGH_SINE, LEAST_SINE, SLACK_SINE
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.visibility import HIGH_SINE, LEAST_SINE, SLACK_SINE
 
 
 def horizon_sines(surface, rows=slice(None)):

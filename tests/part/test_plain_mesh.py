@@ -6,9 +6,7 @@ from tests import plain_mesh
 from tests.surfaces import solid, triangulated
 from trimesh.creation import box, icosphere
 
-from paint_deposition.part.creases import Edges
-from paint_deposition.part.groups import connected
-from paint_deposition.part.half_edges import edges_of
+from paint_deposition.part.edges import Edges, connected, edges_of
 from paint_deposition.part.normals import mean_normals, surface_normals
 from paint_deposition.part.welding import weld
 

@@ -9,7 +9,7 @@ from trimesh.creation import cylinder
 
 from paint_deposition.errors import MeshError
 from paint_deposition.part import refinement
-from paint_deposition.part.creases import Edges
+from paint_deposition.part.edges import Edges
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.welding import weld

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 from trimesh.creation import box
 
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
+from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import learned_figure, nearest_law

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.profiles import draw_profile, write_comparison_picture

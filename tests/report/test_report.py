@@ -14,11 +14,6 @@ import pytest
 from PIL import Image
 
 from booth import SAMPLES
-from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.diagnosis.procedure import ALPHA
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
@@ -26,6 +21,11 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.measuring_points import MeasuringPoints
 from paint_deposition.files.tables.layout import Layout
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.proposals import Place, Spray
+from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.film import point_rows

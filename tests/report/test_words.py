@@ -1,12 +1,12 @@
 """What the report calls a user's own effect: it reads as well as one of the library."""
 
 from booth import SAMPLES
-from paint_deposition.inference.diagnosis.verdict import EffectClass
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.place import PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.inference.diagnosis.verdict import EffectClass
 from paint_deposition.report.words import (
     effect_meaning,
     effect_name,

@@ -12,10 +12,10 @@ from booth import SAMPLES
 from paint_deposition.batch.cluster.finished import Finished
 from paint_deposition.batch.cluster.run import Case, run
 from paint_deposition.batch.cluster.workers import workers
-from paint_deposition.errors import ManyError
 from paint_deposition.batch.sweep.case import computed
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.errors import ManyError
 
 DOOR = SAMPLES / 'measured_door'
 CASES = 60

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from batch.line.synthetic import FIRST_S, HOUR_S, parts
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.batch.line.causes import pooled
 from paint_deposition.batch.line.change_points import changes_of
 from paint_deposition.batch.line.part import amplitudes
 from paint_deposition.batch.line.series import Series, series_of
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
 
 FIRST = amplitudes()[0]
 

@@ -12,7 +12,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.fitting.parameters import SHAPE_DEVIATIONS, FreeParameters
 from paint_deposition.model.coordinates import PATTERN
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 PATTERNS = st.builds(
     PlanarPattern,

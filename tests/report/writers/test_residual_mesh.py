@@ -5,10 +5,10 @@ import pytest
 import trimesh
 from scipy.spatial import cKDTree
 
-from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.comparison.residual_field import radius_of_readings_m
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.colour_scales import BARE_RGB
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.comparison.residual_field import radius_of_readings_m
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.writers.residual_mesh import file_name, write_residual_meshes
 from small_campaign import small_campaign

@@ -16,9 +16,6 @@ if TYPE_CHECKING:
     from paint_deposition.api.simulation import Film, simulate
     from paint_deposition.api.speeds import compare_speeds
     from paint_deposition.api.writing import write
-    from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-    from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
-    from paint_deposition.inference.diagnosis.verdict import Diagnosis
     from paint_deposition.effects.deposition_model import DepositionModel
     from paint_deposition.errors import PaintError
     from paint_deposition.files.campaign_file import read_campaign
@@ -26,7 +23,12 @@ if TYPE_CHECKING:
     from paint_deposition.files.meshes import read_mesh
     from paint_deposition.files.model_file import read_model, write_model
     from paint_deposition.files.motion_files import read_recording
+    from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+    from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+    from paint_deposition.inference.diagnosis.verdict import Diagnosis
     from paint_deposition.inference.fitting.calibration import Calibration
+    from paint_deposition.inference.readings.campaign import Campaign
+    from paint_deposition.inference.readings.readings import Readings
     from paint_deposition.motion.driven_speed import DrivenSpeed
     from paint_deposition.motion.trajectory import Trajectory
     from paint_deposition.part.surface import Surface
@@ -35,8 +37,6 @@ if TYPE_CHECKING:
     from paint_deposition.planning.part_plan import PartPlan
     from paint_deposition.planning.plan import Plan
     from paint_deposition.planning.recommendation import Recommendation
-    from paint_deposition.inference.readings.campaign import Campaign
-    from paint_deposition.inference.readings.readings import Readings
 
 # Name, and the module that defines it, within this package.
 DEFINED_IN = {

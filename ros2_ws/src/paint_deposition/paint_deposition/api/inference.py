@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.comparison.comparison import compare as compared
-from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
-from paint_deposition.inference.diagnosis.refit import refit as refitted
-from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
+from paint_deposition.inference.diagnosis.refit import refit as refitted
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.inference.fitting.panel_reach import Reach, short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.geometry import require_paint
 

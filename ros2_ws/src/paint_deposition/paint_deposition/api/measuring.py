@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 
 from paint_deposition.api.geometry import look_at, require_brushes
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.reading_choice import (
     DEFAULT_POINTS,
     DEFAULT_REPEATS,
@@ -12,9 +15,6 @@ from paint_deposition.inference.diagnosis.reading_choice import (
     choose,
 )
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import Trajectory

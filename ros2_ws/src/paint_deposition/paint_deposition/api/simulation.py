@@ -11,19 +11,19 @@ import numpy as np
 from paint_deposition.api.geometry import GunOnPart, look_at_guns, require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import by_set_points
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.readings import Readings
 
 Progress = Callable[[str, float], None]
 

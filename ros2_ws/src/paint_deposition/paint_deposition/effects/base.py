@@ -5,19 +5,40 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
-from paint_deposition.effects.set_point_power import SetPointPower
 from paint_deposition.errors import ModelError
-from paint_deposition.kernel.ray import Ray as Ray
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.projection import Projection
+from paint_deposition.kernel.laws import Ray as Ray
+from paint_deposition.model.brush import Brush, SetPoints
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints
+
+
+class SetPointPower(BaseModel):
+    """A power law: the amplitudes as given hold at one value of the set-point."""
+
+    model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
+
+    setting: Literal['flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv']
+    at: float = Field(gt=0.0, description='value of the set-point at which the amplitudes hold')
+    exponent: float = Field(ge=-5.0, le=5.0, description='power of the set-point over that value')
+
+    def factor(self, set_points: SetPoints, whose: str) -> float:
+        """By how much the amplitudes grow at other set-points.
+
+        Raises:
+            ModelError: the set-point is not known there; ``whose`` names effect and brush.
+        """
+        value = getattr(set_points, self.setting)
+        if value is None:
+            raise ModelError(f'{whose} does not tell its {self.setting}; give it to the brush')
+        return (value / self.at) ** self.exponent
+
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250

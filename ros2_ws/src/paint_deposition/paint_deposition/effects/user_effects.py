@@ -19,7 +19,7 @@ from paint_deposition.effects.base import Effect, PathContext, Ray
 from paint_deposition.effects.catalogue import IDS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import in_precision
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory

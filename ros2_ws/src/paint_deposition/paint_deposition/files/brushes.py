@@ -5,9 +5,8 @@ from typing import Any
 
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.refusals import checked
-from paint_deposition.model.brush import MOST, Brush, SetPoints
-from paint_deposition.model.brush_law import BrushLaw
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.brush import MOST, Brush, BrushLaw, SetPoints
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 PLANAR = 'planar'
 KEYS = (PLANAR, *SetPoints.model_fields)

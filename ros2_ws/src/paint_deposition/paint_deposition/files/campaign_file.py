@@ -16,13 +16,13 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.words import UNITS_M, words_of
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
 from paint_deposition.motion.spraying import require_spraying
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Readings are matched to the surface; a finer mesh only helps where the surface is strongly
 # curved.

@@ -13,8 +13,8 @@ from paint_deposition.files.tables.finding import read_table
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table
-from paint_deposition.part.surface import Surface
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
+from paint_deposition.part.surface import Surface
 
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0

@@ -9,7 +9,7 @@ from paint_deposition.files.tables.columns import AXES, NORMALS, ON_FACE
 from paint_deposition.files.tables.finding import read_table
 from paint_deposition.files.tables.layout import Layout
 from paint_deposition.files.tables.table import Table
-from paint_deposition.part.face_places import on_face_m
+from paint_deposition.part.gauge_places import on_face_m
 from paint_deposition.part.surface import Surface
 
 MOST_NAMED = 6

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface

@@ -21,7 +21,7 @@ from paint_deposition.film.layout import (
 )
 from paint_deposition.film.lines_of_sight import LinesOfSight, Obstacle, Sight
 from paint_deposition.film.paint_used import PaintUsed
-from paint_deposition.kernel.accumulation import REACH, TERMS, compile_kernel
+from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 

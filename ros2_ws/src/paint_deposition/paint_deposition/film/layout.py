@@ -7,9 +7,9 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.kernel import accumulation as kernel
+from paint_deposition.kernel import eq2_flux as kernel
 from paint_deposition.kernel.laws import Law
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 
 Laws = tuple[tuple[Law, int], ...]

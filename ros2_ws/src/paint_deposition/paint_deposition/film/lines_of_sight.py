@@ -10,9 +10,9 @@ from typing import Protocol
 import numpy as np
 from numba import get_num_threads, njit
 
-from paint_deposition.kernel.accumulation import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
 from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.part.points import SurfacePoints
 
 # Lines of sight are traced anew after this travel of the emission point [m].

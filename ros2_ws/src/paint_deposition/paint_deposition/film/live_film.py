@@ -9,8 +9,8 @@ from operator import attrgetter
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.between_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.lines_of_sight import Obstacle
 from paint_deposition.motion.motion_log import (
     DEFAULT_LIMIT_POSES,

@@ -8,8 +8,11 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import require_above_zero
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.collapse import NEGLIGIBLE, SampledCollapse
-from paint_deposition.model.line_integral import line_integral_um_m_per_s
+from paint_deposition.model.eq3_collapse import (
+    NEGLIGIBLE,
+    SampledCollapse,
+    line_integral_um_m_per_s,
+)
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 

@@ -4,8 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paint_deposition.part.edge_distance import edge_distance_m
-from paint_deposition.part.groups import connected
+from paint_deposition.part.edges import connected, edge_distance_m
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 from paint_deposition.part.surface import Surface
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
-from paint_deposition.part import creases, curvature, edge_distance, hems, locating, rays, slope
+from paint_deposition.part import creases, derivatives, face_tree, locating
+from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
 from paint_deposition.part.locating import Location
@@ -85,12 +86,12 @@ class Surface:
         """
         vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
         faces = np.ascontiguousarray(faces, dtype=np.int64)
-        edges = creases.Edges.of(faces)
+        edges = Edges.of(faces)
         folds = creases.folds_rad(vertices_m, faces, edges)
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
         origin, patches = creases.split_at_creases(faces, edges, folds, rim)
         rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
-        strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
+        strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         del edges, folds  # large ones, before the next are made
         corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
@@ -108,7 +109,7 @@ class Surface:
             down / np.linalg.norm(down),
             rim_m,
             notes,
-            in_hem=hems.carried_over(strip, fine, len(vertices)),
+            in_hem=creases.carried_over(strip, fine, len(vertices)),
             curved_edges=CurvedEdges.of(corners, read_normals, patches),
             neighbours=neighbours_together(vertices),
         )
@@ -140,8 +141,8 @@ class Surface:
         return Occluder(self._tree)
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(N,) the triangle that each ray meets first, -1 for none; see ``rays.first_faces``."""
-        return rays.first_faces(self._tree(), starts_m, directions)
+        """(N,) the triangle that each ray meets first, from either side, -1 for none."""
+        return face_tree.first_faces(self._tree(), starts_m, directions)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""
@@ -150,7 +151,7 @@ class Surface:
             self.normals,
             area_m2=self.vertex_areas_m2,
             neighbours=self.neighbours,
-            slope_per_m=lambda: slope.slope_operator(
+            slope_per_m=lambda: derivatives.slope_operator(
                 self.vertices_m, self.faces, self.normals, self.down
             ),
             **self._covariates(self.vertices_m, self.normals),
@@ -184,11 +185,13 @@ class Surface:
         positions, outward = place.positions_m, place.normals
         operator = None
         if stencil_m is not None and len(positions):
-            way = slope.downhill(outward, self.down)
+            way = derivatives.downhill(outward, self.down)
             unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
             above = self.locate(positions - stencil_m * unit, outward)
             below = self.locate(positions + stencil_m * unit, outward)
-            operator = slope.slope_at_stencil(positions, above.positions_m, below.positions_m, way)
+            operator = derivatives.slope_at_stencil(
+                positions, above.positions_m, below.positions_m, way
+            )
             positions = np.concatenate([positions, above.positions_m, below.positions_m])
             outward = np.concatenate([outward, above.normals, below.normals])
         return SurfacePoints(
@@ -205,7 +208,7 @@ class Surface:
             'centre_m': self.centre_m,
             'extent_m': box_extent_m(self.vertices_m),
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
-            'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
+            'edge_distance_m': lambda: edge_distance_m(positions_m, self.rim_m),
             'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),
             'height_fraction': lambda: heights(positions_m, self.vertices_m, self.down),
         }
@@ -233,11 +236,11 @@ class Surface:
         if self.in_hem is not None:
             vertex_areas = vertex_areas * ~self.in_hem
             areas = areas * ~self.in_hem[self.faces[:, 0]]
-        return curvature.curvature_per_m(
+        return derivatives.curvature_per_m(
             positions_m,
             normals,
             np.concatenate([self.vertices_m, self.vertices_m[self.faces].mean(axis=1)]),
             np.concatenate([self.normals, centre_normals]),
             np.concatenate([vertex_areas, areas]),
-            max(curvature.RADIUS_M, self.longest_edge_m),
+            max(derivatives.RADIUS_M, self.longest_edge_m),
         )

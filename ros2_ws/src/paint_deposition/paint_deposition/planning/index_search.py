@@ -11,7 +11,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.plane_passes import PassSetup
 
 FEWEST_POINTS, MOST_POINTS = 121, 601

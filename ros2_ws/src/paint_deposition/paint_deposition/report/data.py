@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.part.points import SurfacePoints
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.part.points import SurfacePoints
 from paint_deposition.report.profile_charts import ModelLine, ProfileChart
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
 from paint_deposition.report.writers.fitted_model import history_as_list

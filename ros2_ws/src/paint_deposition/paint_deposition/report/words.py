@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
-from paint_deposition.inference.diagnosis.proposals import Spray
-from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.inference.diagnosis.proposals import Spray
+from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.style import TWO_SIDED_95
 from paint_deposition.report.writers.fitted_model import PATTERN, REFIT

@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.writers.provenance import provenance
-from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData

@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.api.writers.provenance import input_files, provenance, with_provenance
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
 from paint_deposition.film.spray_geometry import spray_geometry
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from scipy.special import logsumexp
 
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.batch.line.measured import Measured
 from paint_deposition.batch.line.part import amplitudes
 from paint_deposition.batch.line.pooling import ONE_BRUSH, Pool, Sums, evidence, likeliest, pools
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.report.words import unit_words
 
 # An effect is accepted if it is so probable that something of the catalogue acts.

@@ -8,12 +8,12 @@ from typing import Any
 from paint_deposition.batch.cluster.code import code_digest
 from paint_deposition.batch.cluster.finished import digest_of
 from paint_deposition.batch.cluster.run import Case
+from paint_deposition.batch.line.line_file import LineFile, Run, read_line, runs_in
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.batch.line.line_file import LineFile, Run, read_line, runs_in
 
 # Keys of a campaign that name files.
 FILES = {'mesh', 'trajectory', 'measurements', 'points', 'urdf'}

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.api.geometry import look_at
+from paint_deposition.batch.line.line_file import LineFile, Run
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -27,10 +28,9 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.batch.line.line_file import LineFile, Run
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25

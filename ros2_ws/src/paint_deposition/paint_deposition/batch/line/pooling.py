@@ -23,8 +23,8 @@ import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.special import logsumexp
 
-from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.batch.line.measured import Measured, places
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
 
 LEVELS = np.geomspace(1e-3, 0.2, 24).tolist()
 NOISES = np.geomspace(0.5, 3.0, 19).tolist()

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from paint_deposition import __version__
-from paint_deposition.files.atomic import write_text
-from paint_deposition.files.provenance import model_digest
 from paint_deposition.batch.line.change_points import date
 from paint_deposition.batch.line.result import Line
 from paint_deposition.batch.line.series import FEWEST, RUN_LENGTH, Series
+from paint_deposition.files.atomic import write_text
+from paint_deposition.files.provenance import model_digest
 from paint_deposition.report.page.layout import axis, base_layout
 from paint_deposition.report.page.report import TEMPLATES as SHARED
 from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK

@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.provenance import origin
-from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.batch.line.causes import Pooled, pooled
 from paint_deposition.batch.line.change_points import Change, changes_of, date
 from paint_deposition.batch.line.measured import Measured, measured_parts
 from paint_deposition.batch.line.part import FIGURES
 from paint_deposition.batch.line.series import FEWEST, RUN_LENGTH, Series, series_of
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.provenance import origin
+from paint_deposition.inference.fitting.parameters import FreeParameters
 
 if TYPE_CHECKING:
     import pyarrow as pa

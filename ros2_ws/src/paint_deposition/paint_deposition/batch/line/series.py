@@ -9,11 +9,11 @@ from functools import cached_property
 import numpy as np
 from scipy.stats import chi2, norm
 
-from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.batch.line.causes import Pooled
 from paint_deposition.batch.line.control_charts import Charts, charts, robust_deviation
 from paint_deposition.batch.line.measured import Measured, places
 from paint_deposition.batch.line.part import amplitudes
+from paint_deposition.effects.catalogue import EFFECTS
 
 # Fewer parts make no chart.
 FEWEST = 8

@@ -6,11 +6,11 @@ from collections import Counter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paint_deposition.files.json_files import write_json
-from paint_deposition.files.parquet import write_parquet
 from paint_deposition.batch.line.picture import write_line_picture
 from paint_deposition.batch.line.report import write_line_report
 from paint_deposition.batch.line.result import DERIVATIVES, Line
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa

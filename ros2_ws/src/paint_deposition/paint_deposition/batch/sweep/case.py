@@ -9,13 +9,13 @@ from typing import Any
 from paint_deposition.api.inference import compare
 from paint_deposition.api.planning import plan
 from paint_deposition.api.simulation import simulate
+from paint_deposition.batch.sweep.varied_motion import varied_motion
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.surface import Surface
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.batch.sweep.varied_motion import varied_motion
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
 
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
 FILM, PREDICTED = 'film_um', 'predicted_um'

@@ -11,17 +11,6 @@ from typing import Any
 from paint_deposition.batch.cluster.code import code_digest
 from paint_deposition.batch.cluster.finished import content_digest, digest_of
 from paint_deposition.batch.cluster.run import Case
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ManyError
-from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
-from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.provenance import model_digest
-from paint_deposition.inference.fitting.draws import drawn
 from paint_deposition.batch.sweep.sweep_file import SweepFile
 from paint_deposition.batch.sweep.variations import (
     DRAW,
@@ -33,6 +22,17 @@ from paint_deposition.batch.sweep.variations import (
     variations,
     varied_model,
 )
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError
+from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.inference.fitting.draws import drawn
 
 Tell = Callable[[str], None]
 NOTHING = 'nothing'

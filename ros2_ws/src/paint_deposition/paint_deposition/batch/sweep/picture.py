@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 
+from paint_deposition.batch.sweep.variations import DRAW
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK
-from paint_deposition.batch.sweep.variations import DRAW
 
 # Values that are few enough for a line through their medians.
 FEW_VALUES = 12

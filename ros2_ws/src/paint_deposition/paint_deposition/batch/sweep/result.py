@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.batch.cluster.finished import Finished
-from paint_deposition.files.json_files import write_json
-from paint_deposition.files.parquet import write_parquet
-from paint_deposition.files.provenance import origin
 from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.picture import write_sweep_picture
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.parquet import write_parquet
+from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -12,8 +12,8 @@ from rclpy.timer import Timer
 
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
-from paint_deposition.film.between_brushes import require_its_brush
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
+from paint_deposition.film.interpolated_brushes import require_its_brush
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting import early
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from paint_deposition import __version__
-from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.version import git_version
 from paint_deposition.film.statistics import CPK_MEANS
+from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import figures as charts

@@ -8,9 +8,9 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patheffects import Normal, Stroke
 
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED

@@ -4,9 +4,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
+from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.report.writers.fitted_model import write_fitted
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from paint_deposition.inference.comparison.comparison import Comparison
-from paint_deposition.inference.comparison.residual_field import spread_over_surface
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.film.colour_scales import residual_scale
+from paint_deposition.inference.comparison.comparison import Comparison
+from paint_deposition.inference.comparison.residual_field import spread_over_surface
 
 
 def write_residual_meshes(folder: str | Path, comparison: Comparison) -> list[Path]:

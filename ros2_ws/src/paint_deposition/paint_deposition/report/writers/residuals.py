@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from paint_deposition.inference.comparison.comparison import Comparison
 from paint_deposition.files.gauge_readings import write_table
+from paint_deposition.inference.comparison.comparison import Comparison
 
 
 def write_residuals(path: str | Path, comparison: Comparison) -> None:

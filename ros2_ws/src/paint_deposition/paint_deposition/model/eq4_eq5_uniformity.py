@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from paint_deposition.model.collapse import Collapse, ThreeGaussianCollapse
+from paint_deposition.model.eq3_collapse import Collapse, ThreeGaussianCollapse
 
 # Points of the period in the collapse's finest scale; the rule converges faster than any power.
 POINTS_PER_SCALE = 8.0

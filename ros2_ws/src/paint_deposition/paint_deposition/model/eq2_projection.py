@@ -3,7 +3,7 @@
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Eq. (2) has a pole at the emission point.
 NEAREST_M = 1e-3

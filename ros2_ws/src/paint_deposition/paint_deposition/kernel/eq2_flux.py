@@ -21,8 +21,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.fast_math import exp2
-from paint_deposition.kernel.laws import Law, product
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Law, Ray, product
 
 # Columns of a sub-step's row: emission point, tool axes x and y times Omega, tool axis z, shift
 # of the pattern on the model plane, dwell times relative flow times Omega^2, speed.
