@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paint_deposition.effects.catalogue import effect_class
+from brushes import two_brushes
+from paint_deposition.effects.catalogue import LEARNED, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -231,3 +232,15 @@ def test_memory_is_bounded_and_says_so():
     # Too late to be taken back: the gun is off from the first state on, not before.
     film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))
     assert film.up_to_date().film_um.max() > 1.0
+
+
+def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
+    """Another part, and a model without the brush that sprays: refused before the next pose."""
+    model = two_brushes()
+    before = _painted([TriggerChange(START_NS, 1.0, 2)], model)
+    other_part = LiveFilm(lying_plane(), model)
+    other_part.carry_on(before)
+    with pytest.raises(ModelError, match='brush 2 is not in the model'):
+        other_part.use(model.with_brush(1))
+    other_part.add_poses(_poses(straight_pass(TIMES_S), slice(0, 500)))
+    assert (other_part.brush, other_part.flow) == (2, 1.0)

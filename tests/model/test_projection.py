@@ -206,8 +206,8 @@ def test_rolling_the_gun_rolls_the_pattern():
 def test_the_model_joins_them():
     model = DepositionModel(planar=NARROW, projection=PROJECTION)
     assert model.reach_m == NARROW.radius_of_flux_m(1e-6)
-    assert model.shadow == 0.0
-    assert DepositionModel(effects=(Occlusion(strength=0.7),)).shadow == 0.7
+    assert max(model.shadows) == 0.0
+    assert DepositionModel(effects=(Occlusion(strength=0.7),)).shadows[0] == 0.7
     assert not model.needs_whole_strokes
     assert model.max_step_m == pytest.approx(0.0025)
     assert DepositionModel().max_step_m == pytest.approx(0.008)

@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 import paint_deposition as pd
-from paint_deposition.effects.learned.curves import CURVES, LearnedAcross
+from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PlanError
 from paint_deposition.inference.fitting.draws import drawn
@@ -25,7 +25,7 @@ NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.06, sigma2_m=0.1)
 )
 # More to the right, by 30 % over the width of the panel.
-SKEWED = NARROW.with_effect(LearnedAcross(low=-0.3, high=0.3, learned=(-0.15, 0.15)))
+SKEWED = NARROW.with_effect(CURVES['across_m'](low=-0.3, high=0.3, learned=(-0.15, 0.15)))
 
 
 @pytest.fixture(scope='module')

@@ -14,9 +14,8 @@ import pytest
 from PIL import Image
 
 from booth import SAMPLES
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.measuring_points import MeasuringPoints

@@ -13,7 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
-from paint_deposition.film.interpolated_brushes import by_set_points
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
@@ -190,9 +190,10 @@ def simulate(
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
-    given, told = models, [by_set_points(m, its) for m, its in zip(motions, models, strict=True)]
-    motions, models = [motion for motion, _ in told], [its for _, its in told]
-    for motion, its_model in told:
+    given, pairs = models, zip(motions, models, strict=True)
+    known = [with_interpolated_brushes(motion, its) for motion, its in pairs]
+    motions, models = [motion for motion, _ in known], [its for _, its in known]
+    for motion, its_model in known:
         require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface

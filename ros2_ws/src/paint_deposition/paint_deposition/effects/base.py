@@ -62,12 +62,12 @@ class PathContext:
 
     @property
     def across(self) -> np.ndarray:
-        """(3,) horizontal unit vector along the part, to the right as the gun sees it."""
+        """See ``across_axis``."""
         return across_axis(self.outward, self.down)
 
     @property
     def downhill(self) -> np.ndarray:
-        """(3,) unit vector down along the part, at right angles to ``across`` and ``outward``."""
+        """See ``downhill_axis``."""
         return downhill_axis(self.outward, self.down)
 
 
@@ -85,12 +85,10 @@ def parameter(
 
     Args:
         neutral: value at which the effect is absent; for a shape, its default.
-        low, high: bounds; a value outside is refused. Where physics knows one sign only, the
-            neutral value is one of them.
-        unit: its unit; also part of the field's name where it is not 1.
+        low, high: bounds; where physics knows one sign only, the neutral value is one of them.
+        unit: also part of the field's name where it is not 1.
         description: what it is, with its symbol, and what a positive value means.
-        typical: size of the amplitude that occurs in practice, the scale of its prior. For a
-            shape, unused.
+        typical: size of an amplitude that occurs in practice, the scale of its prior.
         role: 'amplitude' (neutral means absent) or 'shape' (length or time scale).
     """
     if typical is None:
@@ -196,9 +194,8 @@ class Effect(BaseModel):
         whose = f'{self.id} follows a set-point, and brush {brush.number}'
         factor = prod(power.factor(brush, whose) for power in self.follows)
         described, values = self.parameters(), {}
-        for name in self.amplitudes():
-            info, neutral = described[name], described[name]['neutral']
-            value = neutral + factor * (getattr(self, name) - neutral)
+        for name, neutral in self._neutral().items():
+            info, value = described[name], neutral + factor * (getattr(self, name) - neutral)
             if not info['low'] <= value <= info['high']:
                 raise ModelError(
                     f'{self.id}: {name} would be {value:.4g} at the set-points of brush '
@@ -211,8 +208,7 @@ class Effect(BaseModel):
     @property
     def is_neutral(self) -> bool:
         """Whether all amplitudes are at the value at which the effect is absent."""
-        described = self.parameters()
-        return all(getattr(self, name) == described[name]['neutral'] for name in self.amplitudes())
+        return all(getattr(self, name) == value for name, value in self._neutral().items())
 
     @property
     def acts_on_the_finished_film(self) -> bool:
@@ -223,9 +219,7 @@ class Effect(BaseModel):
     @property
     def absent(self) -> 'Effect':
         """The same with all amplitudes neutral."""
-        described = self.parameters()
-        neutral = {name: described[name]['neutral'] for name in self.amplitudes()}
-        return self.model_copy(update=neutral)
+        return self.model_copy(update=self._neutral())
 
     @classmethod
     def typical(cls) -> 'Effect':
@@ -245,6 +239,11 @@ class Effect(BaseModel):
     def amplitudes(cls) -> tuple[str, ...]:
         """Names of the parameters that make the effect absent at their neutral value."""
         return tuple(n for n, p in cls.parameters().items() if p['role'] == 'amplitude')
+
+    @classmethod
+    def _neutral(cls) -> dict[str, float]:
+        described = cls.parameters()
+        return {name: described[name]['neutral'] for name in cls.amplitudes()}
 
     @classmethod
     def coordinates(cls) -> dict[str, str]:

@@ -63,7 +63,7 @@ class DepositionModel(BaseModel):
         """A copy with other patterns, in the order of ``patterns``."""
         new = tuple(patterns)
         brushes = tuple(
-            brush.model_copy(update={'planar': planar, 'interpolated': False})
+            brush.calibrated.model_copy(update={'planar': planar})
             for brush, planar in zip(self.brushes, new, strict=False)
         )
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
@@ -83,10 +83,7 @@ class DepositionModel(BaseModel):
     def painting_with(self, number: int) -> 'DepositionModel':
         """The same for what a motion calls its brush: without ``brushes`` any number will do."""
         row = int(self.pattern_rows(np.array([number]))[0])
-        brushes = tuple(
-            brush.model_copy(update={'interpolated': False})
-            for brush in self.brushes[row : row + 1]
-        )
+        brushes = tuple(brush.calibrated for brush in self.brushes[row : row + 1])
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
 
     def of_numbers(self, numbers: Iterable[int]) -> 'DepositionModel':
@@ -99,9 +96,8 @@ class DepositionModel(BaseModel):
         self.require_brushes(wanted)
         if len(self.brushes) <= 1:
             return self
-        kept = [brush for brush in self.brushes if brush.number in wanted]
         return DepositionModel.of_brushes(
-            (brush.model_copy(update={'interpolated': False}) for brush in kept),
+            (brush.calibrated for brush in self.brushes if brush.number in wanted),
             projection=self.projection, effects=self.effects,
         )  # fmt: skip
 
@@ -127,15 +123,11 @@ class DepositionModel(BaseModel):
             ModelError: it has several brushes; ``purpose`` says what needs one.
         """
         if len(self.brushes) > 1:
+            numbers = listed(brush.number for brush in self.brushes)
             raise ModelError(
-                f'{purpose} is for one brush and the model has {listed(self._numbers)}: say which '
-                '(brush)'
+                f'{purpose} is for one brush and the model has {numbers}: say which (brush)'
             )
         return self
-
-    @property
-    def _numbers(self) -> tuple[int, ...]:
-        return tuple(brush.number for brush in self.brushes)
 
     def require_brushes(self, numbers: Iterable[int]) -> None:
         """Refuse a motion that names brushes which the model does not have.
@@ -162,7 +154,7 @@ class DepositionModel(BaseModel):
         """
         if not self.brushes:
             return np.zeros(len(numbers), dtype=np.int64)
-        known = np.array(self._numbers)
+        known = np.array([brush.number for brush in self.brushes])
         if len(known) == 1:
             numbers = np.where(numbers == ONLY_BRUSH, known[0], numbers)
         strange = np.setdiff1d(numbers, known)
@@ -184,21 +176,18 @@ class DepositionModel(BaseModel):
         """
         following = [effect for effect in self.effects if effect.follows]
         for effect in following:
-            if not self.brushes:
-                raise ModelError(
-                    f'{effect.id} follows set-points, which a model with planar alone does not '
-                    'tell; give brushes'
-                )
-            if not effect.amplitudes():
-                raise ModelError(
-                    f'{effect.id} has no amplitude that could follow set-points; take `follows` '
-                    'out'
-                )
-            if effect.acts_on_the_finished_film:
-                raise ModelError(
-                    f'{effect.id} acts on the finished film, which all brushes share: it cannot '
-                    'follow set-points; take `follows` out'
-                )
+            problem = (
+                'follows set-points, which a model with planar alone does not have; give brushes'
+                if not self.brushes
+                else 'has no amplitude that could follow set-points; take `follows` out'
+                if not effect.amplitudes()
+                else 'acts on the finished film, which all brushes share: it cannot follow '
+                'set-points; take `follows` out'
+                if effect.acts_on_the_finished_film
+                else ''
+            )
+            if problem:
+                raise ModelError(f'{effect.id} {problem}')
         if not following:
             return (self.effects,) * len(self.patterns)
         return tuple(tuple(e.of_brush(brush) for e in self.effects) for brush in self.brushes)
@@ -219,13 +208,8 @@ class DepositionModel(BaseModel):
         return planar.radius_of_flux_m(CUT_FLUX) * self.widening
 
     @property
-    def shadow(self) -> float:
-        """Most that is stopped of the flux where the line of sight is blocked, 0 to 1."""
-        return max(self.shadows)
-
-    @property
     def shadows(self) -> tuple[float, ...]:
-        """The same share for each of the patterns."""
+        """Share of the flux stopped where the line of sight is blocked, 0 to 1, by pattern."""
         by_pattern = self.effects_by_pattern()
         return tuple(max((e.shadow() for e in effects), default=0.0) for effects in by_pattern)
 
@@ -233,12 +217,8 @@ class DepositionModel(BaseModel):
     def max_step_m(self) -> float:
         """Travel of a sub-step that keeps the integral's error below 0.1 % of the peak [m]."""
         # Brushes that set-points stand for come and go while a motion is under way.
-        named = [
-            p
-            for p, number in zip(self.patterns, self._numbers or (0,), strict=True)
-            if number < BETWEEN
-        ]
-        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named)
+        named = [brush.planar for brush in self.brushes if brush.number < BETWEEN]
+        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named or [self.planar])
         return min(DEFAULT_MAX_STEP_M, 0.1 * width)
 
     def effect(self, effect_id: str) -> Effect | None:

@@ -16,7 +16,7 @@ from numba import njit
 
 import paint_deposition
 from paint_deposition.effects.base import Effect, PathContext, Ray
-from paint_deposition.effects.catalogue import IDS
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import in_precision
 from paint_deposition.model.eq2_projection import Projection
@@ -34,11 +34,7 @@ _loaded: dict[tuple[Path, str], type[Effect]] = {}
 
 
 def load_effect_file(path: str | Path) -> type[Effect]:
-    """The class of a user's own effect, read and tried out.
-
-    Raises:
-        ModelError: as ``read_effect_file`` and ``try_effect``.
-    """
+    """``read_effect_file`` and ``try_effect``."""
     effect = read_effect_file(path)
     try_effect(effect, path)
     return effect
@@ -74,7 +70,7 @@ def effect_of(path: Path, source: bytes) -> type[Effect]:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
         _loaded[key].file, _loaded[key].file_content = key[0], source
     effect = _loaded[key]
-    if effect.id in IDS:
+    if effect.id in EFFECTS:
         raise ModelError(
             f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
         )
@@ -130,8 +126,7 @@ def _line_in(error: Exception, path: Path) -> str:
     if isinstance(error, SyntaxError):
         return f', line {error.lineno}'
     frames = traceback.extract_tb(error.__traceback__)
-    numbers = [frame.lineno for frame in frames if frame.filename == str(path)]
-    return f', line {numbers[-1]}' if numbers else ''
+    return next((f', line {f.lineno}' for f in reversed(frames) if f.filename == str(path)), '')
 
 
 def _one_line(error: Exception) -> str:
@@ -150,14 +145,13 @@ def _checked(module: ModuleType, path: Path) -> type[Effect]:
         and issubclass(value, Effect)
         and value.__module__ == module.__name__
     ]
-    if not classes:
-        raise ModelError(f'{path}: has no effect; define one class that derives from Effect')
-    if len(classes) > 1:
+    if len(classes) != 1:
         names = ', '.join(c.__name__ for c in classes)
-        raise ModelError(f'{path}: has several effects ({names}); keep one a file')
-    effect = classes[0]
-    problem = _problem_with(effect)
-    if problem:
+        what = f'has several effects ({names}); keep one a file' if classes else (
+            'has no effect; define one class that derives from Effect')  # fmt: skip
+        raise ModelError(f'{path}: {what}')
+    (effect,) = classes
+    if problem := _problem_with(effect):
         raise ModelError(f'{path}: {effect.__name__} {problem}')
     return effect
 

@@ -183,7 +183,7 @@ def _learned(where: str, entry: dict[str, Any]) -> Effect:
             f'{where}: has no covariate; give that of the learned law, such as time_s'
         )
     # Loaded by those only whose models have learned.
-    from paint_deposition.effects.learned.catalogue import learned_law
+    from paint_deposition.effects.catalogue import learned_law
 
     cls = learned_law(covariate)
     values = {key: entry[key] for key in entry if key not in ('id', 'covariate')}

@@ -11,7 +11,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.film.integrator import FilmIntegrator, settled_um, shown_um
+from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.motion.trajectory import PoseCounts
@@ -45,12 +45,12 @@ class CommonFilm:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return settled_um(self.raw_um, self._effects, self.guns[0].points)
+        return after_film_effects(self.raw_um, self._effects, self.guns[0].points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return shown_um(self.raw_um, self._effects, self.guns[0].points)
+        return gauge_reading_um(self.raw_um, self._effects, self.guns[0].points)
 
     @property
     def used(self) -> PaintUsed:

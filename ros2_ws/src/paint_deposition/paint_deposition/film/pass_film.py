@@ -101,7 +101,7 @@ def pass_film_um(
     roll_rad: float,
     fineness: float = 1.0,
 ) -> np.ndarray:
-    """Film [um] across the pass, through the same integrator as every other film.
+    """Film [um] across the pass, integrated sub-step by sub-step with the effects.
 
     Args:
         model: the deposition model; its effects on the finished film are left out.

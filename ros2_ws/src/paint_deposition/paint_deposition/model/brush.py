@@ -57,6 +57,11 @@ class Brush(SetPoints):
     interpolated: bool = False
 
     @property
+    def calibrated(self) -> 'Brush':
+        """The same as one that the others do not determine."""
+        return self.model_copy(update={'interpolated': False})
+
+    @property
     def set_points(self) -> SetPoints:
         """What the cell sets for it."""
         return SetPoints(**{name: getattr(self, name) for name in SetPoints.model_fields})

@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, shown_um
+from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, gauge_reading_um
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES
@@ -66,7 +66,7 @@ class Forward:
 
     def _shown_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
         return np.concatenate([
-            shown_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
+            gauge_reading_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
             for part, film, one in zip(self._parts, films_um, stages, strict=True)
         ])  # fmt: skip
 
@@ -175,7 +175,7 @@ class _Part:
             )  # fmt: skip
         integrator.use(model)
         moving = tuple(e for e in model.effects if _defines(e, ('on_path',)))
-        return integrator, self._steps(slope, model.projection, moving, model.shadow > 0.0)
+        return integrator, self._steps(slope, model.projection, moving, max(model.shadows) > 0.0)
 
     def _prepared(self, slope: bool, *_: object) -> Steps:
         """The path as the integrator's effects have it."""

@@ -11,7 +11,7 @@ from paint_deposition.errors import ModelError
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.interpolated_brushes import by_set_points
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, BrushLaw, SetPoints
 from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
@@ -36,7 +36,7 @@ def motion(*changes: tuple[float, int, tuple[float, ...]]) -> Trajectory:
 
 
 def offline_um(given: Trajectory, model: DepositionModel = MODEL) -> np.ndarray:
-    numbered, known = by_set_points(given, model)
+    numbered, known = with_interpolated_brushes(given, model)
     known.require_brushes(numbered.brushes)
     path, _ = spray_path(numbered, 0.25, known.max_step_m)
     integrator = FilmIntegrator(lying_plane(), known)
@@ -159,7 +159,7 @@ def test_a_bag_keeps_set_points_and_paint_tells_them_apart(tmp_path):
     read = read_trajectory(write_pose_bag(tmp_path / 'run', CHANGING), None, '/atomizer/state')
     assert np.array_equal(np.nan_to_num(read.trigger_set_points), CHANGING.trigger_set_points)
     assert np.array_equal(offline_um(read), offline_um(CHANGING))
-    numbered, known = by_set_points(read, MODEL)
+    numbered, known = with_interpolated_brushes(read, MODEL)
     assert numbered.notes[-1].endswith('set-points lie between brushes 1, 2 (2 different)')
     assert model_digest(known) == model_digest(MODEL)
     path, _ = spray_path(numbered)
