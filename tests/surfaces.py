@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import Delaunay
 
 from paint_deposition.part.edges import Edges
-from paint_deposition.part.normals import mean_normals
+from plain_mesh import mean_normals
 
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

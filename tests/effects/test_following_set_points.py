@@ -82,15 +82,6 @@ def test_each_brush_paints_with_the_effects_at_its_own_set_points():
     assert np.abs(together - plain).max() > 0.02 * total.max()
 
 
-def test_a_power_of_zero_is_an_effect_that_follows_nothing_to_the_last_bit():
-    still = tuple(
-        e.model_copy(update={'follows': (e.follows[0].model_copy(update={'exponent': 0.0}),)})
-        for e in FOLLOWING
-    )
-    plain = brushed(*(e.model_copy(update={'follows': ()}) for e in FOLLOWING))
-    assert np.array_equal(film_um(brushed(*still), PATH), film_um(plain, PATH))
-
-
 def test_the_live_film_follows_set_points_as_the_offline_film_does():
     model = brushed(*FOLLOWING)
     columns = MOTION.stamps_ns, MOTION.positions_m, MOTION.quaternions_xyzw
@@ -133,7 +124,7 @@ def test_a_model_file_holds_what_an_effect_follows(tmp_path):
     ('model', 'words'),
     [
         (DepositionModel(effects=FOLLOWING[:1]),
-         'incidence_attraction follows set-points, which a model with planar alone does not tell'),
+         'incidence_attraction follows set-points, which a model with planar alone does not have'),
         (brushed(IncidenceAttraction(attraction=1.0, follows=(BELL,))),
          'incidence_attraction follows a set-point, and brush 1 does not tell its bell_speed_rpm'),
         (brushed(Sag(run_m=0.01, follows=(AIR,))),

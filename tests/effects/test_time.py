@@ -35,14 +35,6 @@ def test_what_flows_behind_a_closing_has_drifted_like_the_pass(lag):
     np.testing.assert_allclose(drifted_then_late.flow, late_then_drifted.flow, rtol=1e-12)
 
 
-def test_pose_lag_keeps_the_paint():
-    path = path_of(serpentine((0.1, -0.1)))
-    plain = painted(panel(), path)
-    for lag_s in (-0.03, 0.03):
-        lagged = painted(panel(), path, PoseLag(lag_s=lag_s))
-        assert lagged.emitted_cm3 == pytest.approx(plain.emitted_cm3, rel=1e-9)
-
-
 def test_gun_wake_is_the_whole_pass_moved_back():
     trajectory = serpentine((0.0,), speed_m_per_s=0.35)
     moved = replace(trajectory, positions_m=trajectory.positions_m - [0.02 * 0.35, 0.0, 0.0])

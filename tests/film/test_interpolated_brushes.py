@@ -116,13 +116,6 @@ def test_a_number_counts_more_than_set_points():
     assert np.array_equal(offline_um(told), offline_um(by_number))
 
 
-def test_a_model_of_one_pattern_paints_whatever_is_set():
-    one = DepositionModel()
-    told = motion((1.0, 0, OUTSIDE), (0.8, 0, MIDDLE), (0.0, 0, UNTOLD))
-    untold = replace(told, trigger_set_points=np.empty((0, 4)))
-    assert np.array_equal(offline_um(told, one), offline_um(untold, one))
-
-
 @pytest.mark.parametrize(
     ('set_points', 'words'),
     [

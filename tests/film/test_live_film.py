@@ -1,7 +1,5 @@
 """The live film is the offline film, whatever way the motion comes in."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -78,20 +76,6 @@ def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
     assert np.array_equal(film.up_to_date().film_um, expected.film_um)
     assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
     assert expected.film_um.max() > 1.0
-
-
-def test_a_law_over_time_counts_from_the_start_of_the_motion():
-    """A factor over time changes the film; the clock of the recording does not matter."""
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film_um = _offline(motion, DRIFTING).film_um
-    assert np.abs(film_um - _offline(motion).film_um).max() > 0.1
-    hour = 3_600_000_000_000
-    later = replace(
-        motion,
-        stamps_ns=motion.stamps_ns + hour,
-        trigger_stamps_ns=motion.trigger_stamps_ns + hour,
-    )
-    assert np.array_equal(_offline(later, DRIFTING).film_um, film_um)
 
 
 def test_looking_at_the_film_changes_nothing():
@@ -175,15 +159,6 @@ def test_after_a_reset_the_gun_stays_as_it_was():
         trigger_flow=np.array([0.8]),
     )
     assert np.allclose(film.up_to_date().film_um, _offline(second).film_um, rtol=0, atol=1e-9)
-
-
-def test_after_a_reset_the_same_motion_paints_the_same_film():
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = _painted(_events(motion, 10))
-    first = film.up_to_date().film_um
-    film.reset()
-    film.follow(_events(motion, 33))
-    assert np.array_equal(film.up_to_date().film_um, first)
 
 
 def test_a_motion_that_begins_again_paints_a_second_coat():

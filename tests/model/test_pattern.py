@@ -124,15 +124,6 @@ def test_beyond_its_radius_the_flux_is_negligible(pattern, fraction, angle):
     assert beyond.max() <= 1.01 * fraction * pattern.peak_flux_um_per_s
 
 
-def test_the_radius_is_no_larger_than_it_need_be():
-    pattern = PlanarPattern()
-    rho = np.linspace(0.0, 2.0, 20_001)
-    towards = pattern.phi_rad + 0.5 * math.pi
-    flux = pattern.flux_um_per_s(rho * math.cos(towards), rho * math.sin(towards))
-    needed = rho[flux > 1e-6 * pattern.peak_flux_um_per_s].max()
-    assert needed < pattern.radius_of_flux_m(1e-6) < 1.05 * needed
-
-
 @pytest.mark.parametrize(
     'wrong',
     [{'K1_cm3_per_s': 0.0}, {'K2': -0.1}, {'K2': 1.1}, {'K3': 1.2}, {'r_m': -0.01},

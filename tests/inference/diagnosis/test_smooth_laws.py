@@ -25,7 +25,12 @@ from reference import reference_film_um
 
 OF_ANY_KIND = pytest.mark.parametrize(
     ('law', 'kind'),
-    [(law, kind) for law in LEARNED.values() for kind in law.kinds if law.covariate != 'speed_m_per_s'],
+    [
+        (law, kind)
+        for law in LEARNED.values()
+        for kind in law.kinds
+        if law.covariate != 'speed_m_per_s'
+    ],
     ids=lambda value: value if isinstance(value, str) else value.covariate,
 )
 

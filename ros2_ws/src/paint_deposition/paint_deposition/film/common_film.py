@@ -59,7 +59,7 @@ class CommonFilm:
 
     @property
     def emitted_cm3(self) -> float:
-        """Solids that a part which catches everything would have got [cm3]."""
+        """See ``PaintUsed``."""
         return self.used.emitted_cm3
 
     def laid_cm3(self, areas_m2: np.ndarray) -> np.ndarray:

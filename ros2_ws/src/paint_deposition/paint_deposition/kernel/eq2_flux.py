@@ -1,4 +1,4 @@
-"""The hot loop: flux of eqs. (1) and (2) summed over sub-steps and surface points.
+"""Eq. (2), the hot loop: its flux with eq. (1) summed over sub-steps and surface points.
 
 Points come in blocks that lie together; a block out of the pattern's reach is skipped whole, and
 within a block the loop over points is one SIMD loop without calls or branches. Each point's sum

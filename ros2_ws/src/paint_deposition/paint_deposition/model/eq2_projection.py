@@ -1,9 +1,13 @@
-"""Projection of the planar model onto any surface, eq. (2) of Conner et al. (IROS 2002)."""
+"""Eq. (2) of Conner et al. (IROS 2002): the planar model projected onto any surface.
 
-import numpy as np
+    flux(s) = (Omega / l)^2 <e, n> / <e, z>^3 d(q),    q = Omega (s - p) / <s - p, z>
+
+with the emission point p, the unit vector e from it to the surface point s at a distance l, the
+bell's axis z and the surface normal n, turned against e. Here is where p and the model plane lie;
+the flux itself is summed in ``kernel/eq2_flux.py``.
+"""
+
 from pydantic import BaseModel, ConfigDict, Field
-
-from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Eq. (2) has a pole at the emission point.
 NEAREST_M = 1e-3
@@ -33,48 +37,3 @@ class Projection(BaseModel):
         What lies behind the bell gets none, nor does what touches the emission point.
         """
         return max(self.emission_offset_m, NEAREST_M)
-
-
-def flux_um_per_s(
-    planar: PlanarPattern,
-    projection: Projection,
-    positions_m: np.ndarray,
-    normals: np.ndarray,
-    tcp_m: np.ndarray,
-    rotation: np.ndarray,
-) -> np.ndarray:
-    """Eq. (2): deposition flux on surface elements for one atomizer pose.
-
-    The double-precision reference that the compiled kernel is checked against. With the outward
-    unit normal n, the paper's <e, n> of a surface that faces the bell is -<e, n_outward>.
-
-    Args:
-        planar: the planar model d(q) of eq. (1).
-        projection: Omega and the emission point.
-        positions_m: (V, 3) surface points s [m].
-        normals: (V, 3) outward unit normals.
-        tcp_m: (3,) tool centre point (bell cup centre) [m].
-        rotation: (3, 3) tool axes as columns; z points from the bell to the surface.
-
-    Returns:
-        (V,) flux [um/s]; zero where the surface faces away or lies behind the bell or behind the
-        emission point.
-    """
-    z = rotation[:, 2]
-    emission_point = tcp_m - projection.emission_offset_m * z
-    to_surface = positions_m - emission_point
-    along_z = to_surface @ z
-    in_front = along_z > projection.nearest_m
-    distance = np.linalg.norm(to_surface, axis=1)
-    e = to_surface / np.where(distance > 0.0, distance, 1.0)[:, np.newaxis]
-    cos_incidence = -np.einsum('ij,ij->i', e, normals)
-    lit = in_front & (cos_incidence > 0.0)
-
-    omega = projection.model_plane_m
-    scale = omega / np.where(lit, along_z, 1.0)
-    flux = planar.flux_um_per_s(
-        scale * (to_surface @ rotation[:, 0]), scale * (to_surface @ rotation[:, 1])
-    )
-    cos_axis = np.where(lit, e @ z, 1.0)
-    magnification = omega**2 * cos_incidence / (np.where(lit, distance, 1.0) ** 2 * cos_axis**3)
-    return np.where(lit, magnification * flux, 0.0)

@@ -1,7 +1,7 @@
 """The 1D collapse: the film that one long straight pass leaves, across the direction of travel.
 
-Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians. What the 2D model,
-eqs. (1) and (2), leaves on a plane that the gun faces squarely is in ``film/pass_film.py``.
+Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians. What eq. (1) leaves
+along a line of the model plane is here, too; with eq. (2) and effects see ``film/pass_film.py``.
 """
 
 import math

@@ -27,15 +27,6 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     lean on a border, where all triangles lie to one side. Where no parabola fits, that mean is
     taken.
     """
-    return _normals(vertices_m, faces, True)
-
-
-def mean_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) unit normals, each the mean of its triangles' weighted by their angle there."""
-    return _normals(vertices_m, faces, False)
-
-
-def _normals(vertices_m: np.ndarray, faces: np.ndarray, fitted: bool) -> np.ndarray:
     vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
     first, corner = _corners_at(triangles, len(vertices))
@@ -44,7 +35,7 @@ def _normals(vertices_m: np.ndarray, faces: np.ndarray, fitted: bool) -> np.ndar
     bounds = np.linspace(0, len(vertices), blocks + 1).astype(np.int64)
     with ThreadPoolExecutor(blocks) as threads:
         work = [
-            threads.submit(_fill, vertices, triangles, first, corner, fitted, start, stop, normals)
+            threads.submit(_fill, vertices, triangles, first, corner, start, stop, normals)
             for start, stop in pairwise(bounds)
         ]
     for done in work:
@@ -99,7 +90,7 @@ def _mean_normal(vertices, faces, corners, out):
 
 @njit(cache=True, nogil=True)
 def _gather(faces, first, corner, v, seen, passed, near):
-    """Put the vertices up to two edges from v, itself among them, into ``near``; tell how many."""
+    """Put v and the vertices up to two edges from it into ``near``; return how many."""
     count = 0
     for c in corner[first[v] : first[v + 1]]:
         for side in range(3):
@@ -191,16 +182,14 @@ def _solved(system, work):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
-def _fill(vertices, faces, first, corner, fitted, start, stop, normals):
+def _fill(vertices, faces, first, corner, start, stop, normals):
     """Set the normals of vertices from start to stop."""
-    seen = np.zeros(len(vertices) if fitted else 0, dtype=np.int32)
+    seen = np.zeros(len(vertices), dtype=np.int32)
     passed, near = np.zeros_like(seen), np.empty_like(seen)
     system, work = np.empty((TERMS, TERMS + 1)), np.empty((TERMS, 2 * TERMS + 1))
     for v in range(start, stop):
         normal = normals[v]
         _mean_normal(vertices, faces, corner[first[v] : first[v + 1]], normal)
-        if not fitted:
-            continue
         count = _gather(faces, first, corner, v, seen, passed, near)
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)

@@ -165,17 +165,6 @@ def _face_vectors(vertices, faces):
 
 
 @njit(cache=True, nogil=True)
-def _lengths(vertices, edges):
-    lengths = np.empty(len(edges))
-    for e in range(len(edges)):
-        x = vertices[edges[e, 1], 0] - vertices[edges[e, 0], 0]
-        y = vertices[edges[e, 1], 1] - vertices[edges[e, 0], 1]
-        z = vertices[edges[e, 1], 2] - vertices[edges[e, 0], 2]
-        lengths[e] = np.sqrt(x * x + y * y + z * z)
-    return lengths
-
-
-@njit(cache=True, nogil=True)
 def _edge_lengths(vertices, faces):
     lengths = np.empty((len(faces), 3))
     for f in range(len(faces)):
@@ -218,7 +207,8 @@ def refine(
     mesh = _Growing(vertices_m, normals)
     while True:
         edges, of_face = edges_of(faces)
-        length_m = _lengths(mesh.vertices_m, edges)
+        length_m = np.empty(len(edges))
+        length_m[of_face] = edge_lengths_m(mesh.vertices_m, faces)
         known = mesh.known_middles(edges)
         too_long = length_m > max_edge_length_m
         in_step = known.max() < 0

@@ -1,9 +1,8 @@
 """The part's surface as a refined triangle mesh, and where points lie on it."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from functools import cache, cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -138,11 +137,11 @@ class Surface:
     @cached_property
     def occluder(self) -> Occluder:
         """The part as an obstacle to rays."""
-        return Occluder(self._tree)
+        return Occluder(lambda: self._tree)
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        return face_tree.first_faces(self._tree(), starts_m, directions)
+        return face_tree.first_faces(self._tree, starts_m, directions)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""
@@ -165,7 +164,7 @@ class Surface:
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
                 agrees is taken. Without them it is the one that the gun paints, if only one is.
         """
-        return locating.locate(self._tree(), self.normals, points_m, normals, self._only_side)
+        return locating.locate(self._tree, self.normals, points_m, normals, self._only_side)
 
     def at(
         self,
@@ -214,9 +213,8 @@ class Surface:
         }
 
     @cached_property
-    def _tree(self) -> Callable[[], FaceTree]:
-        """Gives the tree of the faces, made when it is first asked for."""
-        return cache(partial(FaceTree.of, self.vertices_m, self.faces))
+    def _tree(self) -> FaceTree:
+        return FaceTree.of(self.vertices_m, self.faces)
 
     @property
     def _only_side(self) -> np.ndarray | None:
