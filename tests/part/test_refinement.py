@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial import Delaunay
 from trimesh.creation import cylinder
 
+from paint_deposition.errors import MeshError
 from paint_deposition.part.edges import Edges
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface

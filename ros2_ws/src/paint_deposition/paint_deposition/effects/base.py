@@ -29,14 +29,10 @@ class SetPointPower(BaseModel):
     exponent: float = Field(ge=-5.0, le=5.0, description='power of the set-point over that value')
 
     def factor(self, set_points: SetPoints, whose: str) -> float:
-        """By how much the amplitudes grow at other set-points.
-
-        Raises:
-            ModelError: the set-point is not known there; ``whose`` names effect and brush.
-        """
+        """By how much the amplitudes grow at others, or ModelError that begins with ``whose``."""
         value = getattr(set_points, self.setting)
         if value is None:
-            raise ModelError(f'{whose} does not tell its {self.setting}; give it to the brush')
+            raise ModelError(f'{whose} does not say its {self.setting}; give it to the brush')
         return (value / self.at) ** self.exponent
 
 
@@ -46,14 +42,7 @@ REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
 
 @dataclass(frozen=True)
 class PathContext:
-    """What an effect on the path may need besides the path.
-
-    Attributes:
-        projection: Omega and the emission point.
-        down: (3,) unit vector of gravity in the mesh frame.
-        outward: (3,) mean outward unit normal of the part.
-        centre_m: (3,) centre of the part [m].
-    """
+    """What an effect on the path may need besides the path, as in ``SurfacePoints``: (3,) each."""
 
     projection: Projection
     down: np.ndarray
@@ -184,11 +173,7 @@ class Effect(BaseModel):
         return 0.0
 
     def of_brush(self, brush: Brush) -> 'Effect':
-        """The effect at the set-points of a brush.
-
-        Raises:
-            ModelError: the brush does not tell one, or the amplitude is out of bounds there.
-        """
+        """The effect at the set-points of a brush, or ModelError if unknown or out of bounds."""
         if not self.follows:
             return self
         whose = f'{self.id} follows a set-point, and brush {brush.number}'

@@ -69,11 +69,7 @@ class DepositionModel(BaseModel):
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
 
     def with_brush(self, number: int) -> 'DepositionModel':
-        """A copy that has one of the brushes only; 0 is the only one.
-
-        Raises:
-            ModelError: there is none of that number.
-        """
+        """A copy that has one of the brushes only, or ModelError; 0 is the only one."""
         if number != ONLY_BRUSH and not self.brushes:
             raise ModelError(
                 f'brush {number} is not in the model: it has one pattern, planar, without a number'
@@ -87,11 +83,7 @@ class DepositionModel(BaseModel):
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
 
     def of_numbers(self, numbers: Iterable[int]) -> 'DepositionModel':
-        """A copy with the brushes of a motion only.
-
-        Raises:
-            ModelError: the model does not have one of them.
-        """
+        """A copy with the brushes of a motion only, or ModelError where one is not there."""
         wanted = set(numbers)
         self.require_brushes(wanted)
         if len(self.brushes) <= 1:
@@ -117,11 +109,7 @@ class DepositionModel(BaseModel):
         return self.brushes[0].number if self.brushes else ONLY_BRUSH
 
     def single(self, purpose: str) -> 'DepositionModel':
-        """The model itself, if it has one pattern.
-
-        Raises:
-            ModelError: it has several brushes; ``purpose`` says what needs one.
-        """
+        """The model itself, or ModelError for several brushes; ``purpose`` says what needs one."""
         if len(self.brushes) > 1:
             numbers = listed(brush.number for brush in self.brushes)
             raise ModelError(
@@ -130,12 +118,9 @@ class DepositionModel(BaseModel):
         return self
 
     def require_brushes(self, numbers: Iterable[int]) -> None:
-        """Refuse a motion that names brushes which the model does not have.
+        """Refuse by ModelError a motion that names brushes which the model does not have.
 
         Without ``brushes`` the pattern is that of one brush, whatever number it has in the cell.
-
-        Raises:
-            ModelError: one line that names the brushes there are.
         """
         named = set(map(int, numbers))
         if not self.brushes and len(named - {ONLY_BRUSH}) > 1:
@@ -147,11 +132,7 @@ class DepositionModel(BaseModel):
             self.pattern_rows(np.array(sorted(named), dtype=np.int64))
 
     def pattern_rows(self, numbers: np.ndarray) -> np.ndarray:
-        """(M,) rows in ``patterns`` of brushes (M,) by number.
-
-        Raises:
-            ModelError: the model does not have one of them.
-        """
+        """(M,) rows in ``patterns`` of brushes (M,) by number, or ModelError."""
         if not self.brushes:
             return np.zeros(len(numbers), dtype=np.int64)
         known = np.array([brush.number for brush in self.brushes])
@@ -169,11 +150,7 @@ class DepositionModel(BaseModel):
         return any(effect.needs_whole_strokes for effect in self.effects)
 
     def effects_by_pattern(self) -> tuple[tuple[Effect, ...], ...]:
-        """The effects as they are for each pattern, in the order of ``patterns``.
-
-        Raises:
-            ModelError: an effect follows a set-point that is not known, or cannot follow any.
-        """
+        """The effects as they are for each of ``patterns``, or ModelError if one cannot follow."""
         following = [effect for effect in self.effects if effect.follows]
         for effect in following:
             problem = (

@@ -60,11 +60,7 @@ def read_effect_file(path: str | Path) -> type[Effect]:
 
 
 def effect_of(path: Path, source: bytes) -> type[Effect]:
-    """The class of a user's own effect from what its file reads, wherever the file may be.
-
-    Raises:
-        ModelError: as ``read_effect_file``.
-    """
+    """``read_effect_file`` for the content of a file, wherever it may be."""
     key = (path.resolve(), hashlib.sha256(source).hexdigest())
     if key not in _loaded:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
@@ -228,7 +224,6 @@ def _problem_with_places(effect: Effect) -> str | None:
 
 
 def _trial_path() -> SprayPath:
-    stamps_ns = np.arange(4) * 20_000_000
     positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
     toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
-    return spray_path(Trajectory(stamps_ns, positions_m, toward_y))[0]
+    return spray_path(Trajectory(np.arange(4) * 20_000_000, positions_m, toward_y))[0]

@@ -30,15 +30,9 @@ class SurfacePoints:
         area_m2: (V,) surface that each point stands for, or None for gauge readings.
         neighbours: (V,) the points in the order of ``kernel.blocks.neighbours_together``; default:
             they are sorted when they are painted.
-        curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
-        edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
-        sky_view_factor: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
-        height_fraction: (V,) 0 at the lowest point of the part to 1 at the highest; default over
-            the points themselves.
-        slope_per_m: (V, V) sparse, maps a field on the points to its derivative along gravity's
-            component in the surface [1/m]; default no neighbours, hence zero.
-
-    Covariates are arrays or functions without arguments that return them.
+        curvature_per_m, edge_distance_m, sky_view_factor, height_fraction, slope_per_m: see the
+            properties; arrays or functions without arguments that return them. Default: flat,
+            without edges, all sky, over the points themselves, without neighbours.
     """
 
     def __init__(
@@ -121,9 +115,8 @@ class SurfacePoints:
     def slope_per_m(self) -> scipy.sparse.csr_matrix:
         """(V, V) sparse derivative along gravity's component in the surface [1/m].
 
-        ``points.slope_per_m @ field``: on a vertical surface the change of the field per metre
-        downward; on surface that leans by an angle a from the horizontal sin(a) times the change
-        per metre, zero on a horizontal one. Rows of points without neighbours are zero.
+        On surface that leans by an angle a from the horizontal ``points.slope_per_m @ field`` is
+        sin(a) times the field's change per metre. Rows of points without neighbours are zero.
         """
         return self._covariate('slope_per_m')
 

@@ -175,8 +175,7 @@ class Surface:
         """The surface at points near it, gauge readings for instance.
 
         Args:
-            points_m: (N, 3) [m]; each is moved to the closest place on the surface.
-            normals: as in ``locate``.
+            points_m, normals: as in ``locate``; each is moved to the closest place.
             stencil_m: if given, the N points are followed by N neighbours this far up the surface
                 and N this far down, and the slope is defined on the first N.
         """

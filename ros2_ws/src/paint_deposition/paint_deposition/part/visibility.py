@@ -160,11 +160,7 @@ _GOLDEN_RATIO = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Occluder:
-    """The part as an obstacle to rays.
-
-    Args:
-        tree: gives the one of its faces; asked for it with the first ray.
-    """
+    """The part as an obstacle to rays; ``tree`` gives that of its faces with the first ray."""
 
     def __init__(self, tree: Callable[[], FaceTree]) -> None:
         self._tree = tree
@@ -209,10 +205,7 @@ class Occluder:
         return ~blocked.reshape(length.shape)
 
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) sine of the elevation above which nothing of the part hides a point.
-
-        See ``horizon.horizon_sines``.
-        """
+        """(N,) sine of the elevation above which nothing of the part hides a point."""
         return horizon_sines(self._tree(), points_m, normals)
 
     def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
