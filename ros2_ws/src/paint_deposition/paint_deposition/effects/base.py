@@ -14,9 +14,9 @@ from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import Ray as Ray
 from paint_deposition.model.brush import Brush, SetPoints
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path import SprayPath as SprayPath
 from paint_deposition.part.orientation import across_axis, downhill_axis
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.points import SurfacePoints as SurfacePoints
 
 
 class SetPointPower(BaseModel):
@@ -96,6 +96,11 @@ def parameter(
     )  # fmt: skip
 
 
+def over(**covariates: Any) -> Mapping[str, Any]:
+    """What a class says of covariates, by their names; see ``Effect.covariates``."""
+    return MappingProxyType(covariates)
+
+
 class Effect(BaseModel):
     """Base of all effects: subclass it, name it, and define one of the places where it acts.
 
@@ -126,9 +131,9 @@ class Effect(BaseModel):
     source: ClassVar[str] = ''
     # Covariates along which the law may be off, each with the direction in which a law of any form
     # over it must go: it rises (1), falls (-1), or either (0).
-    covariates: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    covariates: ClassVar[Mapping[str, int]] = over()
     # The range of a covariate in which the effect acts at all; default everywhere.
-    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = over()
     # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
     # over a covariate is not that effect.
     free_law: ClassVar[str] = ''

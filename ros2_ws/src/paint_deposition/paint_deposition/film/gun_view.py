@@ -28,10 +28,7 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 class GunView:
     """What the gun has before it, at poses that stand for equal shares of the paint.
 
-    Args:
-        surface: the part, turned to the gun.
-        path: the motion; some of it sprays.
-        model: its pattern and projection count, its effects do not.
+    The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
 
     def __init__(self, surface: Surface, path: SprayPath, model: DepositionModel) -> None:

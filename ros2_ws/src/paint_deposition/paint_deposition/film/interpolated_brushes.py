@@ -66,11 +66,7 @@ def with_set_points(
 
 
 def require_its_brush(model: DepositionModel, change: TriggerChange) -> None:
-    """Refuse a change that the model cannot paint with.
-
-    Raises:
-        ModelError: its brush is not there, or its set-points lie outside the calibrated ones.
-    """
+    """Refuse by ModelError a change whose brush or set-points the model cannot paint with."""
     if uses_set_points(model, change.brush, change.set_points):
         with_set_points(model, change.set_points)
     else:
@@ -78,7 +74,7 @@ def require_its_brush(model: DepositionModel, change: TriggerChange) -> None:
 
 
 def with_brushes_of(model: DepositionModel, before: DepositionModel) -> DepositionModel:
-    """Another model with the brushes that set-points stood for before, by the same numbers.
+    """A model with the brushes that set-points stood for before, by the same numbers.
 
     Raises:
         ModelError: they lie outside its calibrated brushes.

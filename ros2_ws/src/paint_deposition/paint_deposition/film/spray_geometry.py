@@ -31,12 +31,7 @@ LEAST_LANDING = 0.02
 
 
 def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
-    """Yield what is odd, a line each; what follows from another line is not told again.
-
-    Args:
-        view: what the gun has before it.
-        frame_id: of the poses.
-    """
+    """Yield what is odd, a line each with its likely cause; what follows from one is left out."""
     sprayed_m = view.whole.position_m[view.whole.flow > 0.0]
     boxes = (
         f"the poses in frame '{frame_id}' span {_box(sprayed_m)}, the mesh "
@@ -251,13 +246,9 @@ class SprayGeometry:
 def spray_geometry(
     surface: Surface, path: SprayPath, model: DepositionModel, frame_id: str = ''
 ) -> SprayGeometry:
-    """Sum up how the gun ran over a part, and say what is odd.
+    """Sum up how the gun ran over a part that is turned to it, and say what is odd.
 
-    Args:
-        surface: the part, turned to the gun.
-        path: the motion; some of it sprays.
-        model: its pattern and projection count, its effects do not.
-        frame_id: of the poses, for the warnings.
+    Some of the path sprays; of the model, pattern and projection count, effects do not.
     """
     facets = facet_error(surface, path, model)
     view = GunView(surface, path, model)

@@ -40,11 +40,7 @@ class Blocks:
         precision: type,
         neighbours: np.ndarray | None = None,
     ) -> 'Blocks':
-        """Sort (V, 3) positions [m] and normals into blocks.
-
-        Args:
-            neighbours: (V,) what ``neighbours_together`` gives for these positions, if known.
-        """
+        """Sort (V, 3) positions [m] and normals; ``neighbours_together`` may be known."""
         if neighbours is None:
             neighbours = neighbours_together(positions_m)
         origin = _centre_m(positions_m)

@@ -24,31 +24,22 @@ class Collapse(Protocol):
     """A film profile across the direction of travel."""
 
     def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
-        """Film [um] at distances x [m] from the line that the gun followed."""
-        ...
+        """Film [um] at distances x (...) [m] from the line that the gun followed."""
 
     @property
     def area_um_m(self) -> float:
         """Integral of the film over x [um m]."""
-        ...
 
     @property
     def reach_m(self) -> float:
         """Distance beyond which the film is negligible [m]."""
-        ...
 
     @property
     def finest_m(self) -> float:
         """Scale on which the film changes; quadrature needs a few points in it [m]."""
-        ...
-
-    def mirrored(self) -> 'Collapse':
-        """The same pass with left and right exchanged."""
-        ...
 
     def scaled(self, factor: float) -> 'Collapse':
         """All thicknesses times a factor."""
-        ...
 
 
 def half_width_m(collapse: Collapse) -> float:
@@ -122,14 +113,6 @@ class ThreeGaussianCollapse(BaseModel):
         gains = {f'K{k + 1}_um_m': factor * gain for k, gain in enumerate(self.gains_um_m)}
         return self.model_copy(update=gains)
 
-    def mirrored(self) -> 'ThreeGaussianCollapse':
-        """The same pass with left and right exchanged."""
-        return ThreeGaussianCollapse(
-            K1_um_m=self.K2_um_m, K2_um_m=self.K1_um_m, K3_um_m=self.K3_um_m,
-            r1_m=self.r2_m, r2_m=self.r1_m,
-            sigma1_m=self.sigma2_m, sigma2_m=self.sigma1_m, sigma3_m=self.sigma3_m,
-        )  # fmt: skip
-
 
 @dataclass(frozen=True)
 class SampledCollapse:
@@ -165,10 +148,6 @@ class SampledCollapse:
         """Distance beyond which there is no film [m]."""
         return float(np.abs(self.x_m[[0, -1]]).max())
 
-    def mirrored(self) -> 'SampledCollapse':
-        """The same pass with left and right exchanged."""
-        return SampledCollapse(-self.x_m[::-1], self.film_um[::-1].copy(), self.finest_m)
-
     def scaled(self, factor: float) -> 'SampledCollapse':
         """All thicknesses times a factor."""
         return SampledCollapse(self.x_m, factor * self.film_um, self.finest_m)
@@ -182,16 +161,14 @@ NODES_PER_SIGMA = 4.0
 def line_integral_um_m_per_s(
     planar: PlanarPattern, across_m: np.ndarray, travel_rad: float = 0.0
 ) -> np.ndarray:
-    """Eq. (1) integrated over a line of the model plane [um m/s].
+    """(N,) eq. (1) integrated over lines of the model plane [um m/s].
 
-    The part of f that is odd along the line integrates to zero. What is left of it is smooth in
-    u with distance along the line = |across| sinh(u), though not in the distance itself.
+    The part of f that is odd along a line integrates to zero. What is left of it is smooth in u
+    with distance along the line = |across| sinh(u), though not in the distance itself.
 
     Args:
-        planar: the pattern.
-        across_m: (N,) signed distances of the lines from the centre, positive along
-            tool z times the direction [m].
-        travel_rad: direction of the lines in the tool's x-y frame [rad].
+        across_m: (N,) distances of the lines from the centre, positive along tool z times travel.
+        travel_rad: direction of the lines in the tool's x-y frame.
     """
     p = planar
     across = np.abs(np.atleast_1d(across_m)).astype(float)

@@ -101,13 +101,11 @@ def rim_segments_m(
 def hem_folds(
     ends_m: np.ndarray, folds_rad: np.ndarray, width_m: np.ndarray, turn_rad: float
 ) -> np.ndarray:
-    """(E,) bool: folds of which several in a row turn convexly by at least a rim's turn.
+    """(E,) bool: folds of which several in a row turn convexly by at least ``turn_rad``.
 
     Args:
-        ends_m: (E, 2, 3) each fold's ends [m].
-        folds_rad: (E,) turn over each, positive if convex [rad].
+        ends_m: (E, 2, 3) each fold's ends [m]. folds_rad: (E,) positive if convex.
         width_m: (E,) height of the lower of its two triangles [m].
-        turn_rad: turn of a rim [rad].
     """
     hem = np.zeros(len(folds_rad), dtype=bool)
     close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > LEAST_RATE_PER_M * width_m)
@@ -142,8 +140,7 @@ def strip_vertices(
     """(V,) bool: vertices of patches so narrow that they belong to a hem.
 
     Args:
-        vertices_m: (V, 3) [m].
-        patches: (F, 3) triangles on vertices that no two smooth patches share.
+        vertices_m: (V, 3) [m]. patches: (F, 3), on vertices that no two smooth patches share.
         hem_half_edges: (H,) both half-edges of each fold of a hem, as numbered by ``Edges``.
     """
     if not len(hem_half_edges):

@@ -32,15 +32,12 @@ def curvature_per_m(
     surface. A cylinder's ridge of radius R has -1/R, a ball -2/R, a valley +1/R.
 
     The divergence is that of a linear function fitted to the normals of the surface within the
-    radius, so a fold narrower than the radius appears smoothed, and the triangulation does not
-    show. On cylinders and balls the tangential components of the normal are exactly linear.
-    Surface round a rim does not count: a sheet that is drawn with its thickness has the curvature
-    of one without.
+    radius: a fold narrower than it appears smoothed, and the triangulation does not show. Surface
+    round a rim does not count: a sheet drawn with its thickness has the curvature of one without.
 
     Args:
         points_m, normals: (N, 3) where it is wanted.
         surface_m, surface_normals, surface_areas_m2: (S, 3), (S, 3), (S,) samples of the surface.
-        radius_m: of the neighbourhood [m].
     """
     result = np.empty(len(points_m))
     for block, i, j, distance_m in near_pairs(points_m, surface_m, radius_m):

@@ -19,12 +19,10 @@ class Facing:
     Attributes:
         front: poses that look at the outward side.
         back: poses that look at the other side.
-        past: poses whose axis misses the part.
     """
 
     front: int
     back: int
-    past: int
 
 
 def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:
@@ -96,4 +94,4 @@ def _met(
     met = face >= 0
     normals = face_normals(surface.vertices_m, surface.faces[face[met]])
     front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
-    return Facing(front, len(normals) - front, int(np.sum(~met))), z_axes[met]
+    return Facing(front, len(normals) - front), z_axes[met]

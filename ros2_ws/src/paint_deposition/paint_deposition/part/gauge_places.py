@@ -14,13 +14,14 @@ BEFORE_M = 0.1
 def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points of the surface that lie straight before places on its face.
 
+    The face is the part as the gun sees it, along its mean outward normal.
+
     Args:
-        surface: the part.
-        from_left_m: (N, 2) distance from the left edge and height over the lower edge [m].
+        from_left_m: (N, 2) from the part's leftmost point and over its lowest [m].
 
     Returns:
-        Points (N, 3) in the mesh frame [m], and (N,) bool, whether there is surface at all; points
-        without are nan.
+        Points (N, 3) in the mesh frame [m], nan where there is no surface, and (N,) bool, whether
+        there is.
     """
     outward, vertices = surface.outward, surface.vertices_m
     right, up, left, low = _face(surface)

@@ -23,17 +23,11 @@ def outward_side(
     down: np.ndarray,
     gun_side: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(3,) unit mean of the (V, 3) normals on the side of the part that is painted.
+    """(3,) unit mean of the (V, 3) normals, weighted by (V,) areas, on the painted side.
 
     On a closed body it is the mean over the surface that faces the gun, found from roughly where
-    the gun is: which motion told it makes no difference, to the last bit, on a part that has
-    sides. Where the normals cancel and no gun is known, it is -y, or z.
-
-    Args:
-        normals: (V, 3) outward unit normals.
-        areas_m2: (V,) weights, or None.
-        down: (3,) gravity.
-        gun_side: (3,) roughly toward the gun, any length, or None.
+    the gun is (``gun_side``, any length): on a part that has sides any motion before one gives the
+    same, to the last bit. Where the normals cancel and no gun is known, it is -y, or z.
     """
     mean = mean_normal(normals, areas_m2)
     length = np.linalg.norm(mean)
@@ -119,10 +113,6 @@ def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:
     """(3,) horizontal unit vector along the part, to the right as the gun sees it.
 
     On a part that lies flat it is the mesh's x axis, or y where x is vertical.
-
-    Args:
-        outward: (3,) mean outward unit normal of the part.
-        down: (3,) unit vector of gravity.
     """
     level = np.cross(outward, down)
     length = np.linalg.norm(level)

@@ -1,11 +1,8 @@
 """More paint along the free edges: fat edges, picture framing."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.effects.base import Effect, SurfacePoints, over, parameter
 
 
 class EdgeBuild(Effect):
@@ -18,7 +15,7 @@ class EdgeBuild(Effect):
     id = 'edge_build'
     family = 'boundary'
     needs = 'voltage'
-    covariates = MappingProxyType({'edge_distance_m': -1})
+    covariates = over(edge_distance_m=-1)
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
     rivals = ('corner_slowdown',)

@@ -1,11 +1,8 @@
 """A gauge whose scale is off."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.effects.base import Effect, SurfacePoints, over, parameter
 
 
 class GaugeGain(Effect):
@@ -17,7 +14,7 @@ class GaugeGain(Effect):
 
     id = 'gauge_gain'
     family = 'level'
-    covariates = MappingProxyType({'film_um': 0})
+    covariates = over(film_um=0)
     signature = 'in proportion to the film everywhere; the same as another K1'
     rivals = ('gauge_zero',)
     source = 'specification of gauges: a fixed amount plus a percentage, 1 to 3 %'

@@ -1,11 +1,8 @@
 """Flow that follows the trigger late: pump, hose and bell need time."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.effects.base import Effect, PathContext, SprayPath, over, parameter
 
 
 class TriggerLag(Effect):
@@ -19,7 +16,7 @@ class TriggerLag(Effect):
 
     id = 'trigger_lag'
     family = 'boundary'
-    covariates = MappingProxyType({'since_trigger_s': 0})
+    covariates = over(since_trigger_s=0)
     signature = 'less paint where the gun opens and more where it closes, on alternate sides'
     rivals = ('corner_slowdown', 'pose_lag')
     source = (
