@@ -33,7 +33,7 @@ class CommonFilm:
 
     @cached_property
     def shares_um(self) -> tuple[np.ndarray, ...]:
-        """(V,) what each gun had laid when this was first asked for, as it arrived [um]."""
+        """(V,) what each gun had laid when this was first used, as it arrived [um]."""
         return tuple(gun.raw_um for gun in self.guns)
 
     @property

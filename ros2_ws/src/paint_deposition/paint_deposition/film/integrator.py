@@ -136,7 +136,7 @@ class FilmIntegrator:
         self._traced_from: np.ndarray | None = None
 
     def fork(self) -> 'FilmIntegrator':
-        """One that goes on from here and leaves this one as it is."""
+        """A copy to paint on; this one stays as it is."""
         other = copy.copy(self)
         other._film, other._recent = self._film.copy(), self._recent.copy()
         return other

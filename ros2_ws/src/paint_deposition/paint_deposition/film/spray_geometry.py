@@ -186,7 +186,7 @@ def _missing(view: GunView) -> str:
     return f'{which} the part, next to none of that paint goes over it: {cause}'
 
 
-# Distances from the surface are told without the few of approaches and ends.
+# Distances from the surface are given without the few of approaches and ends.
 RANGE = (0.05, 0.95)
 
 
@@ -266,6 +266,6 @@ def spray_geometry(
         off_normal_deg=lean,
         paint_over_part=float(view.landing.mean()),
         facet_error=facets.share,
-        # Wrong geometry also makes facets cost more: it is told alone.
+        # Wrong geometry also makes facets cost more: it is reported alone.
         warnings=tuple(geometry_warnings(view, frame_id)) or tuple(filter(None, [facets.warning])),
     )

@@ -149,19 +149,19 @@ class BrushLaw:
         for name in (*SETTINGS, 'solids'):
             value = getattr(wanted, name)
             known = [getattr(brush, name) for brush in self.brushes]
-            told = [each for each in known if each is not None]
-            if value is None and len(set(told)) > 1:
+            given = [each for each in known if each is not None]
+            if value is None and len(set(given)) > 1:
                 raise ModelError(
                     f'{where}: {name} is missing, in which brushes {numbers} differ; give it'
                 )
-            if value is None or (name == 'solids' and not told):
+            if value is None or (name == 'solids' and not given):
                 continue
-            if len(told) < len(known):
+            if len(given) < len(known):
                 lacks = next(b.number for b in self.brushes if getattr(b, name) is None)
                 raise ModelError(f'{where}: {name} is given and brush {lacks} has none; add it')
-            if name in SETTINGS and not min(told) <= value <= max(told):
+            if name in SETTINGS and not min(given) <= value <= max(given):
                 raise ModelError(
-                    f'{where}: {name} is {value:g}, outside {min(told):g} to {max(told):g} of the '
+                    f'{where}: {name} is {value:g}, outside {min(given):g} to {max(given):g} of the '
                     f'calibrated brushes {numbers}; calibrate a brush there'
                 )
         return [name for name in SETTINGS if getattr(wanted, name) is not None]

@@ -1,11 +1,11 @@
 """Vertex normals of the curved surface that a triangulation stands for."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
+
+from paint_deposition.kernel.blocks import shared_among_threads
 
 # Near vertices shape the parabola by far the most.
 NEARNESS = 12.0
@@ -13,8 +13,6 @@ NEARNESS = 12.0
 LARGEST_CORRECTION_COSINE = math.cos(math.radians(15.0))
 # Of the fit's equations, by the Frobenius norm.
 WORST_CONDITION = 1e8
-# Fewer vertices are done before a second thread wakes.
-LEAST_BLOCK = 2048
 TERMS = 5
 
 
@@ -31,15 +29,11 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
     first, corner = _corners_at(triangles, len(vertices))
     normals = np.empty((len(vertices), 3))
-    blocks = max(1, min(get_num_threads(), len(vertices) // LEAST_BLOCK))
-    bounds = np.linspace(0, len(vertices), blocks + 1).astype(np.int64)
-    with ThreadPoolExecutor(blocks) as threads:
-        work = [
-            threads.submit(_fill, vertices, triangles, first, corner, start, stop, normals)
-            for start, stop in pairwise(bounds)
-        ]
-    for done in work:
-        done.result()
+
+    def fill(start: int, stop: int) -> None:
+        _fill(vertices, triangles, first, corner, start, stop, normals)
+
+    shared_among_threads(len(vertices), fill)
     return normals
 
 

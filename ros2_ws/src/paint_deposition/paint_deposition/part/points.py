@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ from paint_deposition.kernel.blocks import Blocks, bounding_box_m
 from paint_deposition.part.orientation import outward_side
 
 DOWN = (0.0, 0.0, -1.0)
-
-# A covariate, or how to get it once an effect asks for it.
-Covariate = np.ndarray | Callable[[], np.ndarray]
 
 
 class SurfacePoints:
@@ -46,11 +42,7 @@ class SurfacePoints:
         extent_m: np.ndarray | None = None,
         area_m2: np.ndarray | None = None,
         neighbours: np.ndarray | None = None,
-        curvature_per_m: Covariate | None = None,
-        edge_distance_m: Covariate | None = None,
-        sky_view_factor: Covariate | None = None,
-        height_fraction: Covariate | None = None,
-        slope_per_m: scipy.sparse.csr_matrix | Callable[[], scipy.sparse.csr_matrix] | None = None,
+        **covariates: Any,
     ) -> None:
         self.positions_m = np.ascontiguousarray(positions_m, dtype=np.float64)
         self.normals = np.ascontiguousarray(normals, dtype=np.float64)
@@ -64,15 +56,17 @@ class SurfacePoints:
         self._neighbours = neighbours
         self._blocks: dict[type, Blocks] = {}
         count = len(self.positions_m)
-        self._covariates = {
-            'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
-            'edge_distance_m': _default(edge_distance_m, lambda: np.full(count, np.inf)),
-            'sky_view_factor': _default(sky_view_factor, lambda: np.ones(count)),
-            'height_fraction': _default(
-                height_fraction, lambda: heights(self.positions_m, self.positions_m, self.down)
-            ),
-            'slope_per_m': _default(slope_per_m, lambda: scipy.sparse.csr_matrix((count, count))),
+        self._covariates: dict[str, Any] = {
+            'curvature_per_m': lambda: np.zeros(count),
+            'edge_distance_m': lambda: np.full(count, np.inf),
+            'sky_view_factor': lambda: np.ones(count),
+            'height_fraction': lambda: heights(self.positions_m, self.positions_m, self.down),
+            'slope_per_m': lambda: scipy.sparse.csr_matrix((count, count)),
         }
+        if strange := covariates.keys() - self._covariates:
+            raise TypeError(f'{", ".join(strange)}: no covariate of points; there are: '
+                            f'{", ".join(self._covariates)}')  # fmt: skip
+        self._covariates |= {k: v for k, v in covariates.items() if v is not None}
 
     def __len__(self) -> int:
         return len(self.positions_m)
@@ -171,10 +165,6 @@ def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> n
     height, others = -positions_m @ down, -among_m @ down
     extent = np.ptp(others) if len(others) else 0.0
     return (height - others.min()) / extent if extent else np.zeros(len(height))
-
-
-def _default(given: Any, otherwise: Callable[[], Any]) -> Any:
-    return otherwise if given is None else given
 
 
 def _slope_among(slope: scipy.sparse.csr_matrix, rows: np.ndarray) -> scipy.sparse.csr_matrix:

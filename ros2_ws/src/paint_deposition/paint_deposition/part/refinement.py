@@ -26,7 +26,7 @@ class CutEdges:
     first: np.ndarray
 
     def along(self, edge: np.ndarray, forward: np.ndarray, parts: int) -> np.ndarray:
-        """(N, parts - 1) inner vertices of edges of that many parts, in the sense asked for."""
+        """(N, parts - 1) inner vertices of edges of that many parts, ``forward`` or not."""
         steps = np.arange(parts - 1)
         return self.first[edge][:, None] + np.where(forward[:, None], steps, parts - 2 - steps)
 

@@ -36,8 +36,8 @@ class Surface:
         down: (3,) unit vector of gravity in the mesh frame.
         rim_m: (B, 2, 3) segments of the free edges [m].
         notes: what had to be put right in the file, for the user to read.
-        gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
-            of a part whose surface has several, a closed body.
+        gun_side: (3,) mean direction from the part to the gun, or None; it shows the painted
+            side of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
         curved_edges: where the mesh as it was read is coarser than its curvature.
         neighbours: (V,) vertices in the order in which they are painted, see

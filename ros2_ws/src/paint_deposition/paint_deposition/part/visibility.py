@@ -2,16 +2,15 @@
 
 import math
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
-from itertools import pairwise
 from threading import Lock
 
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from numba import get_num_threads, njit
+from numba import njit
 
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
@@ -24,12 +23,10 @@ from paint_deposition.part.face_tree import (
 )
 from paint_deposition.part.points import box_centre_m
 
-# Lower horizons are not told apart [sine]: hardly any paint comes from there.
+# Lower horizons count as this one [sine]: hardly any paint comes from there.
 LEAST_SINE = 0.05
 # What rounding may hide [sine], and how near a point a face passes through it [m].
 SLACK_SINE, TOUCHING_M = 0.03, 1e-6
-# Fewer points are done before a second thread wakes.
-LEAST_BLOCK = 2048
 # Points with a part of the surface as high over them [sine] are not looked at any longer.
 HIGH_SINE = 0.8
 
@@ -42,16 +39,13 @@ def horizon_sines(tree: FaceTree, points_m: np.ndarray, normals: np.ndarray) -> 
     where it is above HIGH_SINE.
     """
     found = np.empty(len(points_m))
-    blocks = max(1, min(get_num_threads(), len(points_m) // LEAST_BLOCK))
-    bounds = np.linspace(0, len(points_m), blocks + 1).astype(np.int64)
     points = np.ascontiguousarray(points_m, dtype=np.float64)
     upward = np.ascontiguousarray(normals, dtype=np.float64)
 
-    def fill(part: tuple[int, int]) -> None:
-        _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, *part, found)
+    def fill(start: int, stop: int) -> None:
+        _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, start, stop, found)
 
-    with ThreadPoolExecutor(blocks) as threads:
-        list(threads.map(fill, pairwise(bounds)))
+    shared_among_threads(len(points), fill)
     return found
 
 

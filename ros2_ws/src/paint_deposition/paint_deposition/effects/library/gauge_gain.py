@@ -9,7 +9,7 @@ class GaugeGain(Effect):
     """The gauge was calibrated on a foil or a substrate that is not the part's.
 
     Acts on the reading: times 1 + a. Positive a: it reads too much. On one part the same as more
-    flow: only a check of the gauge tells them apart.
+    flow: only a check of the gauge distinguishes them.
     """
 
     id = 'gauge_gain'
