@@ -5,7 +5,6 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from numba import float32, njit
 from pydantic import ValidationError
 
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
@@ -14,7 +13,6 @@ from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, along_
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import collapse_um
-from paint_deposition.kernel.laws import Ray, in_precision
 from reference import reference_film_um
 
 LAW = pytest.mark.parametrize('law', CURVES.values(), ids=CURVES)
@@ -88,10 +86,6 @@ def test_how_well_it_is_known_is_told_within_its_range_only(law):
     assert np.isnan(plain.deviation(np.array([2.5]))).all()
     many = np.concatenate([beyond, np.linspace(-1.0, 6.0, 30)])
     assert np.array_equal(known.curve(many), plain.curve(many))
-
-
-def test_where_the_covariate_is_not_known_the_law_is_neutral():
-    assert law_over('time_s').factor(np.array([np.nan, np.inf])).tolist() == [1.0, 1.0]
 
 
 def test_a_factor_never_takes_all_film_away():
@@ -179,16 +173,6 @@ def test_the_kernel_computes_the_law(law, precision, tolerance):
     np.testing.assert_allclose(
         integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
     )
-
-
-@RAY_LAW
-def test_the_law_stays_in_single_precision(law):
-    ray = Ray(*np.array([0.1, 0.2, 1.1, 0.9, 0.4], np.float32))
-    values = np.array(law_over(law.covariate).values(), np.float32)
-    compiled = njit(in_precision(law.flux_factor, np.float32))
-    assert compiled(ray, *values) == pytest.approx(law.flux_factor(ray, *values), rel=1e-5)
-    (signature,) = compiled.nopython_signatures
-    assert signature.return_type == float32
 
 
 @pytest.mark.parametrize('covariate', ['time_s', 'spray_pass'])

@@ -237,17 +237,6 @@ def test_shadows_reach_over_batches_on_few_points(count):
     assert np.all(film.film_um[1:] > 0.0)
 
 
-def test_a_fork_goes_its_own_way():
-    path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
-    film = painted(lying_plane(count=21), path)
-    before = film.film_um
-    fork = film.fork()
-    fork.add(path)
-    assert np.array_equal(film.film_um, before)
-    assert np.allclose(fork.film_um, 2.0 * before, rtol=1e-12)
-    assert fork.emitted_cm3 == pytest.approx(2.0 * film.emitted_cm3)
-
-
 def test_progress_names_the_sub_steps_done():
     path, _ = spray_path(straight_pass(np.arange(0.0, 200.0, 0.05)))
     seen = []
@@ -273,24 +262,3 @@ def test_the_gun_is_off_in_a_gap():
         for h in halves
     )
     assert np.allclose(film, apart, rtol=1e-12)
-
-
-@pytest.mark.parametrize('precision', ['single', 'double'])
-def test_a_pose_far_off_takes_its_own_paint_with_it_and_no_more(precision):
-    log = straight_pass(np.arange(0.0, 2.0, 0.02))
-    positions = log.positions_m.copy()
-    positions[50] = [-3e5, 7e5, 2e5]
-    points = lying_plane(0.6, 25)
-    film = painted(
-        points,
-        Trajectory(log.stamps_ns, positions, log.quaternions_xyzw),
-        precision=precision,
-    ).film_um
-    clean = painted(points, log).film_um
-    assert np.isfinite(film).all()
-    assert film.min() >= 0.0
-    lost = painted(
-        points,
-        Trajectory(*(a[49:52] for a in (log.stamps_ns, log.positions_m, log.quaternions_xyzw))),
-    ).film_um
-    assert largest_error(film, clean - lost) < 1e-3

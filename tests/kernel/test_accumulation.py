@@ -124,15 +124,6 @@ def test_no_block_with_a_lit_point_is_skipped(seed, share):
         assert within_reach(np.append(lit + radius * out, radius), row, constants)
 
 
-def test_a_thousand_small_sums_stay_accurate():
-    """A long time in one place, single precision: the newest sums join the film in time."""
-    path, _ = spray_path(straight_pass(np.arange(0.0, 200.0, 0.05), (0, 0, 0.25), (0.01, 0, 0.25)))
-    assert len(path) > 3900
-    points, model = lying_plane(count=21), DepositionModel()
-    single, double = (film_um(points, path, model, p) for p in ('single', 'double'))
-    assert np.abs(single - double).max() < 1e-6 * double.max()
-
-
 def test_the_number_of_threads_changes_no_bit():
     path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
     points, model = lying_plane(count=80), DepositionModel()
@@ -168,11 +159,3 @@ def test_blocks_hold_every_point_once_within_their_spheres(count):
     for block, (start, stop) in enumerate(zip(blocks.bounds, blocks.bounds[1:], strict=False)):
         away = np.linalg.norm(blocks.points[:, start:stop].T - blocks.spheres[block, :3], axis=1)
         assert away.max() <= blocks.spheres[block, 3] * (1 + 1e-12) + 1e-15
-
-
-def test_blocks_of_a_plane_are_nearly_square():
-    plane = lying_plane(0.5, 128)
-    blocks = Blocks.of(plane.positions_m, plane.normals, np.float32)
-    assert len(blocks.spheres) == 64
-    # An eighth of a metre square: half its diagonal.
-    assert blocks.spheres[:, 3].max() < 1.05 * 0.125 * np.sqrt(0.5)

@@ -67,15 +67,6 @@ def test_exponents_are_found_where_brushes_differ_and_the_prior_decides_elsewher
     assert of_two['width']['voltage_kv'] == pytest.approx((-1.0, 0.5))
 
 
-def test_the_law_goes_through_the_calibrated_brushes():
-    other = CORNERS[1].model_copy(
-        update={'planar': PlanarPattern(K1_cm3_per_s=0.9, K2=0.5, K3=0.3, phi_rad=-2.0)}
-    )
-    for brush in (CORNERS[0], other):
-        found = BrushLaw((CORNERS[0], other)).pattern('brushes, 9', brush.set_points)
-        assert values(found) == pytest.approx(values(brush.planar), rel=1e-5)
-
-
 def test_twice_the_flow_is_twice_the_paint_where_nothing_else_is_known():
     one = Brush(number=1, planar=FIRST, flow_cm3_per_min=100.0)
     four = Brush(

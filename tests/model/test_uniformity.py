@@ -66,15 +66,6 @@ def test_single_gaussian_has_its_known_sigma_n():
     assert ParallelPasses.one_way(one).sigma_n(index) == pytest.approx(expected, rel=1e-12)
 
 
-def test_sigma_n_ignores_level_shift_and_mirroring():
-    raster = ParallelPasses.one_way(EQ3)
-    for index in INDICES_M:
-        level = ParallelPasses.one_way(EQ3.scaled(7.0)).sigma_n(index)
-        assert level == pytest.approx(raster.sigma_n(index), rel=1e-10)
-        mirrored = ParallelPasses.one_way(MIRRORED).sigma_n(index)
-        assert mirrored == pytest.approx(raster.sigma_n(index), rel=1e-10)
-
-
 def test_dense_passes_are_even_and_distant_ones_are_not():
     assert ParallelPasses.one_way(EQ3).sigma_n(0.05) < 1e-12
     assert ParallelPasses.one_way(EQ3).sigma_n(3.0) > 1.0

@@ -100,18 +100,6 @@ def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():
     assert np.linalg.norm(place.positions_m - some.positions_m, axis=1).max() < 0.002
 
 
-@pytest.mark.parametrize('lean_deg', [10.0, 20.0])
-def test_a_fold_of_the_solid_is_still_curvature(lean_deg, fold):
-    vertices, faces = triangulated(fold(np.radians(lean_deg)), 0.02)
-    shell = Surface.from_triangles(*solid(vertices, faces, 0.012), 0.01)
-    z = np.linspace(-0.08, 0.08, 401)
-    ridge = np.stack([0 * z, np.abs(z) * np.tan(np.radians(lean_deg)), z], axis=1)
-    across = shell.at(ridge, np.tile([0.0, -1.0, 0.0], (401, 1)))
-    turn = np.trapezoid(across.curvature_per_m, z / np.cos(np.radians(lean_deg)))
-    assert turn == pytest.approx(-2.0 * np.radians(lean_deg), rel=0.15)
-    np.testing.assert_allclose(across.edge_distance_m, 0.2 - np.abs(z), atol=0.013)
-
-
 @pytest.mark.parametrize(
     ('thickness_m', 'facets'), [(0.002, 6), (0.003, 2), (0.003, 4), (0.003, 12), (0.012, 8)]
 )

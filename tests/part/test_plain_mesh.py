@@ -56,11 +56,6 @@ def test_normals_agree_to_rounding(mesh):
     assert np.array_equal(repeated, np.tile(fitted, (copies, 1)))
 
 
-def test_normals_of_vertices_without_a_triangle_are_none():
-    vertices = np.concatenate([np.eye(3), [[5.0, 5.0, 5.0]]])
-    assert np.array_equal(surface_normals(vertices, np.array([[0, 1, 2]]))[3], np.zeros(3))
-
-
 @pytest.mark.parametrize('off_m', [0.0, 3e-7, 9e-7, 2e-6])
 @pytest.mark.parametrize('place_m', [0.0, 1.0, -40.0])
 def test_the_same_vertices_are_welded(mesh, off_m, place_m):

@@ -57,11 +57,6 @@ def test_a_normal_that_nothing_agrees_with_shows_in_the_angle(make_surface, flat
     assert place.distance_m[0] == pytest.approx(0.01)
 
 
-def test_no_points_are_no_trouble(make_surface, flat):
-    surface = make_surface(flat, 0.05)
-    assert len(surface.at(np.empty((0, 3)), stencil_m=0.006)) == 0
-
-
 def test_a_standing_part_has_z_up_and_a_lying_one_y(triangles, flat):
     vertices, faces = triangles(flat, 0.1)
     standing = Surface.from_triangles(vertices, faces, 0.05)

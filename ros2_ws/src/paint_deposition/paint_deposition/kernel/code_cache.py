@@ -78,8 +78,8 @@ def named_for_its_code(
 
     Args:
         function: what will be compiled.
-        laws: functions whose code distinguishes this one from others of its name; default: its own.
-        variant: what else does.
+        laws: functions whose code makes it another than others of its name; default: its own.
+        variant: what else makes it another.
     """
     functions = [function] if laws is None else laws
     function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'

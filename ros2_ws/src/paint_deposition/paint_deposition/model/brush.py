@@ -161,8 +161,8 @@ class BrushLaw:
                 raise ModelError(f'{where}: {name} is given and brush {lacks} has none; add it')
             if name in SETTINGS and not min(given) <= value <= max(given):
                 raise ModelError(
-                    f'{where}: {name} is {value:g}, outside {min(given):g} to {max(given):g} of the '
-                    f'calibrated brushes {numbers}; calibrate a brush there'
+                    f'{where}: {name} is {value:g}, outside {min(given):g} to {max(given):g} of '
+                    f'the calibrated brushes {numbers}; calibrate a brush there'
                 )
         return [name for name in SETTINGS if getattr(wanted, name) is not None]
 
