@@ -19,14 +19,11 @@ from paint_deposition.motion.trajectory import PoseCounts
 
 @dataclass(frozen=True)
 class CommonFilm:
-    """What guns with an integrator each laid on the same points.
+    """What guns with an integrator each, at least one, laid on the same points.
 
     The shares are added in the order of the guns: the film does not depend on whose poses came
     first. What acts on the finished film, sag say, acts on the sum, as the first gun's model has
     it; see ``require_one_finish``.
-
-    Attributes:
-        guns: at least one integrator.
     """
 
     guns: tuple[FilmIntegrator, ...]
@@ -73,11 +70,7 @@ class CommonFilm:
 
 @dataclass(frozen=True)
 class LiveFilms:
-    """The films of several guns that paint the same points, each of a motion under way.
-
-    Attributes:
-        guns: at least one film.
-    """
+    """The films of one or more guns that paint the same points, each of a motion under way."""
 
     guns: tuple[LiveFilm, ...]
 

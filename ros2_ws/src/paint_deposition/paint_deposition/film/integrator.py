@@ -77,11 +77,9 @@ class Steps:
 
 
 class FilmIntegrator:
-    """Accumulates the film on surface points as the path comes in.
+    """Accumulates the film of a model on surface points as the path comes in.
 
     Args:
-        points: where the film is wanted.
-        model: the deposition model with its effects.
         precision: 'single' for meshes (1e-6 of the peak), 'double' for fitting.
         occluder: traces lines of sight; None where nothing can stand in the way.
         keep_absent_laws: compile the laws of absent effects too, so that a fit which varies them

@@ -92,11 +92,7 @@ MET, LEVEL = 1e-4, 10.0
 
 @dataclass(frozen=True)
 class BrushLaw:
-    """The law through calibrated brushes.
-
-    Attributes:
-        brushes: the calibrated ones, two at least.
-    """
+    """The law through calibrated brushes, two at least."""
 
     brushes: tuple[Brush, ...]
 

@@ -116,13 +116,7 @@ class ThreeGaussianCollapse(BaseModel):
 
 @dataclass(frozen=True)
 class SampledCollapse:
-    """A profile given at a row of distances, zero beyond them; a cubic spline in between.
-
-    Attributes:
-        x_m: (N,) increasing [m].
-        film_um: (N,) [um]; next to nothing at both ends.
-        finest_m: scale on which it changes [m].
-    """
+    """A profile at (N,) rising distances, next to nothing at both ends; a cubic spline between."""
 
     x_m: np.ndarray
     film_um: np.ndarray

@@ -149,11 +149,7 @@ def leaf_faces(nodes, faces, node):
 
 @njit(cache=True, nogil=True)
 def wait(waiting, keys, left, node, first, second):
-    """Let a node's children wait, by their keys; the one with the lesser is looked at first.
-
-    Returns:
-        How many wait now.
-    """
+    """Let a node's children wait, the one with the lesser key first; return how many wait now."""
     one, other = 2 * node + 1, 2 * node + 2
     if first < second:
         one, other, first, second = other, one, second, first
@@ -169,12 +165,7 @@ SLACK_M = 1e-9
 
 
 def first_faces(tree: FaceTree, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-    """(N,) the face that each ray meets first, from either side, -1 for none.
-
-    Args:
-        starts_m: (N, 3) [m].
-        directions: (N, 3), any length.
-    """
+    """(N,) the face that each of N rays meets first, from either side, -1 for none."""
     starts = np.ascontiguousarray(starts_m, dtype=np.float64)
     ways = np.ascontiguousarray(directions, dtype=np.float64)
     met = np.empty(len(starts), dtype=np.int64)

@@ -57,13 +57,9 @@ def find_slivers(lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
 def cut_edges(
     of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float, next_vertex: int
 ) -> CutEdges:
-    """Cut the long sides of slivers into pieces about as long as their base.
+    """Cut the long sides of slivers, (N, 3) edges of (E,) lengths, into pieces as their base.
 
-    Args:
-        of_slivers: (N, 3) edges of the slivers.
-        lengths_m: (E,) lengths of all edges [m].
-        max_edge_length_m: no need for shorter pieces than this [m].
-        next_vertex: number that the first new vertex gets.
+    No piece need be shorter than the longest edge; the first new vertex is ``next_vertex``.
     """
     in_order = np.take_along_axis(of_slivers, lengths_m[of_slivers].argsort(axis=1), axis=1)
     piece_m = np.maximum(lengths_m[in_order[:, :1]], max_edge_length_m)
@@ -231,8 +227,7 @@ def refine(
 class _Growing:
     """Vertices with normals, to which middles of edges are added.
 
-    Once a sliver's edge was cut ahead of its neighbour's, the middles that the neighbour has to
-    meet are remembered.
+    Once a sliver's edge was cut ahead of its neighbour's, those that this has to meet are kept.
     """
 
     def __init__(self, vertices_m: np.ndarray, normals: np.ndarray) -> None:
