@@ -56,7 +56,7 @@ def _distinct(vertices):
     # Those of a cell hang together as a linked list.
     heads = np.full(slots, -1, dtype=np.int32)
     first, following, label = np.empty((3, len(vertices)), dtype=np.int32)
-    close = [(0, 0)]  # gives the list its type
+    close = [(np.int64(0), np.int64(0))]  # gives the list its type
     count = 0
     for v in range(len(vertices)):
         x, y, z = (
@@ -82,7 +82,7 @@ def _distinct(vertices):
                         a, b, c = _place(vertices, first[other])
                         away2 = (x - a) ** 2 + (y - b) ** 2 + (z - c) ** 2
                         if away2 <= WELD_M * WELD_M:
-                            close.append((np.int64(other), count))
+                            close.append((np.int64(other), np.int64(count)))
                         other = following[other]
         first[count], following[count], heads[home] = v, heads[home], count
         count += 1

@@ -1,7 +1,8 @@
 """Curves learned from readings over one covariate."""
 
 from collections.abc import Callable
-from typing import Any
+from types import new_class
+from typing import Any, cast
 
 import numpy as np
 from numba.extending import register_jitable
@@ -180,7 +181,8 @@ def _acting(
         'id': f'learned:{covariate}', 'covariate': covariate, 'unit': unit, 'over': over,
         '__module__': __name__, '__doc__': f'What is painted follows {over}, as learned.',
     }  # fmt: skip
-    return type(acts)(f'Learned_{covariate}', (acts,), what | others)
+    law = new_class(f'Learned_{covariate}', (acts,), {}, lambda names: names.update(what | others))
+    return cast(type[LearnedCurve], law)
 
 
 def _edge_axis(value: Any) -> Any:
