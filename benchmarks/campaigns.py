@@ -24,8 +24,8 @@ from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.projection import flux_um_per_s
+from paint_deposition.model.eq2_projection import flux_um_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory

@@ -1,6 +1,6 @@
 """Patterns that try out one thing each."""
 
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 RING = PlanarPattern(K2=0.15, K3=0.3, phi_rad=0.7, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15)
 PATTERNS = {

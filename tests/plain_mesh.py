@@ -11,38 +11,15 @@ LARGEST_CORRECTION_COSINE = np.cos(np.radians(15.0))
 WORST_CONDITION = 1e8
 
 
-def groups(pairs, count):
-    """How many groups pairs (P, 2) make, and the number of each member's, first come first."""
-    links = coo_matrix((np.ones(len(pairs)), np.asarray(pairs).T), shape=(count, count))
-    return connected_components(links, directed=False)
-
-
 def welded(vertices, faces):
     """Vertices closer than a micrometre made one, in the order in which they appear."""
     unique, label = np.unique(vertices, axis=0, return_inverse=True)
     close = cKDTree(unique).query_pairs(WELD_M, output_type='ndarray')
-    group = groups(close, len(unique))[1][label.ravel()]
+    links = coo_matrix((np.ones(len(close)), close.T), shape=(len(unique),) * 2)
+    group = connected_components(links, directed=False)[1][label.ravel()]
     first = np.unique(group, return_index=True)[1]
     order = np.argsort(first)
     return vertices[first[order]], np.argsort(order)[group][faces]
-
-
-def edges(faces):
-    """Ends of the edges (E, 2), lower first and in order, and (F, 3) which leaves each corner."""
-    ends = np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2)
-    unique, of_face = np.unique(np.sort(ends, axis=1), axis=0, return_inverse=True)
-    return unique, of_face.reshape(-1, 3)
-
-
-def half_edges(faces):
-    """Pairs of opposed half-edges, pairs of the same sense, and those without one partner."""
-    of_face = edges(faces)[1].ravel()
-    order = np.argsort(of_face, kind='stable')
-    count = np.bincount(of_face)
-    first = (np.cumsum(count) - count)[count == 2]
-    pairs = np.stack([order[first], order[first + 1]], axis=1)
-    opposed = faces.ravel()[pairs[:, 0]] != faces.ravel()[pairs[:, 1]]
-    return pairs[opposed], pairs[~opposed], np.flatnonzero(count[of_face] != 2)
 
 
 def mean_normals(vertices, faces):

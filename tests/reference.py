@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Ray
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.kernel.laws import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -21,31 +21,25 @@ def reference_film_um(
 def _flux_um_per_s(
     points: SurfacePoints, path: SprayPath, row: int, model: DepositionModel
 ) -> np.ndarray:
-    omega = model.projection.model_plane_m
+    omega, offset_m = model.projection.model_plane_m, model.projection.emission_offset_m
     rotation = path.rotation[row]
-    emission_point = path.position_m[row] - model.projection.emission_offset_m * rotation[:, 2]
-    to_point = points.positions_m - emission_point
-    x, y, z = (to_point @ rotation).T
+    to_point = points.positions_m - (path.position_m[row] - offset_m * rotation[:, 2])
     length = np.linalg.norm(to_point, axis=1)
     cos_incidence = -np.einsum('ij,ij->i', to_point, points.normals) / length
-    lit = (z > max(model.projection.emission_offset_m, 1e-3)) & (cos_incidence > 0.0)
+    lit = np.flatnonzero((to_point @ rotation[:, 2] > max(offset_m, 1e-3)) & (cos_incidence > 0.0))
+    x, y, z = (to_point[lit] @ rotation).T
+    shift_x, shift_y = path.pattern_shift_m[row]
+    rays = np.stack([
+        omega * x / z - shift_x, omega * y / z - shift_y, z / omega, cos_incidence[lit],
+        np.full(len(lit), path.speed_m_per_s[row]),
+    ], axis=1)  # fmt: skip
+    factor, scale = np.ones((2, len(lit)))
+    for effect in model.effects:
+        for law, total in ((effect.flux_factor, factor), (effect.pattern_scale, scale)):
+            if law is not None:
+                total *= [law(Ray(*ray), *effect.values()) for ray in rays]
+    magnification = omega**2 * cos_incidence[lit] / (length[lit] ** 2 * (z / length[lit]) ** 3)
+    planar = model.planar.flux_um_per_s(scale * rays[:, 0], scale * rays[:, 1])
     flux = np.zeros(len(points))
-    for point in np.flatnonzero(lit):
-        ray = Ray(
-            omega * x[point] / z[point] - path.pattern_shift_m[row, 0],
-            omega * y[point] / z[point] - path.pattern_shift_m[row, 1],
-            z[point] / omega,
-            cos_incidence[point],
-            path.speed_m_per_s[row],
-        )
-        factor, scale = 1.0, 1.0
-        for effect in model.effects:
-            if effect.flux_factor is not None:
-                factor *= effect.flux_factor(ray, *effect.values())
-            if effect.pattern_scale is not None:
-                scale *= effect.pattern_scale(ray, *effect.values())
-        cos_axis = z[point] / length[point]
-        magnification = omega**2 * cos_incidence[point] / (length[point] ** 2 * cos_axis**3)
-        planar = model.planar.flux_um_per_s(scale * ray.x_m, scale * ray.y_m)
-        flux[point] = factor * scale**2 * magnification * planar
+    flux[lit] = factor * scale**2 * magnification * planar
     return flux

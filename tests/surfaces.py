@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 from scipy.spatial import Delaunay
 
-from paint_deposition.part.creases import Edges
-from paint_deposition.part.normals import mean_normals
+from paint_deposition.part.edges import Edges
+from plain_mesh import mean_normals
 
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 

@@ -14,7 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from booth import SAMPLES
-from paint_deposition.effects.base import Effect, Ray
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
+from paint_deposition.kernel.laws import Ray
 
 
 @pytest.fixture(scope='module')

@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 
 from brushes import NARROW, WIDE, switched
-from paint_deposition.effects.base import Effect
+from paint_deposition.effects.base import Effect, SetPointPower
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.incidence_attraction import IncidenceAttraction
 from paint_deposition.effects.library.sag import Sag
-from paint_deposition.effects.set_point_power import SetPointPower
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.provenance import model_digest
@@ -83,15 +82,6 @@ def test_each_brush_paints_with_the_effects_at_its_own_set_points():
     assert np.abs(together - plain).max() > 0.02 * total.max()
 
 
-def test_a_power_of_zero_is_an_effect_that_follows_nothing_to_the_last_bit():
-    still = tuple(
-        e.model_copy(update={'follows': (e.follows[0].model_copy(update={'exponent': 0.0}),)})
-        for e in FOLLOWING
-    )
-    plain = brushed(*(e.model_copy(update={'follows': ()}) for e in FOLLOWING))
-    assert np.array_equal(film_um(brushed(*still), PATH), film_um(plain, PATH))
-
-
 def test_the_live_film_follows_set_points_as_the_offline_film_does():
     model = brushed(*FOLLOWING)
     columns = MOTION.stamps_ns, MOTION.positions_m, MOTION.quaternions_xyzw
@@ -134,9 +124,9 @@ def test_a_model_file_holds_what_an_effect_follows(tmp_path):
     ('model', 'words'),
     [
         (DepositionModel(effects=FOLLOWING[:1]),
-         'incidence_attraction follows set-points, which a model with planar alone does not tell'),
+         'incidence_attraction follows set-points, which a model with planar alone does not have'),
         (brushed(IncidenceAttraction(attraction=1.0, follows=(BELL,))),
-         'incidence_attraction follows a set-point, and brush 1 does not tell its bell_speed_rpm'),
+         'incidence_attraction follows a set-point, and brush 1 does not say its bell_speed_rpm'),
         (brushed(Sag(run_m=0.01, follows=(AIR,))),
          'sag acts on the finished film, which all brushes share: it cannot follow set-points'),
         (brushed(CURVES['time_s'](low=0.0, high=4.0, learned=(0.1, -0.1), follows=(AIR,))),

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 from numba import float32, float64, njit
 
-from booth import MODEL, STANDOFF_M, door, in_batches, painted, panel, path_of, serpentine, spot
+from booth import MODEL, STANDOFF_M, painted, panel, spot
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.kernel.laws import in_precision
-from paint_deposition.kernel.ray import Ray
-from reference import reference_film_um
+from paint_deposition.kernel.laws import Ray, in_precision
 
 REACH_M = 0.2
 STEP_M = REACH_M / 4
@@ -70,29 +67,6 @@ def test_it_never_takes_all_that_arrives_away():
     assert constant(-3.0).flux_factor(at(0.1, 0.0), *constant(-3.0).values()) == LEAST_FACTOR
 
 
-@pytest.mark.slow
-def test_no_deviation_is_the_same_film_to_the_bit():
-    path = path_of(serpentine((0.08, -0.08)))
-    neutral = constant(0.0)
-    assert neutral.is_neutral
-    assert neutral.flux_factor(at(0.03, 0.04), *neutral.values()) == 1.0
-    film = painted(door(), path, neutral)
-    assert np.array_equal(film.gauge_um, painted(door(), path).gauge_um)
-
-
-@pytest.mark.slow
-def test_the_kernel_computes_the_law():
-    points = door().points().select(slice(None, None, 7))
-    path = path_of(spot(z_m=0.45, standoff_m=0.35))
-    model = MODEL.with_effect(LAW)
-    integrator = FilmIntegrator(points, model, 'double')
-    integrator.add(path)
-    expected = reference_film_um(points, path, model)
-    plain = reference_film_um(points, path, MODEL)
-    assert np.abs(expected - plain).max() > 0.02 * plain.max()
-    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
-
-
 def volume_um_m2(*effects) -> float:
     """Paint on the panel in front of a gun that stands still for a second."""
     surface = panel(0.5, 0.01)
@@ -116,19 +90,6 @@ def test_the_paint_on_a_flat_panel_changes_as_the_integral_of_the_pattern(law):
 
 
 @pytest.mark.slow
-def test_harmonics_move_paint_and_make_none_where_the_pattern_is_round():
-    """A pattern without offset ring or asymmetry: cosine and sine integrate to nothing."""
-    turned = LearnedFootprint(reach_m=REACH_M, learned=(0.0, 0.3, -0.2, 0.1, 0.2) * 5)
-    round_pattern = MODEL.planar.model_copy(update={'K3': 0.0})
-    model = MODEL.model_copy(update={'planar': round_pattern})
-    points = panel(0.5, 0.01)
-    plain = painted(points, spot(), model=model).raw_um
-    film = painted(points, spot(), turned, model=model).raw_um
-    assert np.abs(film - plain).max() > 0.1 * plain.max()
-    assert film.sum() == pytest.approx(plain.sum(), rel=1e-4)
-
-
-@pytest.mark.slow
 def test_its_axes_are_those_of_the_tool_on_the_model_plane():
     """More to the tool's +x, which the booth's gun has along the world's x."""
     towards_x = LearnedFootprint(reach_m=REACH_M, learned=(0.0, 0.2, 0.0, 0.0, 0.0) * 5)
@@ -142,16 +103,3 @@ def test_its_axes_are_those_of_the_tool_on_the_model_plane():
     near = (radius > STEP_M) & (radius < REACH_M)
     cos = place[near, 0] / np.hypot(place[near, 0], place[near, 2])
     np.testing.assert_allclose(film[near], (1.0 + 0.2 * cos) * plain[near], rtol=1e-6)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('poses', [1, 40])
-def test_a_stream_paints_what_the_recording_does(poses):
-    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
-    surface = panel(0.3, 0.05)
-    whole = painted(surface, trajectory, LAW)
-    live = FilmIntegrator(surface.points(), MODEL.with_effect(LAW), 'double', surface.occluder)
-    for piece in in_batches(trajectory, poses, LAW.needs_whole_strokes):
-        live.add(piece)
-    assert np.array_equal(live.gauge_um, whole.gauge_um)
-    assert not np.array_equal(whole.gauge_um, painted(surface, trajectory).gauge_um)

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from booth import MODEL, door, in_batches, painted, panel, path_of, serpentine
-from paint_deposition.effects.learned.place import SAME_PART, LearnedMap, PartGrid, places_m
-from paint_deposition.film.integrator import FilmIntegrator
+from booth import door, panel
+from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
 from paint_deposition.part.points import SurfacePoints
 
 PANEL = panel().points()
@@ -65,33 +64,11 @@ def test_the_film_changes_by_the_map_where_the_part_is_its_own(kind):
     assert np.ptp(h) > 0.4
 
 
-def test_bare_metal_stays_bare_and_no_film_falls_below_zero():
-    film_um = np.where(PANEL.positions_m[:, 0] > 0.0, 0.3, 0.0)
-    law = on_part(learned=np.full((2, 3), -1.0), kind='addition')
-    changed = law.on_film(film_um, PANEL)
-    near = np.abs(places_m(PANEL)) <= [0.3, 0.1]
-    assert changed[near.all(axis=1)].max() == 0.0
-    assert changed[film_um == 0.0].max() == 0.0
-
-
 @pytest.mark.parametrize('surface', [door(), panel(0.25)], ids=['door', 'smaller panel'])
 def test_another_part_is_left_alone(surface):
     points = surface.points()
     film_um = np.ones(len(points))
     assert on_part().on_film(film_um, points) is film_um
-
-
-def test_a_part_is_the_same_though_its_mesh_differs_a_little():
-    sides = np.array(PANEL.extent_m)
-    assert grid_on(PANEL, part_m=tuple(sides * (1.0 + 0.5 * SAME_PART))).is_of(PANEL)
-    assert not grid_on(PANEL, part_m=tuple(sides * (1.0 + 3.0 * SAME_PART))).is_of(PANEL)
-
-
-def test_a_map_of_zeros_changes_nothing_to_the_bit():
-    path, neutral = path_of(serpentine()), on_part(learned=np.zeros((2, 3)))
-    assert neutral.is_neutral
-    film = painted(panel(), path, neutral)
-    assert np.array_equal(film.gauge_um, painted(panel(), path).gauge_um)
 
 
 @pytest.mark.parametrize('kind', ['factor', 'addition'])
@@ -105,19 +82,6 @@ def test_few_points_are_changed_as_they_are_among_many(kind, count):
     whole = law.on_film(film_um, points)
     assert not np.array_equal(whole, film_um)
     assert np.array_equal(law.on_film(film_um[rows], points.select(rows)), whole[rows])
-
-
-@pytest.mark.parametrize('poses', [1, 40])
-def test_a_stream_paints_what_the_recording_does(poses):
-    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
-    law = on_part()
-    surface = panel()
-    whole = painted(surface, trajectory, law)
-    live = FilmIntegrator(surface.points(), MODEL.with_effect(law), 'double', surface.occluder)
-    for piece in in_batches(trajectory, poses, law.needs_whole_strokes):
-        live.add(piece)
-    assert np.array_equal(live.gauge_um, whole.gauge_um)
-    assert not np.allclose(whole.gauge_um, painted(surface, trajectory).gauge_um, rtol=0.05)
 
 
 def test_each_part_follows_its_own_map():

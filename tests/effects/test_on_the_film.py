@@ -9,8 +9,6 @@ from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.effects.library.flow_drift import MIDDLE_PASS, FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.gauge_curvature_bias import GaugeCurvatureBias
-from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.incidence_attraction import IncidenceAttraction
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.library.overspray_fog import OversprayFog
@@ -53,14 +51,6 @@ def test_the_gauge_reads_high_on_convex_surface_whatever_the_film():
         assert gauge.on_film(film, make_surface(1.0 / RADIUS_M))[0] == film_um
 
 
-def test_gauges_change_readings_and_not_the_film():
-    path = path_of(spot())
-    plain = painted(panel(), path)
-    gauge = painted(panel(), path, GaugeGain(gain=0.03), GaugeZero(offset_um=-0.8))
-    assert np.array_equal(gauge.film_um, plain.film_um)
-    np.testing.assert_allclose(gauge.gauge_um, 1.03 * plain.film_um - 0.8, rtol=1e-12)
-
-
 def test_fog_adds_exactly_and_only_to_a_part_that_was_sprayed():
     path = path_of(spot())
     plain = painted(panel(), path).film_um
@@ -94,13 +84,6 @@ def test_attraction_goes_with_the_incidence_of_each_ray(attraction):
     cos_incidence = distance_m / np.sqrt(distance_m**2 + radius2)
     expected = plain * (1.0 + attraction * (1.0 - cos_incidence))
     np.testing.assert_allclose(film, expected, atol=1e-11 * plain.max())
-
-
-def test_rebound_at_its_bound_is_another_cosine_and_never_less_than_nothing():
-    law = IncidenceAttraction.flux_factor
-    for cos_incidence in (1.0, 0.5, 1e-9):
-        ray = type('Ray', (), {'cos_incidence': cos_incidence})
-        assert law(ray, -1.0) == pytest.approx(cos_incidence, abs=1e-15)
 
 
 @pytest.mark.parametrize('strength', [0.4, 1.0])

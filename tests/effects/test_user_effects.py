@@ -55,12 +55,6 @@ def test_an_import_of_a_module_that_has_moved_is_answered_with_its_new_place(own
         load_effect_file(path)
 
 
-def test_an_import_of_what_never_was_is_the_files_to_correct(own):
-    path = own(('paint_deposition.kernel.fast_math', 'paint_deposition.kernel.slow_math'))
-    with pytest.raises(ModelError, match=r'slow_math.*; correct the file$'):
-        load_effect_file(path)
-
-
 @pytest.mark.slow
 def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     path = own(
@@ -75,21 +69,6 @@ def test_a_law_may_use_all_of_the_ray_and_numbers_of_its_module(own):
     integrator = FilmIntegrator(points, model, 'single')
     integrator.add(motion)
     np.testing.assert_allclose(integrator.raw_um, expected, atol=3e-6 * expected.max(), rtol=0.0)
-
-
-@pytest.mark.slow
-def test_an_edited_law_is_compiled_anew(own):
-    points, motion = panel(0.3, 0.05).points(), path_of(spot())
-
-    def total(*changes) -> float:
-        effect = load_effect_file(own(*changes))
-        integrator = FilmIntegrator(points, MODEL.with_effect(effect.typical()), 'double')
-        integrator.add(motion)
-        return integrator.raw_um.sum()
-
-    plain = total(('exp(-loss_per_m_per_s * ray.speed_m_per_s)', '1.0 + 0.0 * loss_per_m_per_s'))
-    half = total(('exp(-loss_per_m_per_s * ray.speed_m_per_s)', '0.5 + 0.0 * loss_per_m_per_s'))
-    assert half == pytest.approx(0.5 * plain, rel=1e-12)
 
 
 def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
@@ -158,12 +137,6 @@ def test_places_are_tried_out(own, place, body, message):
 def test_a_missing_file_is_named(tmp_path: Path):
     with pytest.raises(ModelError, match=r'nothing\.py: cannot be read \(No such file'):
         load_effect_file(tmp_path / 'nothing.py')
-
-
-def test_no_byte_code_is_left_beside_the_users_file(own):
-    path = own()
-    load_effect_file(path)
-    assert [item.name for item in path.parent.iterdir()] == ['own.py']
 
 
 def test_an_unknown_id_is_answered_with_the_nearest():

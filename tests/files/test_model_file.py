@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from booth import SAMPLES
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
@@ -23,7 +22,7 @@ from paint_deposition.files.model_file import (
     read_model_file,
     write_model,
 )
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 
 @pytest.fixture

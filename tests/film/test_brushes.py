@@ -107,15 +107,6 @@ def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
     assert (film.flow, film.brush) == (1.2, 1)
 
 
-def test_a_closed_gun_drips_with_the_brush_that_was_open():
-    """Behind a closing the flow falls with a time constant: tau times the flow, of that brush."""
-    motion = replace(straight_pass(TIMES_S), **switched(stamps_ns([0.5, 1.5]), (1.0, 2), (0.0, 1)))
-    model = MODEL.with_effect(TriggerLag(fall_s=0.1))
-    path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
-    sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
-    assert seconds_by_pattern(model, sprayed) == pytest.approx([0.0, 1.1], rel=1e-6)
-
-
 @pytest.mark.parametrize('lag_s', [0.03, -0.03])
 def test_a_lag_takes_the_brush_along(lag_s):
     motion = replace(
@@ -160,15 +151,6 @@ def test_one_pattern_does_not_stand_for_several_brushes():
     film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 1))
     with pytest.raises(ModelError, match='brushes 1, 2 are used'):
         film.add_trigger(TriggerChange(int(stamps_ns(0.2)), 1.0, 2))
-
-
-def test_a_new_model_must_have_the_brushes_in_use():
-    film = LiveFilm(lying_plane(), MODEL)
-    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 2))
-    film.reset()
-    with pytest.raises(ModelError, match='brush 2 is not in the model; its brushes: 4'):
-        film.use(DepositionModel.of_brushes([Brush(number=4, planar=NARROW)]))
-    assert film.model is MODEL
 
 
 def test_brushes_are_in_the_order_of_their_numbers_each_once():

@@ -157,8 +157,3 @@ def test_the_error_at_readings_is_most_of_the_true_one(curve):
     true_um = films[1] - films[0]
     assert np.corrcoef(told_um, true_um)[0, 1] > 0.8
     assert np.std(true_um - told_um) < 0.6 * np.std(true_um)
-
-
-def test_there_is_no_error_at_readings_on_a_plane():
-    surface = Surface.from_triangles(*triangulated(lambda x, z: 0.3 * x, 0.1), 0.02)
-    assert not facet_errors_um(surface, surface.points(), PATH, BELL).any()

@@ -1,13 +1,12 @@
 """The live film is the offline film, whatever way the motion comes in."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from paint_deposition.effects.catalogue import effect_class
+from brushes import two_brushes
+from paint_deposition.effects.catalogue import LEARNED, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.path_builder import spray_path
@@ -77,20 +76,6 @@ def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
     assert np.array_equal(film.up_to_date().film_um, expected.film_um)
     assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
     assert expected.film_um.max() > 1.0
-
-
-def test_a_law_over_time_counts_from_the_start_of_the_motion():
-    """A factor over time changes the film; the clock of the recording does not matter."""
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film_um = _offline(motion, DRIFTING).film_um
-    assert np.abs(film_um - _offline(motion).film_um).max() > 0.1
-    hour = 3_600_000_000_000
-    later = replace(
-        motion,
-        stamps_ns=motion.stamps_ns + hour,
-        trigger_stamps_ns=motion.trigger_stamps_ns + hour,
-    )
-    assert np.array_equal(_offline(later, DRIFTING).film_um, film_um)
 
 
 def test_looking_at_the_film_changes_nothing():
@@ -176,15 +161,6 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     assert np.allclose(film.up_to_date().film_um, _offline(second).film_um, rtol=0, atol=1e-9)
 
 
-def test_after_a_reset_the_same_motion_paints_the_same_film():
-    motion = straight_pass(TIMES_S, **TRIGGERS)
-    film = _painted(_events(motion, 10))
-    first = film.up_to_date().film_um
-    film.reset()
-    film.follow(_events(motion, 33))
-    assert np.array_equal(film.up_to_date().film_um, first)
-
-
 def test_a_motion_that_begins_again_paints_a_second_coat():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = LiveFilm(lying_plane(), MODEL)
@@ -231,3 +207,15 @@ def test_memory_is_bounded_and_says_so():
     # Too late to be taken back: the gun is off from the first state on, not before.
     film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))
     assert film.up_to_date().film_um.max() > 1.0
+
+
+def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
+    """Another part, and a model without the brush that sprays: refused before the next pose."""
+    model = two_brushes()
+    before = _painted([TriggerChange(START_NS, 1.0, 2)], model)
+    other_part = LiveFilm(lying_plane(), model)
+    other_part.carry_on(before)
+    with pytest.raises(ModelError, match='brush 2 is not in the model'):
+        other_part.use(model.with_brush(1))
+    other_part.add_poses(_poses(straight_pass(TIMES_S), slice(0, 500)))
+    assert (other_part.brush, other_part.flow) == (2, 1.0)

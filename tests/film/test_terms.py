@@ -9,7 +9,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from scenes import lying_plane, weaving
 
@@ -93,12 +93,3 @@ def test_the_terms_add_up_to_the_films_derivatives(planar, effects):
         slope = (ends[1] - ends[0]) / 2e-4
         scale = max(np.abs(slope).max(), peak)
         assert derivative == pytest.approx(slope, rel=0, abs=1e-4 * scale), parameter
-
-
-@pytest.mark.parametrize('share', [0.0, 1.0])
-def test_a_gain_of_nothing_has_a_derivative(share):
-    """The film is linear in K2, to where one of the Gaussians has no share."""
-    planar = PlanarPattern(K2=share)
-    ends = [film_um(model_of(PlanarPattern(K2=k2), ())) for k2 in (0.0, 1.0)]
-    found = term_weights(planar)[1][1] @ terms_um(model_of(planar, ()))
-    assert found == pytest.approx(ends[1] - ends[0], rel=0, abs=CUT * ends[1].max())

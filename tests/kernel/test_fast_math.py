@@ -93,12 +93,6 @@ def test_below_the_floor_it_stays_there(real, floor):
     assert exp2_all(far).tolist() == [2.0**floor] * 4
 
 
-@pytest.mark.parametrize('real', FLOORS)
-def test_the_precision_is_kept(real):
-    x = np.ones(3, real)
-    assert exp_all(x).dtype == exp2_all(x).dtype == log_all(x).dtype == real
-
-
 def test_outside_compiled_code_they_are_the_c_librarys():
     assert exp(-1.3) == math.exp(-1.3)
     assert exp2(-1.3) == 2.0**-1.3

@@ -6,9 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import Brush, SetPoints
-from paint_deposition.model.brush_law import SETTINGS, BrushLaw
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.brush import SETTINGS, Brush, BrushLaw, SetPoints
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 BASE = {
     'flow_cm3_per_min': 200.0, 'shaping_air_l_per_min': 250.0, 'bell_speed_rpm': 40_000.0,
@@ -66,15 +65,6 @@ def test_exponents_are_found_where_brushes_differ_and_the_prior_decides_elsewher
     assert of_two['width']['bell_speed_rpm'][0] == pytest.approx(0.4, abs=1e-4)
     # Both have the same voltage: DELMIA's factor, with its whole deviation.
     assert of_two['width']['voltage_kv'] == pytest.approx((-1.0, 0.5))
-
-
-def test_the_law_goes_through_the_calibrated_brushes():
-    other = CORNERS[1].model_copy(
-        update={'planar': PlanarPattern(K1_cm3_per_s=0.9, K2=0.5, K3=0.3, phi_rad=-2.0)}
-    )
-    for brush in (CORNERS[0], other):
-        found = BrushLaw((CORNERS[0], other)).pattern('brushes, 9', brush.set_points)
-        assert values(found) == pytest.approx(values(brush.planar), rel=1e-5)
 
 
 def test_twice_the_flow_is_twice_the_paint_where_nothing_else_is_known():

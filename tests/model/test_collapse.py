@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from paint_deposition.model.collapse import ThreeGaussianCollapse
-from paint_deposition.model.line_integral import line_integral_um_m_per_s
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse, line_integral_um_m_per_s
 from patterns import PATTERNS
 
 ACROSS_M = np.linspace(-0.7, 0.7, 57)
@@ -37,10 +36,7 @@ def test_eq3_area_is_a_third_of_the_gains():
     assert pytest.approx(area, rel=1e-10) == EQ3.area_um_m
 
 
-def test_eq3_mirrored_exchanges_left_and_right():
-    np.testing.assert_allclose(
-        EQ3.mirrored().thickness_um(ACROSS_M), EQ3.thickness_um(-ACROSS_M), rtol=1e-14
-    )
+def test_eq3_scaled_is_that_much_thicker():
     assert EQ3.scaled(3.0).area_um_m == pytest.approx(3.0 * EQ3.area_um_m)
 
 

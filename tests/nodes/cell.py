@@ -18,8 +18,8 @@ from rclpy.time import Time
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.recordings.headers import SET_POINTS
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -95,7 +95,7 @@ def offline_um(
     node, trajectory: Trajectory, model: DepositionModel | None = None, precision: str = 'single'
 ) -> np.ndarray:
     """The film that an offline run has at the node's points."""
-    trajectory, model = by_set_points(trajectory, model or DepositionModel())
+    trajectory, model = with_interpolated_brushes(trajectory, model or DepositionModel())
     path, _ = spray_path(
         trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
     )

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 
 X, Y, Z = np.eye(3)
 

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.effects.base import PathContext
-from paint_deposition.model.projection import Projection
 from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -56,10 +54,6 @@ def assert_same_edge(there: SurfacePoints, alone: SurfacePoints) -> None:
     assert (there.edge_distance_m[~near] > 0.05).all()
 
 
-def context(surface: Surface) -> PathContext:
-    return PathContext(Projection(), surface.down, surface.outward, surface.centre_m)
-
-
 @pytest.mark.parametrize('thickness_m', [0.003, 0.012, 0.04])
 @pytest.mark.parametrize('side', SIDES)
 def test_the_outer_surface_of_the_solid_is_the_sheet(side, thickness_m):
@@ -70,32 +64,6 @@ def test_the_outer_surface_of_the_solid_is_the_sheet(side, thickness_m):
     assert np.ptp(alone.curvature_per_m) > 5.0
     np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)
     assert_same_edge(there, alone)
-
-
-@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
-@pytest.mark.parametrize('side', SIDES)
-def test_outward_is_where_the_gun_is(side, thickness_m):
-    sheet, shell = parts(side, thickness_m)
-    np.testing.assert_allclose(shell.outward, sheet.outward, atol=1e-9)
-    np.testing.assert_allclose(context(shell).across, context(sheet).across, atol=1e-9)
-    np.testing.assert_allclose(context(shell).downhill, context(sheet).downhill, atol=1e-9)
-    np.testing.assert_array_equal(shell.points().outward, shell.outward)
-
-
-@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
-@pytest.mark.parametrize('side', SIDES)
-def test_a_solid_stands_as_its_sheet_does(side, thickness_m):
-    sheet, shell = parts(side, thickness_m)
-    np.testing.assert_array_equal(sheet.down, [0, 0, -1])
-    np.testing.assert_array_equal(shell.down, [0, 0, -1])
-
-
-@pytest.mark.parametrize('thickness_m', [0.003, 0.04])
-def test_a_solid_drawn_lying_lies(thickness_m):
-    vertices, faces = triangulated(door_depth, 0.03)
-    vertices, faces = solid(vertices, faces, thickness_m)
-    lying = Surface.from_triangles(vertices[:, [0, 2, 1]], faces[:, ::-1], 0.03)
-    np.testing.assert_array_equal(lying.down, [0, -1, 0])
 
 
 @pytest.mark.parametrize('tilt_deg', [-40.0, 0.0, 15.0, 40.0])
@@ -130,18 +98,6 @@ def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():
     place = shell.at(some.positions_m + inside)
     assert (place.normals @ shell.outward > 0.8).all()
     assert np.linalg.norm(place.positions_m - some.positions_m, axis=1).max() < 0.002
-
-
-@pytest.mark.parametrize('lean_deg', [10.0, 20.0])
-def test_a_fold_of_the_solid_is_still_curvature(lean_deg, fold):
-    vertices, faces = triangulated(fold(np.radians(lean_deg)), 0.02)
-    shell = Surface.from_triangles(*solid(vertices, faces, 0.012), 0.01)
-    z = np.linspace(-0.08, 0.08, 401)
-    ridge = np.stack([0 * z, np.abs(z) * np.tan(np.radians(lean_deg)), z], axis=1)
-    across = shell.at(ridge, np.tile([0.0, -1.0, 0.0], (401, 1)))
-    turn = np.trapezoid(across.curvature_per_m, z / np.cos(np.radians(lean_deg)))
-    assert turn == pytest.approx(-2.0 * np.radians(lean_deg), rel=0.15)
-    np.testing.assert_allclose(across.edge_distance_m, 0.2 - np.abs(z), atol=0.013)
 
 
 @pytest.mark.parametrize(

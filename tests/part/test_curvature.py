@@ -22,17 +22,6 @@ def test_ball(make_surface, ball, radius_m):
     np.testing.assert_allclose(points.curvature_per_m, -2.0 / radius_m, rtol=0.02)
 
 
-def test_flat_is_zero_up_to_the_corners(make_surface, flat):
-    points = make_surface(flat, 0.05, jitter=0.3).points()
-    np.testing.assert_allclose(points.curvature_per_m, 0.0, atol=1e-9)
-
-
-def test_a_saddle_has_none_in_the_sum(make_surface):
-    points = make_surface(lambda x, z: 0.8 * (x**2 - z**2), 0.01).points()
-    middle = np.linalg.norm(points.positions_m, axis=1) < 0.05
-    np.testing.assert_allclose(points.curvature_per_m[middle], 0.0, atol=0.02)
-
-
 def test_a_sharp_ridge_shows_smoothed_and_holds_its_turn(make_surface, fold):
     lean = np.radians(25)
     surface = make_surface(fold(lean), 0.01)

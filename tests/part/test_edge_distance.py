@@ -13,15 +13,6 @@ def test_a_sheet_has_its_rim(make_surface, flat):
     np.testing.assert_allclose(points.edge_distance_m, expected, atol=1e-9)
 
 
-def test_refinement_leaves_the_rim_alone(make_surface, cylinder):
-    coarse = make_surface(cylinder(0.5), 0.02, max_edge_length_m=0.02)
-    fine = make_surface(cylinder(0.5), 0.02, max_edge_length_m=0.005)
-    places = coarse.vertices_m[::7]
-    np.testing.assert_allclose(
-        coarse.at(places).edge_distance_m, fine.at(places).edge_distance_m, atol=1e-9
-    )
-
-
 def test_a_ball_has_none():
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = Surface.from_triangles(ball.vertices, np.asarray(ball.faces), 0.05)
@@ -49,11 +40,3 @@ def test_a_seam_between_patches_triangulated_apart_is_no_edge(triangles, flat, g
     surface = Surface.from_triangles(np.concatenate([one, other]), faces, 0.02)
     near_seam = surface.at([[0.19, 0.0, 0.0], [0.21, 0.0, 0.05]])
     np.testing.assert_allclose(near_seam.edge_distance_m, [0.2, 0.15], atol=1e-3)
-
-
-def test_a_slit_is_an_edge(triangles, flat):
-    one, one_faces = triangles(flat, 0.05, half_width_m=0.2)
-    faces = np.concatenate([one_faces, one_faces + len(one)])
-    both = np.concatenate([one, one + np.array([0.405, 0.0, 0.0])])
-    surface = Surface.from_triangles(both, faces, 0.02)
-    assert surface.at([[0.19, 0.0, 0.0]]).edge_distance_m[0] == pytest.approx(0.01)

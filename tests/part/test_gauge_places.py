@@ -3,8 +3,13 @@
 import numpy as np
 
 from booth import panel
-from paint_deposition.part.face_places import from_edges_m, on_face_m
-from paint_deposition.part.gauge_places import can_stand, grid_places, spread_places
+from paint_deposition.part.gauge_places import (
+    can_stand,
+    from_edges_m,
+    grid_places,
+    on_face_m,
+    spread_places,
+)
 from paint_deposition.part.surface import Surface
 from surfaces import solid, triangulated
 

@@ -1,12 +1,11 @@
 """How high the part stands around its points, against shapes whose horizon is known."""
 
 import numpy as np
-import pytest
 from trimesh.creation import box
 from trimesh.util import concatenate
 
-from paint_deposition.part.horizon import HIGH_SINE, LEAST_SINE, SLACK_SINE
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.visibility import LEAST_SINE, SLACK_SINE
 
 
 def horizon_sines(surface, rows=slice(None)):
@@ -18,38 +17,6 @@ def test_nothing_stands_over_convex_surface(make_surface, ball):
     found = horizon_sines(make_surface(ball(0.4), 0.02))
     assert found.min() == LEAST_SINE
     assert found.max() < SLACK_SINE + 0.5 * 0.03 / 0.4
-
-
-@pytest.mark.parametrize('radius_m', [0.3, 0.6])
-def test_the_rim_of_a_bowl(make_surface, ball, radius_m):
-    """From the bottom of a bowl its corners stand under half the angle that they span."""
-    half_m = 0.2
-    bowl = make_surface(ball(-radius_m), 0.02, half_width_m=half_m)
-    bottom = np.argmin(np.hypot(bowl.vertices_m[:, 0], bowl.vertices_m[:, 2]))
-    sine = np.sin(0.5 * np.arcsin(np.sqrt(2.0) * half_m / radius_m))
-    (found,) = horizon_sines(bowl, [bottom])
-    assert sine <= found <= sine + 1.1 * SLACK_SINE
-
-
-@pytest.mark.parametrize('opening_deg', [95.0, 140.0])
-def test_the_lip_of_a_groove(make_surface, fold, opening_deg):
-    half = np.radians(opening_deg) / 2
-    slant_m = 0.1
-    groove = make_surface(
-        fold(half - np.pi / 2), 0.1, 0.02, half_width_m=0.3, half_height_m=slant_m * np.sin(half)
-    )
-    # Of the upper wall: straight across lies the nearest of the other lip, under the highest sine.
-    on_wall = (groove.vertices_m[:, 2] > 0.01) & (np.abs(groove.vertices_m[:, 0]) < 0.01)
-    assert on_wall.sum() > 5
-    places, normals = groove.vertices_m[on_wall], groove.normals[on_wall]
-    to_lip = np.array([0.0, -slant_m * np.cos(half), -slant_m * np.sin(half)]) - places
-    to_lip[:, 0] = 0.0
-    sine = np.einsum('ij,ij->i', to_lip, normals) / np.linalg.norm(to_lip, axis=1)
-    found = horizon_sines(groove, on_wall)
-    np.testing.assert_array_less(sine - 1e-9, found)
-    high = sine > HIGH_SINE
-    np.testing.assert_array_equal(found[high], 1.0)
-    np.testing.assert_array_less(found[~high], sine[~high] + 1.1 * SLACK_SINE)
 
 
 def test_a_bar_overhead_is_the_highest_horizon():

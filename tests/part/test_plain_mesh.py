@@ -6,10 +6,7 @@ from tests import plain_mesh
 from tests.surfaces import solid, triangulated
 from trimesh.creation import box, icosphere
 
-from paint_deposition.part.creases import Edges
-from paint_deposition.part.groups import connected
-from paint_deposition.part.half_edges import edges_of
-from paint_deposition.part.normals import mean_normals, surface_normals
+from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.welding import weld
 
 
@@ -46,19 +43,8 @@ def mesh(request):
     return vertices, np.asarray(faces, dtype=np.int64)
 
 
-def test_edges_come_in_the_same_order(mesh):
-    _, faces = mesh
-    for one, other in zip(edges_of(faces), plain_mesh.edges(faces), strict=True):
-        assert np.array_equal(one, other)
-    found = Edges.of(faces)
-    expected = plain_mesh.half_edges(faces)
-    for one, other in zip((found.paired, found.clashing, found.single), expected, strict=True):
-        assert np.array_equal(one, other)
-
-
 def test_normals_agree_to_rounding(mesh):
     vertices, faces = mesh
-    assert np.abs(mean_normals(vertices, faces) - plain_mesh.mean_normals(*mesh)).max() < 1e-14
     fitted = surface_normals(vertices, faces)
     assert np.abs(fitted - plain_mesh.surface_normals(*mesh)).max() < 1e-10
     if len(vertices) > 2000:
@@ -70,11 +56,6 @@ def test_normals_agree_to_rounding(mesh):
     assert np.array_equal(repeated, np.tile(fitted, (copies, 1)))
 
 
-def test_normals_of_vertices_without_a_triangle_are_none():
-    vertices = np.concatenate([np.eye(3), [[5.0, 5.0, 5.0]]])
-    assert np.array_equal(surface_normals(vertices, np.array([[0, 1, 2]]))[3], np.zeros(3))
-
-
 @pytest.mark.parametrize('off_m', [0.0, 3e-7, 9e-7, 2e-6])
 @pytest.mark.parametrize('place_m', [0.0, 1.0, -40.0])
 def test_the_same_vertices_are_welded(mesh, off_m, place_m):
@@ -84,11 +65,3 @@ def test_the_same_vertices_are_welded(mesh, off_m, place_m):
     apart = np.arange(len(corners)).reshape(-1, 3)
     for one, other in zip(weld(corners, apart), plain_mesh.welded(corners, apart), strict=True):
         assert np.array_equal(one, other)
-
-
-def test_groups_are_numbered_by_their_first_members():
-    pairs = np.random.default_rng(3).integers(0, 500, (300, 2))
-    count, group = connected(pairs, 500)
-    expected_count, expected = plain_mesh.groups(pairs, 500)
-    assert count == expected_count
-    assert np.array_equal(group, expected)

@@ -41,17 +41,6 @@ def test_the_first_of_all_triangles_that_a_ray_crosses(waves, rays):
     assert 0.1 < np.mean(met >= 0) < 0.9
 
 
-def test_embree_sees_the_same(waves, rays):
-    from embreex.mesh_construction import TriangleMesh
-    from embreex.rtcore_scene import EmbreeScene
-
-    scene = EmbreeScene(robust=True)
-    mesh = TriangleMesh(scene, waves.vertices_m.astype('f4'), waves.faces.astype('i4'))
-    seen = scene.run(*(each.astype('f4') for each in rays))
-    assert np.mean(seen == waves.first_faces(*rays)) > 0.999
-    del mesh
-
-
 def test_no_ray_slips_between_triangles():
     cube = box((1.0, 1.0, 1.0))
     surface = Surface.from_triangles(cube.vertices, np.asarray(cube.faces), 0.03)

@@ -8,11 +8,9 @@ from scipy.spatial import Delaunay
 from trimesh.creation import cylinder
 
 from paint_deposition.errors import MeshError
-from paint_deposition.part import refinement
-from paint_deposition.part.creases import Edges
+from paint_deposition.part.edges import Edges
 from paint_deposition.part.refinement import face_areas_m2, refine
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.welding import weld
 
 
 @pytest.mark.parametrize('max_edge_length_m', [0.05, 0.02, 0.007])
@@ -86,28 +84,6 @@ def rim_length_m(vertices, faces):
     return np.linalg.norm(vertices[faces.ravel()[single]] - ends, axis=1).sum()
 
 
-def test_too_many_triangles_are_refused_with_an_edge_length_that_works(
-    triangles, flat, monkeypatch
-):
-    monkeypatch.setattr(refinement, 'MAX_TRIANGLES', 5000)
-    vertices, faces = triangles(flat, 0.2, half_width_m=1.0)
-    with pytest.raises(MeshError, match=r'max_edge_length_m = 0\.001 m .* at least') as caught:
-        Surface.from_triangles(vertices, faces, 0.001)
-    remedy_m = float(str(caught.value).split('at least ')[1].split()[0])
-    refined = Surface.from_triangles(vertices, faces, 1.05 * remedy_m)
-    assert 1500 < len(refined.faces) < 5000
-
-
-def test_welding_joins_what_lies_within_a_micrometre():
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1], [0, 0, 2e-7], [1, 0, 0], [1, 0, 1]])
-    welded, faces = weld(vertices, np.array([[0, 1, 2], [3, 4, 5]]))
-    np.testing.assert_allclose(welded, vertices[[0, 1, 2, 5]])
-    np.testing.assert_array_equal(faces, [[0, 1, 2], [0, 1, 3]])
-
-
-def test_a_mesh_that_is_too_fine_itself_is_not_told_to_cut_less(monkeypatch):
-    monkeypatch.setattr('paint_deposition.part.refinement.MAX_TRIANGLES', 1)
-    vertices = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
-    faces = np.array([[0, 1, 2], [0, 2, 3]])
-    with pytest.raises(MeshError, match='the mesh has 2 triangles, more than 1; export it'):
-        Surface.from_triangles(vertices, faces, 2.0)
+def test_too_many_triangles_are_refused_with_an_edge_length(triangles, flat):
+    with pytest.raises(MeshError, match=r'max_edge_length_m = 0\.0001 m .* at least 0\.\d+ m'):
+        Surface.from_triangles(*triangles(flat, 0.2), 1e-4)

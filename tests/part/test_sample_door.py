@@ -86,16 +86,6 @@ def test_the_motions_paint_the_front(samples, name, mesh, passes, mean_um):
     assert mean_um[0] < film @ share < mean_um[1]
 
 
-def test_the_motions_are_logged_as_unevenly_as_by_a_controller(samples):
-    trajectory = motion(samples, 'door_horizontal')
-    interval_s = np.diff(trajectory.stamps_ns) * 1e-9
-    repeated = np.all(np.diff(trajectory.positions_m, axis=0) == 0, axis=1)
-    assert interval_s.min() > 0.0012
-    assert interval_s.max() < 0.0241
-    assert np.std(interval_s) > 0.002
-    assert repeated.sum() > 50
-
-
 def test_film_does_not_depend_on_the_triangulation(samples):
     """One door triangulated in three ways, and seen as the formula that it was drawn with."""
     door_depth = runpy.run_path(samples / 'make_door.py')['door_depth']

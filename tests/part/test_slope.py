@@ -15,11 +15,6 @@ def test_exact_for_linear_fields_on_a_standing_plane(make_surface, flat):
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), -5.0)
 
 
-def test_constant_fields_have_none(make_surface, ball):
-    points = make_surface(ball(0.5), 0.03, jitter=0.3).points()
-    np.testing.assert_allclose(points.slope_per_m @ np.ones(len(points)), 0.0, atol=1e-9)
-
-
 def test_leaning_surface_has_the_sine_of_its_lean(make_surface):
     lean = np.radians(30)
     points = make_surface(lambda x, z: z * np.tan(lean), 0.03).points()
@@ -61,11 +56,3 @@ def test_readings_get_the_slope_from_their_neighbours(make_surface, cylinder):
 def test_readings_on_the_rim_get_the_one_sided_slope(make_surface, flat, z_m):
     points = make_surface(flat, 0.05).at(np.array([[0.0, 0.0, z_m]]), stencil_m=0.006)
     assert (points.slope_per_m @ linear(points.positions_m))[0] == pytest.approx(-5.0)
-
-
-def test_selecting_readings_keeps_slopes_only_with_their_neighbours(make_surface, flat):
-    points = make_surface(flat, 0.05).at(np.array([[0.0, 0, 0], [0.1, 0, 0.1]]), stencil_m=0.006)
-    chosen = points.select([1, 3, 5])
-    assert (chosen.slope_per_m @ linear(chosen.positions_m))[0] == pytest.approx(-5.0)
-    alone = points.select([0, 1, 3])
-    np.testing.assert_array_equal(alone.slope_per_m @ linear(alone.positions_m), 0.0)

@@ -5,9 +5,7 @@ import pytest
 from trimesh.creation import box
 from trimesh.util import concatenate
 
-from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.visibility import Occluder
 
 
 def test_all_of_an_open_surface_is_seen(make_surface, ball):
@@ -16,24 +14,6 @@ def test_all_of_an_open_surface_is_seen(make_surface, ball):
     seen = surface.occluder.sees(eyes[:, None], surface.vertices_m)
     assert seen.shape == (2, len(surface.vertices_m))
     assert seen.all()
-
-
-def test_nothing_is_sorted_before_the_first_ray(make_surface, ball):
-    surface, asked = make_surface(ball(0.5), 0.05), []
-
-    def tree() -> FaceTree:
-        asked.append(True)
-        return FaceTree.of(surface.vertices_m, surface.faces)
-
-    occluder = Occluder(tree)
-    assert not asked
-    occluder.sees([0.0, -0.3, 0.0], surface.vertices_m)
-    assert asked
-
-
-def test_concave_surface_sees_its_eye(make_surface, ball):
-    surface = make_surface(ball(-0.3), 0.02)
-    assert surface.occluder.sees([0.0, -0.3, 0.0], surface.vertices_m).all()
 
 
 def test_the_shadow_of_a_bar_ends_where_geometry_says():

@@ -8,11 +8,11 @@ from scipy.spatial import cKDTree
 
 import paint_deposition as pd
 from brushes import switched
-from paint_deposition.effects.learned.curves import LearnedAcross
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PlanError
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.improvement.nodes import Nodes, retime
 from paint_deposition.planning.improvement.programme import Programme, moves_of
@@ -25,7 +25,7 @@ NARROW = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.06, sigma2_m=0.1)
 )
 # More to the right, by 30 % over the width of the panel.
-SKEWED = NARROW.with_effect(LearnedAcross(low=-0.3, high=0.3, learned=(-0.15, 0.15)))
+SKEWED = NARROW.with_effect(LEARNED['across_m'](low=-0.3, high=0.3, learned=(-0.15, 0.15)))
 
 
 @pytest.fixture(scope='module')

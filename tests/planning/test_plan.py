@@ -10,7 +10,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.films import evenness
 from paint_deposition.planning.plan import plan

@@ -12,8 +12,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.planning.recommendation import recommend

@@ -13,9 +13,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.gauge_readings import MeasuringPoints
 from paint_deposition.files.tables.reading_columns import Layout

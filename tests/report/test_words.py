@@ -2,7 +2,7 @@
 
 from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
-from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned.place import PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.user_effects import load_effect_file

@@ -12,7 +12,7 @@ from paint_deposition.batch.sweep.variations import variations, varied_model
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
 from paint_deposition.model.brush import Brush
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from paint_deposition.effects.learned.catalogue import LEARNED
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file

@@ -21,7 +21,7 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq2_projection import Projection
 
 BY_KEY = {change.key: change for change in MENU}
 

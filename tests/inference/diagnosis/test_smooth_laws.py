@@ -7,9 +7,8 @@ import pytest
 
 from booth import MODEL
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import LearnedHeight, LearnedSpeed
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.smooth_laws import (
     Basis,
@@ -25,7 +24,12 @@ from reference import reference_film_um
 
 OF_ANY_KIND = pytest.mark.parametrize(
     ('law', 'kind'),
-    [(law, kind) for law in LEARNED.values() for kind in law.kinds if law is not LearnedSpeed],
+    [
+        (law, kind)
+        for law in LEARNED.values()
+        for kind in law.kinds
+        if law is not LEARNED['speed_m_per_s']
+    ],
     ids=lambda value: value if isinstance(value, str) else value.covariate,
 )
 
@@ -71,7 +75,7 @@ def test_around_another_model_a_law_keeps_its_values_and_changes_other_film(stud
 
 def basis_on_a_line(knots: int = 9, step: float = 0.5) -> Basis:
     at = step * np.arange(knots)[:, np.newaxis]
-    return Basis(LearnedHeight, {}, np.eye(knots), at, step)
+    return Basis(LEARNED['height_fraction'], {}, np.eye(knots), at, step)
 
 
 @pytest.mark.parametrize('length', [0.5, 1.0, 3.0])

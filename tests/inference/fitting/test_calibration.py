@@ -23,7 +23,7 @@ from paint_deposition.inference.fitting.collapse_fit import fit_collapse
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.panel import Panel
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.writers.write import write
 from virtual_paint_shop.shop import panel_study

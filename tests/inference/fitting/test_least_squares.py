@@ -20,8 +20,8 @@ from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.coordinates import PATTERN
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 
 TRUTH = DepositionModel(

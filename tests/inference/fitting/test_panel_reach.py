@@ -15,7 +15,7 @@ from paint_deposition.inference.fitting.calibration import Calibration, calibrat
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.panel_reach import short_reaches
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 

@@ -23,9 +23,9 @@ from inference.fitting.real_profiles import (
     table,
     transect,
 )
-from paint_deposition.model.collapse import ThreeGaussianCollapse
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 SHIPPED = json.loads(Path(__file__).with_name('real_profiles.json').read_text())
 COLLAPSE = ThreeGaussianCollapse(**SHIPPED['eq3'])

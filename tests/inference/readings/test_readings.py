@@ -4,11 +4,8 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.readings.gauge_noise import (
-    ASSUMED_FREEDOM,
-    ENOUGH_REPEATS,
-    gauge_noise,
-)
+from paint_deposition.inference.readings.gauge_noise import gauge_noise
+from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.inference.readings.readings import (
     PointMeans,
     Readings,

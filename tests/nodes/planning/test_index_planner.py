@@ -26,7 +26,7 @@ from nodes.cell import (
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.recommendation import recommend

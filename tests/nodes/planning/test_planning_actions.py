@@ -21,7 +21,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.planning.plan import PlanRequest, plan
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.requests import PlanRequest
 from small_campaign import small_campaign
 
 COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}

@@ -10,10 +10,10 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
 from paint_deposition.film.film import Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
@@ -187,7 +187,9 @@ def simulate(
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
     given = models
-    pairs = [by_set_points(motion, its) for motion, its in zip(motions, models, strict=True)]
+    pairs = [
+        with_interpolated_brushes(motion, its) for motion, its in zip(motions, models, strict=True)
+    ]
     motions, models = [motion for motion, _ in pairs], [its for _, its in pairs]
     for motion, its_model in pairs:
         require_brushes(motion, its_model)

@@ -5,19 +5,36 @@ from dataclasses import dataclass
 from math import prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, cast
+from typing import Any, ClassVar, Literal, cast
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
 
-from paint_deposition.effects.set_point_power import SetPointPower
 from paint_deposition.errors import ModelError
-from paint_deposition.kernel.ray import Ray as Ray
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.projection import Projection
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.axes import across_axis, downhill_axis
-from paint_deposition.part.points import SurfacePoints
+from paint_deposition.kernel.laws import Ray as Ray
+from paint_deposition.model.brush import Brush, SetPoints
+from paint_deposition.model.eq2_projection import Projection
+from paint_deposition.motion.path import SprayPath as SprayPath
+from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import SurfacePoints as SurfacePoints
+
+
+class SetPointPower(BaseModel):
+    """A power law: the amplitudes as given hold at one value of the set-point."""
+
+    model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
+
+    setting: Literal['flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv']
+    at: float = Field(gt=0.0, description='value of the set-point at which the amplitudes hold')
+    exponent: float = Field(ge=-5.0, le=5.0, description='power of the set-point over that value')
+
+    def factor(self, set_points: SetPoints, whose: str) -> float:
+        """By how much the amplitudes grow at others, or ModelError that begins with ``whose``."""
+        value = getattr(set_points, self.setting)
+        if value is None:
+            raise ModelError(f'{whose} does not say its {self.setting}; give it to the brush')
+        return (value / self.at) ** self.exponent
+
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
@@ -25,14 +42,7 @@ REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
 
 @dataclass(frozen=True)
 class PathContext:
-    """What an effect on the path may need besides the path.
-
-    Attributes:
-        projection: Omega and the emission point.
-        down: (3,) unit vector of gravity in the mesh frame.
-        outward: (3,) mean outward unit normal of the part.
-        centre_m: (3,) centre of the part [m].
-    """
+    """What an effect on the path may need besides the path, as in ``SurfacePoints``: (3,) each."""
 
     projection: Projection
     down: np.ndarray
@@ -41,12 +51,12 @@ class PathContext:
 
     @property
     def across(self) -> np.ndarray:
-        """(3,) horizontal unit vector along the part, to the right as the gun sees it."""
+        """See ``across_axis``."""
         return across_axis(self.outward, self.down)
 
     @property
     def downhill(self) -> np.ndarray:
-        """(3,) unit vector down along the part, at right angles to ``across`` and ``outward``."""
+        """See ``downhill_axis``."""
         return downhill_axis(self.outward, self.down)
 
 
@@ -64,12 +74,10 @@ def parameter(
 
     Args:
         neutral: value at which the effect is absent; for a shape, its default.
-        low, high: bounds; a value outside is refused. Where physics knows one sign only, the
-            neutral value is one of them.
-        unit: its unit; also part of the field's name where it is not 1.
+        low, high: bounds; where physics knows one sign only, the neutral value is one of them.
+        unit: also part of the field's name where it is not 1.
         description: what it is, with its symbol, and what a positive value means.
-        typical: size of the amplitude that occurs in practice, the scale of its prior. For a
-            shape, unused.
+        typical: size of an amplitude that occurs in practice, the scale of its prior.
         role: 'amplitude' (neutral means absent) or 'shape' (length or time scale).
     """
     if typical is None:
@@ -86,6 +94,11 @@ def parameter(
             'unit': unit, 'role': role,
         },
     )  # fmt: skip
+
+
+def over(**covariates: Any) -> Mapping[str, Any]:
+    """What a class says of covariates, by their names; see ``Effect.covariates``."""
+    return MappingProxyType(covariates)
 
 
 class Effect(BaseModel):
@@ -118,9 +131,9 @@ class Effect(BaseModel):
     source: ClassVar[str] = ''
     # Covariates along which the law may be off, each with the direction in which a law of any form
     # over it must go: it rises (1), falls (-1), or either (0).
-    covariates: ClassVar[Mapping[str, int]] = MappingProxyType({})
+    covariates: ClassVar[Mapping[str, int]] = over()
     # The range of a covariate in which the effect acts at all; default everywhere.
-    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = MappingProxyType({})
+    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = over()
     # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
     # over a covariate is not that effect.
     free_law: ClassVar[str] = ''
@@ -165,19 +178,14 @@ class Effect(BaseModel):
         return 0.0
 
     def of_brush(self, brush: Brush) -> 'Effect':
-        """The effect at the set-points of a brush.
-
-        Raises:
-            ModelError: the brush does not tell one, or the amplitude is out of bounds there.
-        """
+        """The effect at the set-points of a brush, or ModelError if unknown or out of bounds."""
         if not self.follows:
             return self
         whose = f'{self.id} follows a set-point, and brush {brush.number}'
         factor = prod(power.factor(brush, whose) for power in self.follows)
         described, values = self.parameters(), {}
-        for name in self.amplitudes():
-            info, neutral = described[name], described[name]['neutral']
-            value = neutral + factor * (getattr(self, name) - neutral)
+        for name, neutral in self._neutral().items():
+            info, value = described[name], neutral + factor * (getattr(self, name) - neutral)
             if not info['low'] <= value <= info['high']:
                 raise ModelError(
                     f'{self.id}: {name} would be {value:.4g} at the set-points of brush '
@@ -190,8 +198,7 @@ class Effect(BaseModel):
     @property
     def is_neutral(self) -> bool:
         """Whether all amplitudes are at the value at which the effect is absent."""
-        described = self.parameters()
-        return all(getattr(self, name) == described[name]['neutral'] for name in self.amplitudes())
+        return all(getattr(self, name) == value for name, value in self._neutral().items())
 
     @property
     def acts_on_the_finished_film(self) -> bool:
@@ -202,9 +209,7 @@ class Effect(BaseModel):
     @property
     def absent(self) -> 'Effect':
         """The same with all amplitudes neutral."""
-        described = self.parameters()
-        neutral = {name: described[name]['neutral'] for name in self.amplitudes()}
-        return self.model_copy(update=neutral)
+        return self.model_copy(update=self._neutral())
 
     @classmethod
     def typical(cls) -> 'Effect':
@@ -224,6 +229,11 @@ class Effect(BaseModel):
     def amplitudes(cls) -> tuple[str, ...]:
         """Names of the parameters that make the effect absent at their neutral value."""
         return tuple(n for n, p in cls.parameters().items() if p['role'] == 'amplitude')
+
+    @classmethod
+    def _neutral(cls) -> dict[str, float]:
+        described = cls.parameters()
+        return {name: described[name]['neutral'] for name in cls.amplitudes()}
 
     @classmethod
     def coordinates(cls) -> dict[str, str]:

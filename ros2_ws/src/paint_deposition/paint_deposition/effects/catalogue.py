@@ -1,14 +1,16 @@
-"""Every effect that the project knows."""
+"""Every effect and every learned law that the project knows."""
 
 import importlib
 import pkgutil
 from collections.abc import Mapping
-from functools import cache
 from types import MappingProxyType
-from typing import Any
 
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.footprint import LearnedFootprint
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned.place import LearnedMap
 from paint_deposition.errors import ModelError, did_you_mean
 
 # In the order in which people look for causes.
@@ -16,25 +18,28 @@ FAMILIES = (
     'incidence', 'curvature', 'boundary', 'standoff', 'lateral shift', 'order', 'level', 'time',
     'visibility',
 )  # fmt: skip
-# Of the effects in the library: the names of their files.
-IDS = tuple(module.name for module in pkgutil.iter_modules(library.__path__))
-
-# Effect classes by id, family by family. All are loaded when this is first asked for: who paints
-# needs those of the model only.
-EFFECTS: Mapping[str, type[Effect]]
 
 
-def __getattr__(name: str) -> Any:
-    if name == 'EFFECTS':
-        return _whole_library()
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+def _of_the_library(name: str) -> type[Effect]:
+    module = importlib.import_module(f'{library.__name__}.{name}')
+    (effect,) = (c for c in Effect.__subclasses__() if c.__module__ == module.__name__)
+    return effect
 
 
-@cache
-def _whole_library() -> Mapping[str, type[Effect]]:
-    effects = [effect_class(effect_id) for effect_id in IDS]
-    effects.sort(key=lambda effect: (FAMILIES.index(effect.family), effect.id))
-    return MappingProxyType({effect.id: effect for effect in effects})
+# Effect classes by id, family by family: one a file of the library.
+EFFECTS: Mapping[str, type[Effect]] = MappingProxyType(
+    {
+        effect.id: effect
+        for effect in sorted(
+            (_of_the_library(module.name) for module in pkgutil.iter_modules(library.__path__)),
+            key=lambda effect: (FAMILIES.index(effect.family), effect.id),
+        )
+    }
+)
+# Learned laws by covariate.
+LEARNED: Mapping[str, type[LearnedLaw]] = MappingProxyType(
+    {**CURVES, LearnedMap.covariate: LearnedMap, LearnedFootprint.covariate: LearnedFootprint}
+)
 
 
 def effect_class(effect_id: str) -> type[Effect]:
@@ -43,14 +48,22 @@ def effect_class(effect_id: str) -> type[Effect]:
     Raises:
         ModelError: there is none of that id; names the nearest.
     """
-    if effect_id in IDS:
-        module = importlib.import_module(f'{library.__name__}.{effect_id}')
-        (effect,) = (c for c in Effect.__subclasses__() if c.__module__ == module.__name__)
-        return effect
     family, is_learned, covariate = effect_id.partition(':')
     if is_learned and family == 'learned':
-        from paint_deposition.effects.learned.catalogue import learned_law
-
         return learned_law(covariate)
-    remedy = did_you_mean(effect_id, _whole_library())
-    raise ModelError(f'no effect is called {effect_id!r}; {remedy}')
+    if effect_id in EFFECTS:
+        return EFFECTS[effect_id]
+    raise ModelError(f'no effect is called {effect_id!r}; {did_you_mean(effect_id, EFFECTS)}')
+
+
+def learned_law(covariate: str) -> type[LearnedLaw]:
+    """The class of the learned law over a covariate.
+
+    Raises:
+        ModelError: there is none over it; names the nearest.
+    """
+    if covariate in LEARNED:
+        return LEARNED[covariate]
+    raise ModelError(
+        f'no learned law has the covariate {covariate!r}; {did_you_mean(covariate, LEARNED)}'
+    )

@@ -10,8 +10,8 @@ from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
 from paint_deposition.model.brush import BETWEEN, Brush, listed
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
@@ -63,17 +63,13 @@ class DepositionModel(BaseModel):
         """A copy with other patterns, in the order of ``patterns``."""
         new = tuple(patterns)
         brushes = tuple(
-            brush.model_copy(update={'planar': planar, 'interpolated': False})
+            brush.calibrated.model_copy(update={'planar': planar})
             for brush, planar in zip(self.brushes, new, strict=False)
         )
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
 
     def with_brush(self, number: int) -> 'DepositionModel':
-        """A copy that has one of the brushes only; 0 is the only one.
-
-        Raises:
-            ModelError: there is none of that number.
-        """
+        """A copy that has one of the brushes only, or ModelError; 0 is the only one."""
         if number != ONLY_BRUSH and not self.brushes:
             raise ModelError(
                 f'brush {number} is not in the model: it has one pattern, planar, without a number'
@@ -83,25 +79,17 @@ class DepositionModel(BaseModel):
     def painting_with(self, number: int) -> 'DepositionModel':
         """The same for what a motion calls its brush: without ``brushes`` any number will do."""
         row = int(self.pattern_rows(np.array([number]))[0])
-        brushes = tuple(
-            brush.model_copy(update={'interpolated': False})
-            for brush in self.brushes[row : row + 1]
-        )
+        brushes = tuple(brush.calibrated for brush in self.brushes[row : row + 1])
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
 
     def of_numbers(self, numbers: Iterable[int]) -> 'DepositionModel':
-        """A copy with the brushes of a motion only.
-
-        Raises:
-            ModelError: the model does not have one of them.
-        """
+        """A copy with the brushes of a motion only, or ModelError where one is not there."""
         wanted = set(numbers)
         self.require_brushes(wanted)
         if len(self.brushes) <= 1:
             return self
-        kept = [brush for brush in self.brushes if brush.number in wanted]
         return DepositionModel.of_brushes(
-            (brush.model_copy(update={'interpolated': False}) for brush in kept),
+            (brush.calibrated for brush in self.brushes if brush.number in wanted),
             projection=self.projection, effects=self.effects,
         )  # fmt: skip
 
@@ -121,29 +109,18 @@ class DepositionModel(BaseModel):
         return self.brushes[0].number if self.brushes else ONLY_BRUSH
 
     def single(self, purpose: str) -> 'DepositionModel':
-        """The model itself, if it has one pattern.
-
-        Raises:
-            ModelError: it has several brushes; ``purpose`` says what needs one.
-        """
+        """The model itself, or ModelError for several brushes; ``purpose`` says what needs one."""
         if len(self.brushes) > 1:
+            numbers = listed(brush.number for brush in self.brushes)
             raise ModelError(
-                f'{purpose} is for one brush and the model has {listed(self._numbers)}: say which '
-                '(brush)'
+                f'{purpose} is for one brush and the model has {numbers}: say which (brush)'
             )
         return self
 
-    @property
-    def _numbers(self) -> tuple[int, ...]:
-        return tuple(brush.number for brush in self.brushes)
-
     def require_brushes(self, numbers: Iterable[int]) -> None:
-        """Refuse a motion that names brushes which the model does not have.
+        """Refuse by ModelError a motion that names brushes which the model does not have.
 
         Without ``brushes`` the pattern is that of one brush, whatever number it has in the cell.
-
-        Raises:
-            ModelError: one line that names the brushes there are.
         """
         named = set(map(int, numbers))
         if not self.brushes and len(named - {ONLY_BRUSH}) > 1:
@@ -155,14 +132,10 @@ class DepositionModel(BaseModel):
             self.pattern_rows(np.array(sorted(named), dtype=np.int64))
 
     def pattern_rows(self, numbers: np.ndarray) -> np.ndarray:
-        """(M,) rows in ``patterns`` of brushes (M,) by number.
-
-        Raises:
-            ModelError: the model does not have one of them.
-        """
+        """(M,) rows in ``patterns`` of brushes (M,) by number, or ModelError."""
         if not self.brushes:
             return np.zeros(len(numbers), dtype=np.int64)
-        known = np.array(self._numbers)
+        known = np.array([brush.number for brush in self.brushes])
         if len(known) == 1:
             numbers = np.where(numbers == ONLY_BRUSH, known[0], numbers)
         strange = np.setdiff1d(numbers, known)
@@ -177,28 +150,21 @@ class DepositionModel(BaseModel):
         return any(effect.needs_whole_strokes for effect in self.effects)
 
     def effects_by_pattern(self) -> tuple[tuple[Effect, ...], ...]:
-        """The effects as they are for each pattern, in the order of ``patterns``.
-
-        Raises:
-            ModelError: an effect follows a set-point that is not known, or cannot follow any.
-        """
+        """The effects as they are for each of ``patterns``, or ModelError if one cannot follow."""
         following = [effect for effect in self.effects if effect.follows]
         for effect in following:
-            if not self.brushes:
-                raise ModelError(
-                    f'{effect.id} follows set-points, which a model with planar alone does not '
-                    'tell; give brushes'
-                )
-            if not effect.amplitudes():
-                raise ModelError(
-                    f'{effect.id} has no amplitude that could follow set-points; take `follows` '
-                    'out'
-                )
-            if effect.acts_on_the_finished_film:
-                raise ModelError(
-                    f'{effect.id} acts on the finished film, which all brushes share: it cannot '
-                    'follow set-points; take `follows` out'
-                )
+            problem = (
+                'follows set-points, which a model with planar alone does not have; give brushes'
+                if not self.brushes
+                else 'has no amplitude that could follow set-points; take `follows` out'
+                if not effect.amplitudes()
+                else 'acts on the finished film, which all brushes share: it cannot follow '
+                'set-points; take `follows` out'
+                if effect.acts_on_the_finished_film
+                else ''
+            )
+            if problem:
+                raise ModelError(f'{effect.id} {problem}')
         if not following:
             return (self.effects,) * len(self.patterns)
         return tuple(tuple(e.of_brush(brush) for e in self.effects) for brush in self.brushes)
@@ -219,13 +185,8 @@ class DepositionModel(BaseModel):
         return planar.radius_of_flux_m(CUT_FLUX) * self.widening
 
     @property
-    def shadow(self) -> float:
-        """Most that is stopped of the flux where the line of sight is blocked, 0 to 1."""
-        return max(self.shadows)
-
-    @property
     def shadows(self) -> tuple[float, ...]:
-        """The same share for each of the patterns."""
+        """Share of the flux stopped where the line of sight is blocked, 0 to 1, by pattern."""
         by_pattern = self.effects_by_pattern()
         return tuple(max((e.shadow() for e in effects), default=0.0) for effects in by_pattern)
 
@@ -233,12 +194,8 @@ class DepositionModel(BaseModel):
     def max_step_m(self) -> float:
         """Travel of a sub-step that keeps the integral's error below 0.1 % of the peak [m]."""
         # Brushes that set-points stand for come and go while a motion is under way.
-        named = [
-            p
-            for p, number in zip(self.patterns, self._numbers or (0,), strict=True)
-            if number < BETWEEN
-        ]
-        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named)
+        named = [brush.planar for brush in self.brushes if brush.number < BETWEEN]
+        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named or [self.planar])
         return min(DEFAULT_MAX_STEP_M, 0.1 * width)
 
     def effect(self, effect_id: str) -> Effect | None:

@@ -15,11 +15,11 @@ import numpy as np
 from numba import njit
 
 import paint_deposition
-from paint_deposition.effects.base import Effect, PathContext, Ray
-from paint_deposition.effects.catalogue import IDS
+from paint_deposition.effects.base import Effect, PathContext
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
-from paint_deposition.kernel.laws import in_precision
-from paint_deposition.model.projection import Projection
+from paint_deposition.kernel.laws import Ray, in_precision
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -34,11 +34,7 @@ _loaded: dict[tuple[Path, str], type[Effect]] = {}
 
 
 def load_effect_file(path: str | Path) -> type[Effect]:
-    """The class of a user's own effect, read and tried out.
-
-    Raises:
-        ModelError: as ``read_effect_file`` and ``try_effect``.
-    """
+    """``read_effect_file`` and ``try_effect``."""
     effect = read_effect_file(path)
     try_effect(effect, path)
     return effect
@@ -64,17 +60,13 @@ def read_effect_file(path: str | Path) -> type[Effect]:
 
 
 def effect_of(path: Path, source: bytes) -> type[Effect]:
-    """The class of a user's own effect from what its file reads, wherever the file may be.
-
-    Raises:
-        ModelError: as ``read_effect_file``.
-    """
+    """``read_effect_file`` for the content of a file, wherever it may be."""
     key = (path.resolve(), hashlib.sha256(source).hexdigest())
     if key not in _loaded:
         _loaded[key] = _checked(_run(path, source, key[1]), path)
         _loaded[key].file, _loaded[key].file_content = key[0], source
     effect = _loaded[key]
-    if effect.id in IDS:
+    if effect.id in EFFECTS:
         raise ModelError(
             f'{path}: the id {effect.id!r} is that of an effect of the project; choose another'
         )
@@ -130,8 +122,7 @@ def _line_in(error: Exception, path: Path) -> str:
     if isinstance(error, SyntaxError):
         return f', line {error.lineno}'
     frames = traceback.extract_tb(error.__traceback__)
-    numbers = [frame.lineno for frame in frames if frame.filename == str(path)]
-    return f', line {numbers[-1]}' if numbers else ''
+    return next((f', line {f.lineno}' for f in reversed(frames) if f.filename == str(path)), '')
 
 
 def _one_line(error: Exception) -> str:
@@ -150,14 +141,13 @@ def _checked(module: ModuleType, path: Path) -> type[Effect]:
         and issubclass(value, Effect)
         and value.__module__ == module.__name__
     ]
-    if not classes:
-        raise ModelError(f'{path}: has no effect; define one class that derives from Effect')
-    if len(classes) > 1:
+    if len(classes) != 1:
         names = ', '.join(c.__name__ for c in classes)
-        raise ModelError(f'{path}: has several effects ({names}); keep one a file')
-    effect = classes[0]
-    problem = _problem_with(effect)
-    if problem:
+        what = f'has several effects ({names}); keep one a file' if classes else (
+            'has no effect; define one class that derives from Effect')  # fmt: skip
+        raise ModelError(f'{path}: {what}')
+    (effect,) = classes
+    if problem := _problem_with(effect):
         raise ModelError(f'{path}: {effect.__name__} {problem}')
     return effect
 
@@ -234,7 +224,6 @@ def _problem_with_places(effect: Effect) -> str | None:
 
 
 def _trial_path() -> SprayPath:
-    stamps_ns = np.arange(4) * 20_000_000
     positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
     toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
-    return spray_path(Trajectory(stamps_ns, positions_m, toward_y))[0]
+    return spray_path(Trajectory(np.arange(4) * 20_000_000, positions_m, toward_y))[0]

@@ -16,7 +16,7 @@ from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE
 from paint_deposition.files.tables.reading_table import ReadingTable
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
-from paint_deposition.part.face_places import on_face_m
+from paint_deposition.part.gauge_places import on_face_m
 from paint_deposition.part.surface import Surface
 
 THINNEST_UM = -5.0

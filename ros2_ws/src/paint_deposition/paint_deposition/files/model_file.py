@@ -18,10 +18,9 @@ from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.brush import MOST, Brush, SetPoints
-from paint_deposition.model.brush_law import BrushLaw
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.brush import MOST, Brush, BrushLaw, SetPoints
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 
 WORDS: dict[type, str] = {dict: 'a mapping (key: value)', list: 'a list', str: 'text'}
 KEYS = (
@@ -229,7 +228,7 @@ def _learned(where: str, entry: dict[str, Any]) -> Effect:
             f'{where}: has no covariate; give that of the learned law, such as time_s'
         )
     # Loaded by those only whose models have learned.
-    from paint_deposition.effects.learned.catalogue import learned_law
+    from paint_deposition.effects.catalogue import learned_law
 
     cls = learned_law(covariate)
     values = {key: entry[key] for key in entry if key not in ('id', 'covariate')}

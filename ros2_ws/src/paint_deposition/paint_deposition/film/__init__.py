@@ -1,1 +1,1 @@
-"""The film: the one integral over the tool path, live and offline, and its statistics."""
+"""The film: its integrator, live and offline, its statistics, and how the gun ran."""

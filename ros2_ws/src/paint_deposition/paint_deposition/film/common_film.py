@@ -11,7 +11,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.film.integrator import FilmIntegrator, settled_um, shown_um
+from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.motion.trajectory import PoseCounts
@@ -19,21 +19,18 @@ from paint_deposition.motion.trajectory import PoseCounts
 
 @dataclass(frozen=True)
 class CommonFilm:
-    """What guns with an integrator each laid on the same points.
+    """What guns with an integrator each, at least one, laid on the same points.
 
     The shares are added in the order of the guns: the film does not depend on whose poses came
     first. What acts on the finished film, sag say, acts on the sum, as the first gun's model has
     it; see ``require_one_finish``.
-
-    Attributes:
-        guns: at least one integrator.
     """
 
     guns: tuple[FilmIntegrator, ...]
 
     @cached_property
     def shares_um(self) -> tuple[np.ndarray, ...]:
-        """(V,) what each gun had laid when this was first asked for, as it arrived [um]."""
+        """(V,) what each gun had laid when this was first used, as it arrived [um]."""
         return tuple(gun.raw_um for gun in self.guns)
 
     @property
@@ -45,12 +42,12 @@ class CommonFilm:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return settled_um(self.raw_um, self._effects, self.guns[0].points)
+        return after_film_effects(self.raw_um, self._effects, self.guns[0].points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return shown_um(self.raw_um, self._effects, self.guns[0].points)
+        return gauge_reading_um(self.raw_um, self._effects, self.guns[0].points)
 
     @property
     def used(self) -> PaintUsed:
@@ -59,7 +56,7 @@ class CommonFilm:
 
     @property
     def emitted_cm3(self) -> float:
-        """Solids that a part which catches everything would have got [cm3]."""
+        """See ``PaintUsed``."""
         return self.used.emitted_cm3
 
     def laid_cm3(self, areas_m2: np.ndarray) -> np.ndarray:
@@ -73,11 +70,7 @@ class CommonFilm:
 
 @dataclass(frozen=True)
 class LiveFilms:
-    """The films of several guns that paint the same points, each of a motion under way.
-
-    Attributes:
-        guns: at least one film.
-    """
+    """The films of one or more guns that paint the same points, each of a motion under way."""
 
     guns: tuple[LiveFilm, ...]
 

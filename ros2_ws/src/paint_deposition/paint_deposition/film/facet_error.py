@@ -58,10 +58,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> Fa
     and doors, cut into edges of 6 to 50 mm, the estimate was 0.74 to 1.32 times the worst true
     error of the film, from 0.01 % to 13 % of its peak. Creases count as such and cost nothing.
 
-    Args:
-        surface: the part, turned to the gun.
-        path: the motion.
-        model: its pattern and projection count, its effects do not.
+    The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
     edges = surface.curved_edges
     if not len(edges):
@@ -91,13 +88,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> Fa
 def facet_errors_um(
     surface: Surface, points: SurfacePoints, path: SprayPath, model: DepositionModel
 ) -> np.ndarray:
-    """(P,) film on the curve that a mesh stands for less that on its facets, at points [um].
-
-    Args:
-        surface: the part. points: on it.
-        path: the motion.
-        model: its pattern and projection count, its effects do not.
-    """
+    """(P,) film on the curve that a mesh stands for less that on its facets, at points [um]."""
     off_m, turns = surface.curved_edges.off_at(points.positions_m)
     if not (off_m.any() or turns.any()):
         return np.zeros(len(points))

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
@@ -28,10 +28,7 @@ GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 class GunView:
     """What the gun has before it, at poses that stand for equal shares of the paint.
 
-    Args:
-        surface: the part, turned to the gun.
-        path: the motion; some of it sprays.
-        model: its pattern and projection count, its effects do not.
+    The part is turned to the gun; of the model, pattern and projection count, effects do not.
     """
 
     def __init__(self, surface: Surface, path: SprayPath, model: DepositionModel) -> None:

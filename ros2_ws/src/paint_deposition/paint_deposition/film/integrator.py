@@ -1,4 +1,8 @@
-"""The film: flux integrated along the spray path on surface points, with the model's effects."""
+"""The one integrator: flux summed along the spray path on surface points, live and offline.
+
+Offline commands give it a whole path; ``LiveFilm`` gives it the same path piece by piece as poses
+come in. The film is the same to the last bit.
+"""
 
 import copy
 import threading
@@ -21,7 +25,7 @@ from paint_deposition.film.layout import (
 )
 from paint_deposition.film.lines_of_sight import LinesOfSight, Obstacle, Sight
 from paint_deposition.film.paint_used import PaintUsed
-from paint_deposition.kernel.accumulation import REACH, TERMS, compile_kernel
+from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -73,13 +77,9 @@ class Steps:
 
 
 class FilmIntegrator:
-    """Accumulates the film on surface points as the path comes in.
-
-    The live node and every offline command use this class; there is no other integrator.
+    """Accumulates the film of a model on surface points as the path comes in.
 
     Args:
-        points: where the film is wanted.
-        model: the deposition model with its effects.
         precision: 'single' for meshes (1e-6 of the peak), 'double' for fitting.
         occluder: traces lines of sight; None where nothing can stand in the way.
         keep_absent_laws: compile the laws of absent effects too, so that a fit which varies them
@@ -112,7 +112,7 @@ class FilmIntegrator:
         self._context = PathContext(
             model.projection, self.points.down, self.points.outward, self.points.centre_m
         )
-        self._shadowed = model.shadow > 0.0 and self._occluder is not None
+        self._shadowed = max(model.shadows) > 0.0 and self._occluder is not None
         if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
             self._lines_of_sight = LinesOfSight(self._occluder, self.points, self._blocks)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
@@ -134,7 +134,7 @@ class FilmIntegrator:
         self._traced_from: np.ndarray | None = None
 
     def fork(self) -> 'FilmIntegrator':
-        """One that goes on from here and leaves this one as it is."""
+        """A copy to paint on; this one stays as it is."""
         other = copy.copy(self)
         other._film, other._recent = self._film.copy(), self._recent.copy()
         return other
@@ -153,7 +153,7 @@ class FilmIntegrator:
                 progress(min(start + BATCH, len(path)))
 
     def steps(self, path: SprayPath) -> Steps:
-        """A path prepared for this model's effects and projection, to be painted repeatedly."""
+        """A path prepared for this model, to be painted again and again."""
         return self._steps(self.sprayed(path)[0], ANY_REACH_M)
 
     def paint(self, steps: Steps) -> None:
@@ -262,24 +262,28 @@ class FilmIntegrator:
     @property
     def film_um(self) -> np.ndarray:
         """(V,) film [um]."""
-        return settled_um(self.raw_um, self._effects, self.points)
+        return after_film_effects(self.raw_um, self._effects, self.points)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return shown_um(self.raw_um, self._effects, self.points)
+        return gauge_reading_um(self.raw_um, self._effects, self.points)
 
 
-def settled_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:
+def after_film_effects(
+    raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
+) -> np.ndarray:
     """(V,) film that is there in the end [um] where (V,) arrived [um]."""
     for effect in effects:
         raw_um = effect.on_film(raw_um, points)
     return raw_um
 
 
-def shown_um(raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints) -> np.ndarray:
+def gauge_reading_um(
+    raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
+) -> np.ndarray:
     """(V,) what a gauge shows [um] where (V,) arrived [um]."""
-    shown = settled_um(raw_um, effects, points)
+    reading = after_film_effects(raw_um, effects, points)
     for effect in effects:
-        shown = effect.on_gauge(shown, points)
-    return shown
+        reading = effect.on_gauge(reading, points)
+    return reading

@@ -7,9 +7,9 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.kernel import accumulation as kernel
+from paint_deposition.kernel import eq2_flux as kernel
 from paint_deposition.kernel.laws import Law
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 
 Laws = tuple[tuple[Law, int], ...]
@@ -44,9 +44,8 @@ def _constants(model: DepositionModel, planar: PlanarPattern, shadow: float) -> 
 def compiled_laws(effects: Sequence[Sequence[Effect]]) -> tuple[Laws, Laws, np.ndarray]:
     """What the kernel inlines of effects, each as it is for every one of B brushes.
 
-    Returns:
-        Flux factors and pattern scales, each with how many parameters it takes; and (B, n) the
-        parameters, one unused number where there are none.
+    Flux factors and pattern scales, each with how many parameters it takes; (B, n) parameters, one
+    unused number where there are none.
     """
     found: list[Laws] = []
     values: list[list[float]] = [[] for _ in effects]

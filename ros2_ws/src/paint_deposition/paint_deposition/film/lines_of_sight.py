@@ -10,14 +10,14 @@ from typing import Protocol
 import numpy as np
 from numba import get_num_threads, njit
 
-from paint_deposition.kernel.accumulation import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
 from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.part.points import SurfacePoints
 
 # Lines of sight are traced anew after this travel of the emission point [m].
 SIGHT_STEP_M = 0.01
-# Points asked for at once, which bounds the memory.
+# Rays traced at once, which bounds the memory.
 RAYS_AT_ONCE = 200_000
 
 
@@ -57,15 +57,10 @@ class Sight:
 
 
 class LinesOfSight:
-    """Traces rays from the gun to those points that it can paint.
+    """Traces rays from the gun to those points, also given as the kernel's blocks, that it paints.
 
     A point whose normal looks away needs no ray, nor does one over which the gun stands higher
     than all of the part, nor any of a block that lies out of the pattern's reach.
-
-    Args:
-        obstacle: what can stand in the way.
-        points: where the film is wanted.
-        blocks: the same points in the kernel's order.
     """
 
     def __init__(self, obstacle: Obstacle, points: SurfacePoints, blocks: Blocks) -> None:
@@ -107,7 +102,7 @@ class LinesOfSight:
         begins = np.searchsorted(tracing, np.arange(len(traced) + 1))
 
         def trace(part: slice) -> None:
-            places, tracings, points = _asked(
+            places, tracings, points = _rays_to_trace(
                 blocks.bounds, blocks.points, blocks.normals, self._positions_m, self._normals,
                 self._horizon, traced, rows, begins, brush, constants,
                 which[part], block[part], starts[part],
@@ -152,11 +147,11 @@ def _within_reach(spheres, rows, tracing, brush, constants, tracings):
 
 @njit(cache=True, nogil=True)
 @named_for_its_code
-def _asked(
+def _rays_to_trace(
     bounds, p, n, positions, normals, horizon, traced, rows, begins, brush, constants, which,
     block, starts,
 ):  # fmt: skip
-    """Points of runs that must be asked for: place in ``seen``, tracing, and point of each."""
+    """Of each ray that is needed: place in ``seen``, tracing, and point."""
     count = 0
     for run in range(len(which)):
         count += bounds[block[run] + 1] - bounds[block[run]]

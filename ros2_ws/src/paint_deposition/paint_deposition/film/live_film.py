@@ -1,4 +1,4 @@
-"""The film of a motion that is still under way."""
+"""The film of a motion that is still under way: feeds ``FilmIntegrator``, which paints."""
 
 import copy
 from bisect import bisect_right, insort
@@ -9,8 +9,12 @@ from operator import attrgetter
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.between_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import (
+    uses_set_points,
+    with_brushes_of,
+    with_set_points,
+)
 from paint_deposition.film.lines_of_sight import Obstacle
 from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
@@ -33,7 +37,7 @@ _STAMP = attrgetter('stamp_ns')
 
 
 class LiveFilm:
-    """Paints as poses and trigger changes come, and can paint the same motion again.
+    """Gives poses and trigger changes to the integrator as they come, and can do so again.
 
     Poses wait until one is newer by the trigger's latency, measured by their stamps: a change of
     the trigger that comes a little later than the poses around it still cuts where it belongs.
@@ -113,15 +117,13 @@ class LiveFilm:
         return changes[passed - 1] if passed else None
 
     @property
-    def _sprays_untold(self) -> bool:
-        """Whether the gun sprays before any trigger: not where nothing says with which brush."""
+    def _sprays_without_trigger(self) -> bool:
+        """Not where nothing says with which brush."""
         return len(self.model.brushes) <= 1
 
     def reset(self) -> None:
         """Back to bare metal; the gun stays as it is, on or off, if the motion goes on."""
-        self._carried = self._changes or self._carried
-        self._brushes = {change.brush for change in self._carried if change.flow > 0.0}
-        self._clear()
+        self.carry_on(self)
 
     def carry_on(self, before: 'LiveFilm') -> None:
         """Begin bare, with the gun as the motion left it that was painted elsewhere before.
@@ -135,6 +137,7 @@ class LiveFilm:
         brushes = {brush for brush in sprayed if brush < BETWEEN}
         self.model.require_brushes(brushes)
         self._carried, self._brushes = carried, brushes
+        self._integrator.use(with_brushes_of(self.model, before.model))
         self._clear()
 
     def _clear(self) -> None:
@@ -142,7 +145,7 @@ class LiveFilm:
         self._builder = PathBuilder(
             self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
         )
-        if not self._sprays_untold:
+        if not self._sprays_without_trigger:
             self._builder.add_trigger(BEFORE_ALL_NS, 0.0)
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
@@ -202,9 +205,9 @@ class LiveFilm:
         Raises:
             ModelError: the model does not have a brush that was used.
         """
-        model = taken_over(model, self.model)
-        untold = self._sprays_untold and not (self._changes or self._carried)
-        model.require_brushes({ONLY_BRUSH} if untold else self._brushes)
+        model = with_brushes_of(model, self.model)
+        always_on = self._sprays_without_trigger and self.flow is None
+        model.require_brushes({ONLY_BRUSH} if always_on else self._brushes)
         builder = self._builder
         self._integrator.add(builder.take(self._settled_ns, finish=True))
         self._integrator.use(model)
@@ -222,8 +225,8 @@ class LiveFilm:
         _ = unpainted.gauge_um
 
     def _with_its_brush(self, change: TriggerChange) -> TriggerChange:
-        """A change whose set-points tell the brush with the number that stands for them."""
-        if not told_instead(self.model, change.brush, change.set_points):
+        """The change with the number that stands for its set-points, where those choose."""
+        if not uses_set_points(self.model, change.brush, change.set_points):
             return change
         model, number = with_set_points(self.model, change.set_points)
         if model is not self.model:

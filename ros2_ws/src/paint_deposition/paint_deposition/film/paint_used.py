@@ -16,7 +16,7 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 
 @dataclass(frozen=True)
 class PaintUsed:
-    """What left the gun; NaN where a brush that sprayed does not tell it.
+    """What left the gun; NaN where it is not known of a brush that sprayed.
 
     Attributes:
         spraying_s: time sprayed by number of the brush, weighted by the flow.

@@ -8,8 +8,11 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import require_above_zero
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.collapse import NEGLIGIBLE, SampledCollapse
-from paint_deposition.model.line_integral import line_integral_um_m_per_s
+from paint_deposition.model.eq3_collapse import (
+    NEGLIGIBLE,
+    SampledCollapse,
+    line_integral_um_m_per_s,
+)
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -98,15 +101,9 @@ def pass_film_um(
     roll_rad: float,
     fineness: float = 1.0,
 ) -> np.ndarray:
-    """Film [um] across the pass, through the same integrator as every other film.
+    """``collapse_um`` with effects: integrated sub-step by sub-step.
 
-    Args:
-        model: the deposition model; its effects on the finished film are left out.
-        x_m: (N,) distances from the gun's line [m].
-        velocity_m_per_s: of the gun along the line, negative backwards [m/s].
-        standoff_m: TCP to plane [m].
-        roll_rad: direction of forward travel in the tool's x-y frame [rad].
-        fineness: as for ``collapse_um``.
+    ``velocity_m_per_s`` is negative backwards, ``roll_rad`` the direction of travel in the tool.
     """
     points = SurfacePoints(x_m[:, None] * ACROSS, np.tile(OUTWARD, (len(x_m), 1)))
     integrator = FilmIntegrator(points, model, precision='double')

@@ -1,4 +1,4 @@
-"""Compiled kernels kept on disk, and told apart by everything that went into them."""
+"""Compiled kernels kept on disk, under names for everything that went into them."""
 
 import hashlib
 import inspect
@@ -78,8 +78,8 @@ def named_for_its_code(
 
     Args:
         function: what will be compiled.
-        laws: functions whose code tells this one from others of its name; default: its own.
-        variant: what else tells it from them.
+        laws: functions whose code makes it another than others of its name; default: its own.
+        variant: what else makes it another.
     """
     functions = [function] if laws is None else laws
     function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'

@@ -2,10 +2,29 @@
 
 from collections.abc import Callable, Sequence
 from types import FunctionType
+from typing import NamedTuple
 
 from numba.extending import register_jitable
 
 from paint_deposition.kernel.code_cache import named_for_its_code
+
+
+class Ray(NamedTuple):
+    """One straight ray from the emission point to a surface point, inside the kernel.
+
+    Attributes:
+        x_m, y_m: where it pierces the model plane, tool axes [m].
+        standoff_ratio: distance along the bell's axis over Omega [1].
+        cos_incidence: cosine of the angle to the surface normal, above 0 [1].
+        speed_m_per_s: speed of the atomizer [m/s].
+    """
+
+    x_m: float
+    y_m: float
+    standoff_ratio: float
+    cos_incidence: float
+    speed_m_per_s: float
+
 
 Law = Callable[..., float]
 # One call left in the hot loop keeps it from being vectorised: a law of many parameters would be

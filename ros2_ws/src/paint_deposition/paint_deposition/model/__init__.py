@@ -1,1 +1,1 @@
-"""Equations (1) to (5): pattern, projection, profile of a pass, evenness of parallel passes."""
+"""Eqs. (1) to (5) of Conner et al. (IROS 2002) in files of their names, and brushes."""

@@ -1,63 +1,59 @@
-"""Edges of a triangle mesh: creases, which split normals, and the rim, where the surface ends."""
-
-from dataclasses import dataclass
+"""Creases, which split normals, and rims and hems, where the surface ends."""
 
 import numpy as np
 from numba import njit
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.part.edge_distance import without_seams
-from paint_deposition.part.groups import joined_groups, numbered_groups
-from paint_deposition.part.half_edges import matched
-from paint_deposition.part.hems import LEAST_FOLD_RAD, hem_folds
-from paint_deposition.part.refinement import face_areas_m2, face_normals
+from paint_deposition.part.edges import (
+    Edges,
+    connected,
+    cut_segments,
+    half_edges_m,
+    near_pairs,
+    next_half_edge,
+    without_seams,
+)
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals
 
 # Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
 CREASE_RAD = np.radians(30.0)
 # A convex fold at least this sharp ends the surface as a free edge does: a hem, the rim of a
 # plate. Rims that are cut along one direction meet a crowned surface at less than a right angle.
 RIM_FOLD_RAD = np.radians(60.0)
-
-
-@dataclass(frozen=True)
-class Edges:
-    """Which triangle edges lie on each other.
-
-    Half-edges are numbered as in ``half_edges``.
-
-    Attributes:
-        paired: (E, 2) half-edges of two triangles with the same winding that share an edge.
-        clashing: (C, 2) half-edges of two triangles of opposite winding that share an edge.
-        single: (B,) half-edges without a partner, or with several.
-    """
-
-    paired: np.ndarray
-    clashing: np.ndarray
-    single: np.ndarray
-
-    @staticmethod
-    def of(faces: np.ndarray) -> 'Edges':
-        """Match the edges of (F, 3) faces."""
-        return Edges(*matched(faces))
-
-
-def next_half_edge(half_edges: np.ndarray) -> np.ndarray:
-    """The half-edge that follows in the same triangle."""
-    return half_edges - half_edges % 3 + (half_edges + 1) % 3
-
-
-def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarray) -> np.ndarray:
-    """(H, 2, 3) ends of half-edges [m]."""
-    corners = faces.ravel()
-    return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
+# A turn counts as that of a rim if it is made within this distance [m].
+REACH_M = 0.01
+# Folds that turn more slowly belong to a curved surface.
+LEAST_RATE_PER_M = 20.0
+WIDEST_STRIP_M = 0.02
+LEAST_FOLD_RAD = np.radians(4.0)
+PIECE_M = 0.005
+PARALLEL_COSINE = 0.8
 
 
 def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
     """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
-    normals = face_normals(vertices_m, faces)
-    sine, cosine, convex = _turns(normals, vertices_m, faces, edges.paired)
+    sine, cosine, convex = _turns(face_normals(vertices_m, faces), vertices_m, faces, edges.paired)
     angle = np.arctan2(sine, cosine)
     return np.where(convex, angle, -angle)
+
+
+@njit(cache=True, nogil=True)
+def _turns(normals, vertices, faces, paired):
+    """Sine and cosine of the angle across each paired edge, and whether it is convex."""
+    sine, cosine = np.empty((2, len(paired)))
+    convex = np.empty(len(paired), dtype=np.bool_)
+    for e in range(len(paired)):
+        f, k = paired[e, 0] // 3, paired[e, 0] % 3
+        start, end = faces[f, k], faces[f, (k + 1) % 3]
+        ax, ay, az = normals[f]
+        bx, by, bz = normals[paired[e, 1] // 3]
+        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+        sine[e] = np.sqrt(x * x + y * y + z * z)
+        cosine[e] = ax * bx + ay * by + az * bz
+        x *= vertices[end, 0] - vertices[start, 0]
+        y *= vertices[end, 1] - vertices[start, 1]
+        z *= vertices[end, 2] - vertices[start, 2]
+        convex[e] = x + y + z >= 0.0
+    return sine, cosine, convex
 
 
 def rim_folds(
@@ -83,9 +79,10 @@ def split_at_creases(
         (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new vertices.
     """
     smooth = (np.abs(folds) <= CREASE_RAD) & ~rim
-    parent = np.arange(faces.size, dtype=np.int32)
-    _join_across(edges.paired, smooth, parent)
-    count, label = numbered_groups(parent)
+    one, other = edges.paired[smooth].T
+    # Across a smooth edge the corners of both triangles are one at either end.
+    joined = np.concatenate([[one, next_half_edge(other)], [next_half_edge(one), other]], axis=1)
+    count, label = connected(joined.T, faces.size)
     origin = np.empty(count, dtype=np.int64)
     origin[label] = faces.ravel()
     return origin, label.reshape(-1, 3).astype(np.int64)
@@ -101,32 +98,69 @@ def rim_segments_m(
     )
 
 
-@njit(cache=True, nogil=True)
-def _turns(normals, vertices, faces, paired):
-    """Sine and cosine of the angle across each paired edge, and whether it is convex."""
-    sine, cosine = np.empty(len(paired)), np.empty(len(paired))
-    convex = np.empty(len(paired), dtype=np.bool_)
-    for e in range(len(paired)):
-        f, k = paired[e, 0] // 3, paired[e, 0] % 3
-        start, end = faces[f, k], faces[f, (k + 1) % 3]
-        ax, ay, az = normals[f]
-        bx, by, bz = normals[paired[e, 1] // 3]
-        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        sine[e] = np.sqrt(x * x + y * y + z * z)
-        cosine[e] = ax * bx + ay * by + az * bz
-        x *= vertices[end, 0] - vertices[start, 0]
-        y *= vertices[end, 1] - vertices[start, 1]
-        z *= vertices[end, 2] - vertices[start, 2]
-        convex[e] = x + y + z >= 0.0
-    return sine, cosine, convex
+def hem_folds(
+    ends_m: np.ndarray, folds_rad: np.ndarray, width_m: np.ndarray, turn_rad: float
+) -> np.ndarray:
+    """(E,) bool: folds of which several in a row turn convexly by at least ``turn_rad``.
+
+    Args:
+        ends_m: (E, 2, 3) each fold's ends [m]. folds_rad: (E,) positive if convex.
+        width_m: (E,) height of the lower of its two triangles [m].
+    """
+    hem = np.zeros(len(folds_rad), dtype=bool)
+    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > LEAST_RATE_PER_M * width_m)
+    rows = np.flatnonzero(close)
+    if not len(rows):
+        return hem
+    along = ends_m[rows, 1] - ends_m[rows, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    along = along / length[:, None]
+    pieces, whose = cut_segments(ends_m[rows], PIECE_M)
+    half = 0.5 * (length / np.bincount(whose))[whose]
+    middle = pieces.mean(axis=1)
+    fold = folds_rad[rows]
+    turn = fold[whose]
+    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
+        i = i + block.start
+        parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
+        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
+        i, j = i[beside], j[beside]
+        ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
+        # Of a fold beside it in several pieces each counts as far as it lies abreast.
+        abreast = 0.5 + (half[j] - ahead) / (2.0 * np.minimum(half[i], half[j]))
+        turn += np.bincount(i, np.clip(abreast, 0.0, 1.0) * fold[whose[j]], minlength=len(turn))
+    rim = np.bincount(whose, turn >= turn_rad, minlength=len(rows)) > 0
+    hem[rows[rim]] = True
+    return hem
 
 
-@njit(cache=True, nogil=True)
-@named_for_its_code
-def _join_across(paired, smooth, parent):
-    """Make the corners of both triangles one at the ends of every smooth edge."""
-    for e in range(len(paired)):
-        if smooth[e]:
-            one, other = paired[e]
-            joined_groups(parent, one, other + 1 if other % 3 < 2 else other - 2)
-            joined_groups(parent, one + 1 if one % 3 < 2 else one - 2, other)
+def strip_vertices(
+    vertices_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray
+) -> np.ndarray:
+    """(V,) bool: vertices of patches so narrow that they belong to a hem.
+
+    Args:
+        vertices_m: (V, 3) [m]. patches: (F, 3), on vertices that no two smooth patches share.
+        hem_half_edges: (H,) both half-edges of each fold of a hem, as numbered by ``Edges``.
+    """
+    if not len(hem_half_edges):
+        return np.zeros(len(vertices_m), dtype=bool)
+    patch = _patch_of_vertex(patches, len(vertices_m))
+    length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
+    of_face = patch[patches[:, 0]]
+    border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
+    area = np.bincount(of_face, face_areas_m2(vertices_m, patches), minlength=patch.max() + 1)
+    # A strip has a fold on both its sides.
+    return (2.0 * area < WIDEST_STRIP_M * border)[patch]
+
+
+def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarray:
+    """(count,) bool: the flag of patches' first vertices, for all vertices of the refined ones."""
+    if not flagged.any():
+        return np.zeros(count, dtype=bool)
+    patch = _patch_of_vertex(fine, count)
+    return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
+
+
+def _patch_of_vertex(faces: np.ndarray, count: int) -> np.ndarray:
+    return connected(np.concatenate([faces[:, :2], faces[:, 1:]]), count)[1]

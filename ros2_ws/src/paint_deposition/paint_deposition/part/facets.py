@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numba import njit
 
-from paint_deposition.part.half_edges import edges_of
+from paint_deposition.part.edges import edges_of
 
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4

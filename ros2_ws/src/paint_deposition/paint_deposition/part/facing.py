@@ -19,12 +19,10 @@ class Facing:
     Attributes:
         front: poses that look at the outward side.
         back: poses that look at the other side.
-        past: poses whose axis misses the part.
     """
 
     front: int
     back: int
-    past: int
 
 
 def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:
@@ -37,33 +35,29 @@ def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Fac
     return _met(surface, positions_m, z_axes)[0]
 
 
-def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
-    """Turn a part round that is sprayed from behind, and tell a closed one its outward side.
+def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
+    """Turn a part round that is sprayed from behind, and give a closed one its outward side.
 
     Which side of an open surface is outward depends on the program that exported it, and a closed
-    body has a surface on every side; the gun knows.
+    body has a surface on every side; the first gun whose axis meets the part decides.
 
     Args:
-        surface, positions_m, z_axes: as for ``facing``.
+        motions: (positions_m, z_axes) of each gun, as for ``facing``.
 
     Returns:
         The surface itself if it faces the gun; turned and with a note, since it would stay bare,
         if most poses that look at it look at its back; else with another outward side.
-    """
-    return _settled(surface, *_met(surface, positions_m, z_axes))
-
-
-def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
-    """The same for several guns: the first of them whose axis meets the part decides.
-
-    Args:
-        motions: (positions_m, z_axes) of each gun, as for ``facing``.
     """
     for positions_m, z_axes in motions:
         seen, axes = _met(surface, positions_m, z_axes)
         if len(axes):
             return _settled(surface, seen, axes)
     return surface
+
+
+def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
+    """The same for one gun."""
+    return toward_the_guns(surface, [(positions_m, z_axes)])
 
 
 def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
@@ -80,7 +74,7 @@ def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
             curved_edges=surface.curved_edges.turned(),
             notes=(*surface.notes, note),
         )
-    if not len(axes) or is_one_sided(surface.normals, surface.vertex_areas_m2):
+    if is_one_sided(surface.normals, surface.vertex_areas_m2):
         return surface
     gun_side = -axes.mean(axis=0)
     if np.linalg.norm(gun_side) < CANCELLED:
@@ -100,4 +94,4 @@ def _met(
     met = face >= 0
     normals = face_normals(surface.vertices_m, surface.faces[face[met]])
     front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
-    return Facing(front, len(normals) - front, int(np.sum(~met))), z_axes[met]
+    return Facing(front, len(normals) - front), z_axes[met]

@@ -1,11 +1,56 @@
-"""Places on a part where a gauge can stand: clear of edges and bends, at a distance."""
+"""Places on a part: where a gauge can stand, and as one measures them by hand."""
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from paint_deposition.part.face_places import from_edges_m, on_face_m
-from paint_deposition.part.groups import near_pairs
+from paint_deposition.part.edges import near_pairs
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
+
+# How far before the part rays begin [m].
+BEFORE_M = 0.1
+
+
+def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points of the surface that lie straight before places on its face.
+
+    The face is the part as the gun sees it, along its mean outward normal.
+
+    Args:
+        from_left_m: (N, 2) from the part's leftmost point and over its lowest [m].
+
+    Returns:
+        Points (N, 3) in the mesh frame [m], nan where there is no surface, and (N,) bool, whether
+        there is.
+    """
+    outward, vertices = surface.outward, surface.vertices_m
+    right, up, left, low = _face(surface)
+    front = (vertices @ outward).max() + BEFORE_M
+    places = np.nan_to_num(np.asarray(from_left_m, dtype=float))
+    starts = np.outer(left + places[:, 0], right) + np.outer(low + places[:, 1], up)
+    starts += front * outward
+    face = surface.first_faces(starts, np.broadcast_to(-outward, starts.shape))
+    hit = (face >= 0) & np.isfinite(from_left_m).all(axis=1)
+    corners = vertices[surface.faces[np.maximum(face, 0)]]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    height = np.einsum('nk,nk->n', starts - corners[:, 0], normals)
+    way = height / np.where(hit, normals @ outward, 1.0)
+    return np.where(hit[:, np.newaxis], starts - way[:, np.newaxis] * outward, np.nan), hit
+
+
+def from_edges_m(surface: Surface, points_m: np.ndarray) -> np.ndarray:
+    """(N, 2) distance of points (N, 3) from the left edge and height over the lower edge [m]."""
+    right, up, left, low = _face(surface)
+    return np.column_stack([points_m @ right - left, points_m @ up - low])
+
+
+def _face(surface: Surface) -> tuple[np.ndarray, np.ndarray, float, float]:
+    """Unit vectors (3,) to the right and up, and where left and lower edge lie along them [m]."""
+    outward = surface.outward
+    right, up = across_axis(outward, surface.down), -downhill_axis(outward, surface.down)
+    vertices = surface.vertices_m
+    return right, up, float((vertices @ right).min()), float((vertices @ up).min())
+
 
 # The foot of a usual gauge, from its middle to its rim [m].
 FOOT_M = 0.015

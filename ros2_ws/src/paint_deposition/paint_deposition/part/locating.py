@@ -21,16 +21,12 @@ class Location:
     Attributes:
         positions_m: (N, 3) the places [m].
         normals: (N, 3) outward unit normals of the surface there.
-        faces: (N,) triangle.
-        weights: (N, 3) barycentric weights of its corners.
         distance_m: (N,) from the point to the place [m].
         angle_rad: (N,) between the point's own normal and the surface's, NaN where none was given.
     """
 
     positions_m: np.ndarray
     normals: np.ndarray
-    faces: np.ndarray
-    weights: np.ndarray
     distance_m: np.ndarray
     angle_rad: np.ndarray
 
@@ -42,15 +38,7 @@ def locate(
     normals: np.ndarray | None = None,
     side: np.ndarray | None = None,
 ) -> Location:
-    """See ``Surface.locate``.
-
-    Args:
-        tree: of the refined mesh.
-        vertex_normals: (V, 3) outward unit normals of its vertices.
-        points_m, normals: (N, 3).
-        side: (3,) outward unit normal of the only side that is painted, or None; where there are
-            no normals, its back is not taken.
-    """
+    """See ``Surface.locate``; without ``normals`` the back of the only ``side`` is not taken."""
     points: np.ndarray = np.ascontiguousarray(points_m, dtype=np.float64).reshape(-1, 3)
     if not np.isfinite(points).all():
         raise ValueError('points to be located are not finite')
@@ -71,7 +59,7 @@ def locate(
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     distance = np.linalg.norm(points - place, axis=1)
     angle = _angle(outward, None if normals is None else wanted)
-    return Location(place, outward, tree.order[face], weights, distance, angle)
+    return Location(place, outward, distance, angle)
 
 
 @njit(cache=True, nogil=True)

@@ -1,11 +1,11 @@
 """Vertex normals of the curved surface that a triangulation stands for."""
 
 import math
-from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
+
+from paint_deposition.kernel.blocks import shared_among_threads
 
 # Near vertices shape the parabola by far the most.
 NEARNESS = 12.0
@@ -13,8 +13,6 @@ NEARNESS = 12.0
 LARGEST_CORRECTION_COSINE = math.cos(math.radians(15.0))
 # Of the fit's equations, by the Frobenius norm.
 WORST_CONDITION = 1e8
-# Fewer vertices are done before a second thread wakes.
-LEAST_BLOCK = 2048
 TERMS = 5
 
 
@@ -27,28 +25,15 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     lean on a border, where all triangles lie to one side. Where no parabola fits, that mean is
     taken.
     """
-    return _normals(vertices_m, faces, True)
-
-
-def mean_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(V, 3) unit normals, each the mean of its triangles' weighted by their angle there."""
-    return _normals(vertices_m, faces, False)
-
-
-def _normals(vertices_m: np.ndarray, faces: np.ndarray, fitted: bool) -> np.ndarray:
     vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
     first, corner = _corners_at(triangles, len(vertices))
     normals = np.empty((len(vertices), 3))
-    blocks = max(1, min(get_num_threads(), len(vertices) // LEAST_BLOCK))
-    bounds = np.linspace(0, len(vertices), blocks + 1).astype(np.int64)
-    with ThreadPoolExecutor(blocks) as threads:
-        work = [
-            threads.submit(_fill, vertices, triangles, first, corner, fitted, start, stop, normals)
-            for start, stop in pairwise(bounds)
-        ]
-    for done in work:
-        done.result()
+
+    def fill(start: int, stop: int) -> None:
+        _fill(vertices, triangles, first, corner, start, stop, normals)
+
+    shared_among_threads(len(vertices), fill)
     return normals
 
 
@@ -99,7 +84,7 @@ def _mean_normal(vertices, faces, corners, out):
 
 @njit(cache=True, nogil=True)
 def _gather(faces, first, corner, v, seen, passed, near):
-    """Put the vertices up to two edges from v, itself among them, into ``near``; tell how many."""
+    """Put v and the vertices up to two edges from it into ``near``; return how many."""
     count = 0
     for c in corner[first[v] : first[v + 1]]:
         for side in range(3):
@@ -191,16 +176,14 @@ def _solved(system, work):
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
-def _fill(vertices, faces, first, corner, fitted, start, stop, normals):
+def _fill(vertices, faces, first, corner, start, stop, normals):
     """Set the normals of vertices from start to stop."""
-    seen = np.zeros(len(vertices) if fitted else 0, dtype=np.int32)
+    seen = np.zeros(len(vertices), dtype=np.int32)
     passed, near = np.zeros_like(seen), np.empty_like(seen)
     system, work = np.empty((TERMS, TERMS + 1)), np.empty((TERMS, 2 * TERMS + 1))
     for v in range(start, stop):
         normal = normals[v]
         _mean_normal(vertices, faces, corner[first[v] : first[v + 1]], normal)
-        if not fitted:
-            continue
         count = _gather(faces, first, corner, v, seen, passed, near)
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)

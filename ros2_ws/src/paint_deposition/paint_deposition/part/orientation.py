@@ -23,17 +23,11 @@ def outward_side(
     down: np.ndarray,
     gun_side: np.ndarray | None = None,
 ) -> np.ndarray:
-    """(3,) unit mean of the (V, 3) normals on the side of the part that is painted.
+    """(3,) unit mean of the (V, 3) normals, weighted by (V,) areas, on the painted side.
 
     On a closed body it is the mean over the surface that faces the gun, found from roughly where
-    the gun is: which motion told it makes no difference, to the last bit, on a part that has
-    sides. Where the normals cancel and no gun is known, it is -y, or z.
-
-    Args:
-        normals: (V, 3) outward unit normals.
-        areas_m2: (V,) weights, or None.
-        down: (3,) gravity.
-        gun_side: (3,) roughly toward the gun, any length, or None.
+    the gun is (``gun_side``, any length): on a part that has sides any motion before one gives the
+    same, to the last bit. Where the normals cancel and no gun is known, it is -y, or z.
     """
     mean = mean_normal(normals, areas_m2)
     length = np.linalg.norm(mean)
@@ -108,3 +102,28 @@ def _facing_side(
         direction = mean_normal(normals[about], None if areas_m2 is None else areas_m2[about])
         direction /= np.linalg.norm(direction)
     return direction
+
+
+# A part that leans less than this from the horizontal lies flat: its lean says not which side is
+# the right one [rad].
+FLAT_RAD = np.radians(3.0)
+
+
+def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """(3,) horizontal unit vector along the part, to the right as the gun sees it.
+
+    On a part that lies flat it is the mesh's x axis, or y where x is vertical.
+    """
+    level = np.cross(outward, down)
+    length = np.linalg.norm(level)
+    if length > FLAT_RAD:
+        return level / length
+    axis = np.eye(3)[0] if abs(down[0]) < 0.9 else np.eye(3)[1]
+    level = axis - (axis @ down) * down
+    return level / np.linalg.norm(level)
+
+
+def downhill_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:
+    """(3,) unit vector down along the part, at right angles to ``across_axis`` and ``outward``."""
+    along = np.cross(across_axis(outward, down), outward)
+    return along / np.linalg.norm(along)

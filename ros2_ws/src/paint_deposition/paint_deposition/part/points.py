@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ from paint_deposition.kernel.blocks import Blocks, bounding_box_m
 from paint_deposition.part.orientation import outward_side
 
 DOWN = (0.0, 0.0, -1.0)
-
-# A covariate, or how to get it once an effect asks for it.
-Covariate = np.ndarray | Callable[[], np.ndarray]
 
 
 class SurfacePoints:
@@ -30,15 +26,9 @@ class SurfacePoints:
         area_m2: (V,) surface that each point stands for, or None for gauge readings.
         neighbours: (V,) the points in the order of ``kernel.blocks.neighbours_together``; default:
             they are sorted when they are painted.
-        curvature_per_m: (V,) k1 + k2, positive where concave toward the gun; default flat.
-        edge_distance_m: (V,) to the nearest free edge, inf without one; default inf.
-        sky_view_factor: (V,) cosine-weighted share of the sky seen, 0 to 1; default 1.
-        height_fraction: (V,) 0 at the lowest point of the part to 1 at the highest; default over
-            the points themselves.
-        slope_per_m: (V, V) sparse, maps a field on the points to its derivative along gravity's
-            component in the surface [1/m]; default no neighbours, hence zero.
-
-    Covariates are arrays or functions without arguments that return them.
+        curvature_per_m, edge_distance_m, sky_view_factor, height_fraction, slope_per_m: see the
+            properties; arrays or functions without arguments that return them. Default: flat,
+            without edges, all sky, over the points themselves, without neighbours.
     """
 
     def __init__(
@@ -52,11 +42,7 @@ class SurfacePoints:
         extent_m: np.ndarray | None = None,
         area_m2: np.ndarray | None = None,
         neighbours: np.ndarray | None = None,
-        curvature_per_m: Covariate | None = None,
-        edge_distance_m: Covariate | None = None,
-        sky_view_factor: Covariate | None = None,
-        height_fraction: Covariate | None = None,
-        slope_per_m: scipy.sparse.csr_matrix | Callable[[], scipy.sparse.csr_matrix] | None = None,
+        **covariates: Any,
     ) -> None:
         self.positions_m = np.ascontiguousarray(positions_m, dtype=np.float64)
         self.normals = np.ascontiguousarray(normals, dtype=np.float64)
@@ -70,15 +56,17 @@ class SurfacePoints:
         self._neighbours = neighbours
         self._blocks: dict[type, Blocks] = {}
         count = len(self.positions_m)
-        self._covariates = {
-            'curvature_per_m': _default(curvature_per_m, lambda: np.zeros(count)),
-            'edge_distance_m': _default(edge_distance_m, lambda: np.full(count, np.inf)),
-            'sky_view_factor': _default(sky_view_factor, lambda: np.ones(count)),
-            'height_fraction': _default(
-                height_fraction, lambda: heights(self.positions_m, self.positions_m, self.down)
-            ),
-            'slope_per_m': _default(slope_per_m, lambda: scipy.sparse.csr_matrix((count, count))),
+        self._covariates: dict[str, Any] = {
+            'curvature_per_m': lambda: np.zeros(count),
+            'edge_distance_m': lambda: np.full(count, np.inf),
+            'sky_view_factor': lambda: np.ones(count),
+            'height_fraction': lambda: heights(self.positions_m, self.positions_m, self.down),
+            'slope_per_m': lambda: scipy.sparse.csr_matrix((count, count)),
         }
+        if strange := covariates.keys() - self._covariates:
+            raise TypeError(f'{", ".join(strange)}: no covariate of points; there are: '
+                            f'{", ".join(self._covariates)}')  # fmt: skip
+        self._covariates |= {k: v for k, v in covariates.items() if v is not None}
 
     def __len__(self) -> int:
         return len(self.positions_m)
@@ -121,9 +109,8 @@ class SurfacePoints:
     def slope_per_m(self) -> scipy.sparse.csr_matrix:
         """(V, V) sparse derivative along gravity's component in the surface [1/m].
 
-        ``points.slope_per_m @ field``: on a vertical surface the change of the field per metre
-        downward; on surface that leans by an angle a from the horizontal sin(a) times the change
-        per metre, zero on a horizontal one. Rows of points without neighbours are zero.
+        On surface that leans by an angle a from the horizontal ``points.slope_per_m @ field`` is
+        sin(a) times the field's change per metre. Rows of points without neighbours are zero.
         """
         return self._covariate('slope_per_m')
 
@@ -178,10 +165,6 @@ def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> n
     height, others = -positions_m @ down, -among_m @ down
     extent = np.ptp(others) if len(others) else 0.0
     return (height - others.min()) / extent if extent else np.zeros(len(height))
-
-
-def _default(given: Any, otherwise: Callable[[], Any]) -> Any:
-    return otherwise if given is None else given
 
 
 def _slope_among(slope: scipy.sparse.csr_matrix, rows: np.ndarray) -> scipy.sparse.csr_matrix:

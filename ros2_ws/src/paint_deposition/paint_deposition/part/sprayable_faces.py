@@ -4,8 +4,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paint_deposition.part.edge_distance import edge_distance_m
-from paint_deposition.part.groups import connected
+from paint_deposition.part.edges import (
+    connected,
+    edge_distance_m,
+    edges_of,
+    half_edges_by_edge,
+    half_edges_m,
+)
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 from paint_deposition.part.surface import Surface
 
@@ -87,14 +92,10 @@ def patch(surface: Surface, kept: np.ndarray) -> tuple[Surface, np.ndarray]:
 
 def _face(surface: Surface, kept: np.ndarray) -> Face:
     found, rows = patch(surface, kept)
-    places = _places(surface)
-    edges = np.sort(places[surface.faces][:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    of_face = np.repeat(kept, 3)
-    key = edges[:, 0] * (places.max() + 1) + edges[:, 1]
-    seam = of_face & np.isin(key, key[~of_face])
-    ends = surface.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)[seam]
-    distance = edge_distance_m(found.vertices_m, surface.vertices_m[ends])
-    return Face(found, rows, distance)
+    edge = edges_of(_places(surface)[surface.faces])[1]
+    seam = np.flatnonzero((kept[:, None] & np.isin(edge, edge[~kept])).ravel())
+    ends_m = half_edges_m(surface.vertices_m, surface.faces, seam)
+    return Face(found, rows, edge_distance_m(found.vertices_m, ends_m))
 
 
 def _places(surface: Surface) -> np.ndarray:
@@ -105,12 +106,11 @@ def _places(surface: Surface) -> np.ndarray:
 
 def _neighbours(surface: Surface) -> np.ndarray:
     """(N, 2) triangles that share an edge."""
-    corners = _places(surface)[surface.faces]
-    edges = np.sort(corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-    key = edges[:, 0] * (corners.max() + 1) + edges[:, 1]
-    order = np.argsort(key, kind='stable')
-    same = np.flatnonzero(np.diff(key[order]) == 0)
-    return np.column_stack([order[same], order[same + 1]]) // 3
+    half_edges, _, first = half_edges_by_edge(_places(surface)[surface.faces])
+    follows = np.ones(len(half_edges), dtype=bool)
+    follows[first[:-1]] = False
+    same = np.flatnonzero(follows)
+    return np.column_stack([half_edges[same - 1], half_edges[same]]) // 3
 
 
 def _sides(normals: np.ndarray, areas: np.ndarray, widest_rad: float) -> np.ndarray:

@@ -1,15 +1,15 @@
 """The part's surface as a refined triangle mesh, and where points lie on it."""
 
 import hashlib
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields
-from functools import cache, cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
-from paint_deposition.part import creases, curvature, edge_distance, hems, locating, rays, slope
+from paint_deposition.part import creases, derivatives, face_tree, locating
+from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
 from paint_deposition.part.locating import Location
@@ -36,8 +36,8 @@ class Surface:
         down: (3,) unit vector of gravity in the mesh frame.
         rim_m: (B, 2, 3) segments of the free edges [m].
         notes: what had to be put right in the file, for the user to read.
-        gun_side: (3,) mean direction from the part to the gun, or None; tells the painted side
-            of a part whose surface has several, a closed body.
+        gun_side: (3,) mean direction from the part to the gun, or None; it shows the painted
+            side of a part whose surface has several, a closed body.
         in_hem: (V,) bool, vertices on the narrow strips of a hem or rim; None: there are none.
         curved_edges: where the mesh as it was read is coarser than its curvature.
         neighbours: (V,) vertices in the order in which they are painted, see
@@ -85,12 +85,12 @@ class Surface:
         """
         vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
         faces = np.ascontiguousarray(faces, dtype=np.int64)
-        edges = creases.Edges.of(faces)
+        edges = Edges.of(faces)
         folds = creases.folds_rad(vertices_m, faces, edges)
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
         origin, patches = creases.split_at_creases(faces, edges, folds, rim)
         rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
-        strip = hems.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
+        strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
         del edges, folds  # large ones, before the next are made
         corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
@@ -108,7 +108,7 @@ class Surface:
             down / np.linalg.norm(down),
             rim_m,
             notes,
-            in_hem=hems.carried_over(strip, fine, len(vertices)),
+            in_hem=creases.carried_over(strip, fine, len(vertices)),
             curved_edges=CurvedEdges.of(corners, read_normals, patches),
             neighbours=neighbours_together(vertices),
         )
@@ -137,11 +137,11 @@ class Surface:
     @cached_property
     def occluder(self) -> Occluder:
         """The part as an obstacle to rays."""
-        return Occluder(self._tree)
+        return Occluder(lambda: self._tree)
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(N,) the triangle that each ray meets first, -1 for none; see ``rays.first_faces``."""
-        return rays.first_faces(self._tree(), starts_m, directions)
+        """(N,) the triangle that each ray meets first, from either side, -1 for none."""
+        return face_tree.first_faces(self._tree, starts_m, directions)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""
@@ -150,7 +150,7 @@ class Surface:
             self.normals,
             area_m2=self.vertex_areas_m2,
             neighbours=self.neighbours,
-            slope_per_m=lambda: slope.slope_operator(
+            slope_per_m=lambda: derivatives.slope_operator(
                 self.vertices_m, self.faces, self.normals, self.down
             ),
             **self._covariates(self.vertices_m, self.normals),
@@ -164,7 +164,7 @@ class Surface:
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
                 agrees is taken. Without them it is the one that the gun paints, if only one is.
         """
-        return locating.locate(self._tree(), self.normals, points_m, normals, self._only_side)
+        return locating.locate(self._tree, self.normals, points_m, normals, self._only_side)
 
     def at(
         self,
@@ -175,8 +175,7 @@ class Surface:
         """The surface at points near it, gauge readings for instance.
 
         Args:
-            points_m: (N, 3) [m]; each is moved to the closest place on the surface.
-            normals: as in ``locate``.
+            points_m, normals: as in ``locate``; each is moved to the closest place.
             stencil_m: if given, the N points are followed by N neighbours this far up the surface
                 and N this far down, and the slope is defined on the first N.
         """
@@ -184,11 +183,13 @@ class Surface:
         positions, outward = place.positions_m, place.normals
         operator = None
         if stencil_m is not None and len(positions):
-            way = slope.downhill(outward, self.down)
+            way = derivatives.downhill(outward, self.down)
             unit = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-12)
             above = self.locate(positions - stencil_m * unit, outward)
             below = self.locate(positions + stencil_m * unit, outward)
-            operator = slope.slope_at_stencil(positions, above.positions_m, below.positions_m, way)
+            operator = derivatives.slope_at_stencil(
+                positions, above.positions_m, below.positions_m, way
+            )
             positions = np.concatenate([positions, above.positions_m, below.positions_m])
             outward = np.concatenate([outward, above.normals, below.normals])
         return SurfacePoints(
@@ -205,15 +206,14 @@ class Surface:
             'centre_m': self.centre_m,
             'extent_m': box_extent_m(self.vertices_m),
             'curvature_per_m': lambda: self._curvature_per_m(positions_m, normals),
-            'edge_distance_m': lambda: edge_distance.edge_distance_m(positions_m, self.rim_m),
+            'edge_distance_m': lambda: edge_distance_m(positions_m, self.rim_m),
             'sky_view_factor': lambda: self.occluder.sky_view_factor(positions_m, normals),
             'height_fraction': lambda: heights(positions_m, self.vertices_m, self.down),
         }
 
     @cached_property
-    def _tree(self) -> Callable[[], FaceTree]:
-        """Gives the tree of the faces, made when it is first asked for."""
-        return cache(partial(FaceTree.of, self.vertices_m, self.faces))
+    def _tree(self) -> FaceTree:
+        return FaceTree.of(self.vertices_m, self.faces)
 
     @property
     def _only_side(self) -> np.ndarray | None:
@@ -233,11 +233,11 @@ class Surface:
         if self.in_hem is not None:
             vertex_areas = vertex_areas * ~self.in_hem
             areas = areas * ~self.in_hem[self.faces[:, 0]]
-        return curvature.curvature_per_m(
+        return derivatives.curvature_per_m(
             positions_m,
             normals,
             np.concatenate([self.vertices_m, self.vertices_m[self.faces].mean(axis=1)]),
             np.concatenate([self.normals, centre_normals]),
             np.concatenate([vertex_areas, areas]),
-            max(curvature.RADIUS_M, self.longest_edge_m),
+            max(derivatives.RADIUS_M, self.longest_edge_m),
         )

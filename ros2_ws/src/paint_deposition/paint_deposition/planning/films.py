@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator, settled_um
+from paint_deposition.film.integrator import FilmIntegrator, after_film_effects
 from paint_deposition.film.paint_used import PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
@@ -282,5 +282,5 @@ class FilmAtPoints:
         whole = FilmIntegrator(everywhere, self.model, occluder=self._surface.occluder)
         whole.add(path)
         raw = whole.raw_um
-        settled = settled_um(raw, self._settles, everywhere)
+        settled = after_film_effects(raw, self._settles, everywhere)
         return np.divide(settled, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -17,8 +17,12 @@ from scipy.optimize import brentq, minimize_scalar
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.collapse import Collapse
-from paint_deposition.model.uniformity import ParallelPasses, Variation, variation
+from paint_deposition.model.eq3_collapse import Collapse
+from paint_deposition.model.eq4_eq5_uniformity import (
+    ParallelPasses,
+    Variation,
+    variation,
+)
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9

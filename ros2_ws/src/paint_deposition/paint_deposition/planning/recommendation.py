@@ -7,8 +7,8 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.collapse import Collapse, half_width_m
-from paint_deposition.model.uniformity import ParallelPasses
+from paint_deposition.model.eq3_collapse import Collapse, half_width_m
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.index_search import (
     SEARCHED,
     IndexCurve,

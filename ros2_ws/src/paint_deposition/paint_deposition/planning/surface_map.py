@@ -10,7 +10,7 @@ from scipy.interpolate import RectBivariateSpline
 from scipy.ndimage import binary_closing, distance_transform_edt, gaussian_filter
 
 from paint_deposition.errors import PlanError
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 # Surface that leans further from the gun's side than this is not painted from it.

@@ -14,8 +14,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, did_you_mean
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 
 INPUTS = ('mesh', 'trajectory', 'campaign', 'model')

@@ -1,7 +1,8 @@
 """Curves learned from readings over one covariate."""
 
 from collections.abc import Callable
-from typing import Any
+from types import new_class
+from typing import Any, cast
 
 import numpy as np
 from numba.extending import register_jitable
@@ -10,7 +11,7 @@ from pydantic import Field, model_validator
 from paint_deposition.effects.base import PathContext
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied
 from paint_deposition.effects.learned.place import places_m
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
@@ -98,6 +99,13 @@ class _OverTheSurface(LearnedCurve):
         return applied(film_um, self.curve(at_points(points)[self.covariate]()), self.kind)
 
 
+class _OverTheFilm(LearnedCurve):
+    """Acts on the film, or what the gauge makes of it, by the film itself."""
+
+    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+        return applied(film_um, self.curve(film_um), self.kind)
+
+
 class _AlongTheRay(LearnedCurve):
     """Acts on the flux of each ray, inside the kernel."""
 
@@ -165,117 +173,64 @@ def _ray_factor(variable: Callable[[Ray], float]) -> Callable[..., float]:
     return flux_factor
 
 
-class LearnedIncidence(_AlongTheRay):
-    """What arrives follows the angle of incidence, as learned."""
-
-    id, covariate, unit = 'learned:incidence_deg', 'incidence_deg', 'deg'
-    over = 'the angle of incidence'
-
-    @staticmethod
-    def axis(value: Any) -> Any:
-        """Minus its cosine, which the kernel knows."""
-        return -np.cos(np.radians(value))
-
-    flux_factor = staticmethod(_ray_factor(lambda ray: -ray.cos_incidence))
+def _acting(
+    acts: type[LearnedCurve], covariate: str, unit: str, over: str, **others: Any
+) -> type[LearnedCurve]:
+    """The law over a covariate that acts as a class of the above does."""
+    what = {
+        'id': f'learned:{covariate}', 'covariate': covariate, 'unit': unit, 'over': over,
+        '__module__': __name__, '__doc__': f'What is painted follows {over}, as learned.',
+    }  # fmt: skip
+    law = new_class(f'Learned_{covariate}', (acts,), {}, lambda names: names.update(what | others))
+    return cast(type[LearnedCurve], law)
 
 
-class LearnedStandoff(_AlongTheRay):
-    """What arrives follows the distance as a multiple of Omega, as learned."""
-
-    id, covariate, unit = 'learned:standoff_ratio', 'standoff_ratio', '1'
-    over = 'the distance as a multiple of Omega'
-    flux_factor = staticmethod(_ray_factor(lambda ray: ray.standoff_ratio))
+def _edge_axis(value: Any) -> Any:
+    """A scale that resolves what is close to the edge."""
+    return np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
 
 
-class LearnedTime(_OverThePath):
-    """The flow follows the time since the motion began, as learned."""
-
-    id, covariate, unit = 'learned:time_s', 'time_s', 's'
-    over = 'the time since the motion began'
-
-
-class LearnedPass(_OverThePath):
-    """The flow follows the number of the pass, as learned."""
-
-    id, covariate, unit = 'learned:spray_pass', 'spray_pass', '1'
-    over = 'the number of the pass'
-
-
-class LearnedStrokeEnd(_OverThePath):
-    """The flow follows the distance to the nearer end of the stroke, as learned."""
-
-    id, covariate, unit = 'learned:stroke_end_m', 'stroke_end_m', 'm'
-    over = 'the distance to the nearer end of the stroke'
-    needs_whole_strokes = True
-
-
-class LearnedSinceTrigger(_OverThePath):
-    """The flow follows the time since the trigger opened, as learned."""
-
-    id, covariate, unit = 'learned:since_trigger_s', 'since_trigger_s', 's'
-    over = 'the time since the trigger opened'
-
-
-class LearnedSpeed(_OverThePath):
-    """The flow follows the speed of the gun, as learned."""
-
-    id, covariate, unit = 'learned:speed_m_per_s', 'speed_m_per_s', 'm/s'
-    over = 'the speed of the gun'
-
-
-class LearnedCurvature(_OverTheSurface):
-    """The film follows the curvature of the surface, as learned."""
-
-    id, covariate, unit = 'learned:curvature_per_m', 'curvature_per_m', '1/m'
-    over = 'the curvature of the surface'
-
-
-class LearnedEdgeDistance(_OverTheSurface):
-    """The film follows the distance to the nearest free edge, as learned."""
-
-    id, covariate, unit = 'learned:edge_distance_m', 'edge_distance_m', 'm'
-    over = 'the distance to the nearest free edge'
-
-    @staticmethod
-    def axis(value: Any) -> Any:
-        """A scale that resolves what is close to the edge."""
-        return np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
-
-
-class LearnedSkyViewFactor(_OverTheSurface):
-    """The film follows the share of the half-space that a point sees, as learned."""
-
-    id, covariate, unit = 'learned:sky_view_factor', 'sky_view_factor', '1'
-    over = 'the share of the half-space that a point sees'
-
-
-class LearnedAcross(_OverTheSurface):
-    """The film follows the distance from the part's centre to the right, as learned."""
-
-    id, covariate, unit = 'learned:across_m', 'across_m', 'm'
-    over = "the distance from the part's centre to the right"
-
-
-class LearnedHeight(_OverTheSurface):
-    """The film follows the height on the part, as learned."""
-
-    id, covariate, unit = 'learned:height_fraction', 'height_fraction', '1'
-    over = 'the height on the part'
-
-
-class LearnedFilm(LearnedCurve):
-    """The film, or what the gauge makes of it, follows the film itself, as learned."""
-
-    id, covariate, unit = 'learned:film_um', 'film_um', 'um'
-    over = 'the film itself'
-
-    def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        return applied(film_um, self.curve(film_um), self.kind)
+def _incidence_axis(value: Any) -> Any:
+    """Minus the angle's cosine, which the kernel knows."""
+    return -np.cos(np.radians(value))
 
 
 # Learned curves by covariate.
 CURVES: dict[str, type[LearnedCurve]] = {
     law.covariate: law
-    for kinds in (_AlongTheRay, _OverThePath, _OverTheSurface)
-    for law in kinds.__subclasses__()
-} | {LearnedFilm.covariate: LearnedFilm}
+    for law in (
+        _acting(
+            _AlongTheRay, 'incidence_deg', 'deg', 'the angle of incidence',
+            axis=staticmethod(_incidence_axis),
+            flux_factor=staticmethod(_ray_factor(lambda ray: -ray.cos_incidence)),
+        ),
+        _acting(
+            _AlongTheRay, 'standoff_ratio', '1', 'the distance as a multiple of Omega',
+            flux_factor=staticmethod(_ray_factor(lambda ray: ray.standoff_ratio)),
+        ),
+        _acting(_OverThePath, 'time_s', 's', 'the time since the motion began'),
+        _acting(_OverThePath, 'spray_pass', '1', 'the number of the pass'),
+        _acting(
+            _OverThePath, 'stroke_end_m', 'm', 'the distance to the nearer end of the stroke',
+            needs_whole_strokes=True,
+        ),
+        _acting(_OverThePath, 'since_trigger_s', 's', 'the time since the trigger opened'),
+        _acting(_OverThePath, 'speed_m_per_s', 'm/s', 'the speed of the gun'),
+        _acting(_OverTheSurface, 'curvature_per_m', '1/m', 'the curvature of the surface'),
+        _acting(
+            _OverTheSurface, 'edge_distance_m', 'm', 'the distance to the nearest free edge',
+            axis=staticmethod(_edge_axis),
+        ),
+        _acting(
+            _OverTheSurface, 'sky_view_factor', '1',
+            'the share of the half-space that a point sees',
+        ),
+        _acting(
+            _OverTheSurface, 'across_m', 'm', "the distance from the part's centre to the right"
+        ),
+        _acting(_OverTheSurface, 'height_fraction', '1', 'the height on the part'),
+        _acting(_OverTheFilm, 'film_um', 'um', 'the film itself'),
+    )
+}  # fmt: skip
+# Where pickle looks for them.
+globals().update({law.__name__: law for law in CURVES.values()})

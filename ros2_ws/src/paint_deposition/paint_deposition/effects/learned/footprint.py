@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, hat_weights
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Ray
 
 # Harmonics of the angle: 1, cos, sin, cos 2, sin 2.
 WAVES = 5

@@ -1,10 +1,9 @@
 """What all laws learned from readings have in common.
 
-A learned law is an effect like those of the library, but its form comes from readings: values at
-knots over the range that the readings cover, linear in between. One step beyond that range it is
-neutral again: nothing is known there. The idea is that of an embedded discrepancy, inferred inside
-the model and shown against a physical covariate (Parish and Duraisamy, J. Comput. Phys. 305:758,
-2016).
+Its form comes from readings: values at knots over the range that the readings cover, linear in
+between. One step beyond that range it is neutral again: nothing is known there. The idea is that
+of an embedded discrepancy, inferred inside the model and shown against a physical covariate
+(Parish and Duraisamy, J. Comput. Phys. 305:758, 2016).
 """
 
 from typing import Any, ClassVar, Literal

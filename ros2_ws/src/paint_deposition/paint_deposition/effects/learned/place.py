@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from paint_deposition.effects.learned.law import LearnedLaw, applied, hat_weights
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints
 
 # Parts whose boxes differ by less than this share are the same part.

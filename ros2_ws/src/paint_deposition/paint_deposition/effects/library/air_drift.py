@@ -1,10 +1,13 @@
 """Booth air that carries the drops aside on their way."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 
@@ -22,7 +25,7 @@ class AirDrift(Effect):
     id = 'air_drift'
     family = 'lateral shift'
     needs = 'draught'
-    covariates = MappingProxyType({'height_fraction': 0, 'standoff_ratio': 0})
+    covariates = over(height_fraction=0, standoff_ratio=0)
     signature = 'pattern shifted in a direction fixed in the booth, however the gun is turned'
     rivals = ('tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag')
     source = (

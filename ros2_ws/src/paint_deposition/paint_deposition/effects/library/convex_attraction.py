@@ -1,11 +1,15 @@
 """Attraction to convex lines and corners."""
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
+from paint_deposition.effects.base import (
+    REFERENCE_CURVATURE_PER_M,
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -19,8 +23,8 @@ class ConvexAttraction(Effect):
     id = 'convex_attraction'
     family = 'curvature'
     needs = 'voltage'
-    covariates = MappingProxyType({'curvature_per_m': -1})
-    acts_within = MappingProxyType({'curvature_per_m': (-math.inf, 0.0)})
+    covariates = over(curvature_per_m=-1)
+    acts_within = over(curvature_per_m=(-math.inf, 0.0))
     free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'
     rivals = ('gauge_curvature_bias',)

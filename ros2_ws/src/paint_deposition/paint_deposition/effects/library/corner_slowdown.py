@@ -1,10 +1,13 @@
 """A robot that is slower near reversals than its recorded poses say."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 # A gun that is slower than this stands, and its log trembles [m/s].
@@ -21,7 +24,7 @@ class CornerSlowdown(Effect):
 
     id = 'corner_slowdown'
     family = 'boundary'
-    covariates = MappingProxyType({'stroke_end_m': -1})
+    covariates = over(stroke_end_m=-1)
     free_law = 'factor'
     signature = 'more paint where the passes turn, none along edges that they run beside'
     rivals = ('edge_build', 'trigger_lag', 'standoff_efficiency')

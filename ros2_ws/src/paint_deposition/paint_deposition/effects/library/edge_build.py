@@ -1,10 +1,12 @@
 """More paint along the free edges: fat edges, picture framing."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -18,7 +20,7 @@ class EdgeBuild(Effect):
     id = 'edge_build'
     family = 'boundary'
     needs = 'voltage'
-    covariates = MappingProxyType({'edge_distance_m': -1})
+    covariates = over(edge_distance_m=-1)
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
     rivals = ('corner_slowdown',)

@@ -1,11 +1,15 @@
 """Recesses that the field does not reach."""
 
 import math
-from types import MappingProxyType
 
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
+from paint_deposition.effects.base import (
+    REFERENCE_CURVATURE_PER_M,
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -20,8 +24,8 @@ class FaradayShielding(Effect):
     id = 'faraday_shielding'
     family = 'curvature'
     needs = 'voltage'
-    covariates = MappingProxyType({'curvature_per_m': -1, 'sky_view_factor': 1})
-    acts_within = MappingProxyType({'curvature_per_m': (0.0, math.inf)})
+    covariates = over(curvature_per_m=-1, sky_view_factor=1)
+    acts_within = over(curvature_per_m=(0.0, math.inf))
     free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'
     rivals = ('gauge_curvature_bias', 'occlusion')

@@ -1,10 +1,12 @@
 """Overspray that settles more on the lower part of the part."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -17,7 +19,7 @@ class FogGradient(Effect):
 
     id = 'fog_gradient'
     family = 'order'
-    covariates = MappingProxyType({'height_fraction': -1})
+    covariates = over(height_fraction=-1)
     free_law = 'addition'
     signature = 'more at the bottom, by a fixed amount: not in proportion to the film'
     rivals = ('flow_drift',)

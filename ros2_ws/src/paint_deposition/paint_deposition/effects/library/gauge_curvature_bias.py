@@ -1,10 +1,13 @@
 """A gauge that reads high on convex surface and low in hollows."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, parameter
+from paint_deposition.effects.base import (
+    REFERENCE_CURVATURE_PER_M,
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -18,7 +21,7 @@ class GaugeCurvatureBias(Effect):
 
     id = 'gauge_curvature_bias'
     family = 'curvature'
-    covariates = MappingProxyType({'curvature_per_m': -1})
+    covariates = over(curvature_per_m=-1)
     free_law = 'addition'
     signature = 'follows curvature, not film: the same on thin and on thick paint'
     rivals = ('faraday_shielding', 'convex_attraction')

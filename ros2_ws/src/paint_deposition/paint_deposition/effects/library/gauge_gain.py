@@ -1,10 +1,12 @@
 """A gauge whose scale is off."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -12,12 +14,12 @@ class GaugeGain(Effect):
     """The gauge was calibrated on a foil or a substrate that is not the part's.
 
     Acts on the reading: times 1 + a. Positive a: it reads too much. On one part the same as more
-    flow: only a check of the gauge tells them apart.
+    flow: only a check of the gauge distinguishes them.
     """
 
     id = 'gauge_gain'
     family = 'level'
-    covariates = MappingProxyType({'film_um': 0})
+    covariates = over(film_um=0)
     signature = 'in proportion to the film everywhere; the same as another K1'
     rivals = ('gauge_zero',)
     source = 'specification of gauges: a fixed amount plus a percentage, 1 to 3 %'

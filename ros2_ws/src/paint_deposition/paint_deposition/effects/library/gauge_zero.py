@@ -1,10 +1,12 @@
 """A gauge whose zero is off."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -16,7 +18,7 @@ class GaugeZero(Effect):
 
     id = 'gauge_zero'
     family = 'level'
-    covariates = MappingProxyType({'film_um': 0})
+    covariates = over(film_um=0)
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'

@@ -1,8 +1,11 @@
 """A plume that trails behind the moving gun."""
 
-from types import MappingProxyType
-
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 
@@ -15,7 +18,7 @@ class GunWake(Effect):
 
     id = 'gun_wake'
     family = 'time'
-    covariates = MappingProxyType({'speed_m_per_s': 0})
+    covariates = over(speed_m_per_s=0)
     signature = 'passes moved against their direction, in proportion to the speed'
     rivals = ('pose_lag', 'trigger_lag')
     source = 'time of flight of 5 to 50 ms; size from general practice'

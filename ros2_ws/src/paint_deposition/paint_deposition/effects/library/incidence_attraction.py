@@ -1,8 +1,11 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
-from types import MappingProxyType
-
-from paint_deposition.effects.base import Effect, Ray, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
+from paint_deposition.kernel.laws import Ray
 
 
 class IncidenceAttraction(Effect):
@@ -17,7 +20,7 @@ class IncidenceAttraction(Effect):
 
     id = 'incidence_attraction'
     family = 'incidence'
-    covariates = MappingProxyType({'incidence_deg': 0})
+    covariates = over(incidence_deg=0)
     free_law = 'factor'
     signature = 'grows with incidence; most on surface that turns away from the gun'
     rivals = ('standoff_efficiency',)

@@ -1,10 +1,13 @@
 """A part that does not hang where its drawing says."""
 
-from types import MappingProxyType
-
 import scipy
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 
@@ -19,7 +22,7 @@ class PartMisalignment(Effect):
 
     id = 'part_misalignment'
     family = 'lateral shift'
-    covariates = MappingProxyType({'height_fraction': 0})
+    covariates = over(height_fraction=0)
     signature = 'pattern shifted in a direction fixed in the part, more so away from its centre'
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'sag')
     source = 'error of fixtures; size from general practice'

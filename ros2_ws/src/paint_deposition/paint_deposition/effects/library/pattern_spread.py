@@ -1,9 +1,12 @@
 """A pattern that does not widen in proportion to the distance."""
 
-from types import MappingProxyType
-
-from paint_deposition.effects.base import Effect, Ray, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.kernel.fast_math import power
+from paint_deposition.kernel.laws import Ray
 
 # Standoffs between a quarter of the model plane's distance and four times it are within reach.
 STANDOFF_RANGE = 4.0
@@ -20,7 +23,7 @@ class PatternSpread(Effect):
 
     id = 'pattern_spread'
     family = 'standoff'
-    covariates = MappingProxyType({'standoff_ratio': 0})
+    covariates = over(standoff_ratio=0)
     signature = 'the width of the pattern changes with the distance, not what it deposits'
     rivals = ('tcp_standoff', 'overspray_fog')
     source = (

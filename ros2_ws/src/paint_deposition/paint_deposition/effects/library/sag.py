@@ -1,10 +1,12 @@
 """Wet paint that runs down a steep surface."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 
 REFERENCE_FILM_UM = 20.0
@@ -21,7 +23,7 @@ class Sag(Effect):
 
     id = 'sag'
     family = 'lateral shift'
-    covariates = MappingProxyType({'film_um': 0, 'height_fraction': 0})
+    covariates = over(film_um=0, height_fraction=0)
     signature = "thick zones thinner at their top and thicker below; grows with the film's cube"
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment')
     source = (

@@ -1,9 +1,12 @@
 """Transfer efficiency that falls with the distance from the bell."""
 
-from types import MappingProxyType
-
-from paint_deposition.effects.base import Effect, Ray, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    over,
+    parameter,
+)
 from paint_deposition.kernel.fast_math import power
+from paint_deposition.kernel.laws import Ray
 
 
 class StandoffEfficiency(Effect):
@@ -15,7 +18,7 @@ class StandoffEfficiency(Effect):
 
     id = 'standoff_efficiency'
     family = 'standoff'
-    covariates = MappingProxyType({'standoff_ratio': -1})
+    covariates = over(standoff_ratio=-1)
     free_law = 'factor'
     signature = 'negative where the gun is far, positive where it is near; level, not width'
     rivals = ('incidence_attraction', 'corner_slowdown', 'tcp_standoff')

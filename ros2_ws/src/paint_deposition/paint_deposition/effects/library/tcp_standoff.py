@@ -1,8 +1,11 @@
 """A TCP calibrated too short or too long along the bell's axis."""
 
-from types import MappingProxyType
-
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 
@@ -15,7 +18,7 @@ class TcpStandoff(Effect):
 
     id = 'tcp_standoff'
     family = 'standoff'
-    covariates = MappingProxyType({'standoff_ratio': 0})
+    covariates = over(standoff_ratio=0)
     signature = 'as if the whole path were sprayed from another distance'
     rivals = ('pattern_spread', 'standoff_efficiency')
     source = 'error of tool calibration; size from general practice'

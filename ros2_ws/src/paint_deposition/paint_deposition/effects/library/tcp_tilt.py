@@ -2,7 +2,11 @@
 
 import scipy
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 

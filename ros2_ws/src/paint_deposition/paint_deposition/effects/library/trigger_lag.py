@@ -1,10 +1,13 @@
 """Flow that follows the trigger late: pump, hose and bell need time."""
 
-from types import MappingProxyType
-
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, parameter
+from paint_deposition.effects.base import (
+    Effect,
+    PathContext,
+    over,
+    parameter,
+)
 from paint_deposition.motion.path import SprayPath
 
 
@@ -19,7 +22,7 @@ class TriggerLag(Effect):
 
     id = 'trigger_lag'
     family = 'boundary'
-    covariates = MappingProxyType({'since_trigger_s': 0})
+    covariates = over(since_trigger_s=0)
     signature = 'less paint where the gun opens and more where it closes, on alternate sides'
     rivals = ('corner_slowdown', 'pose_lag')
     source = (

@@ -15,8 +15,13 @@ from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.fitting.one_thread import on_one_thread
 from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.face_places import from_edges_m
-from paint_deposition.part.gauge_places import FOOT_M, can_stand, grid_places, spread_places
+from paint_deposition.part.gauge_places import (
+    FOOT_M,
+    can_stand,
+    from_edges_m,
+    grid_places,
+    spread_places,
+)
 from paint_deposition.part.surface import Surface
 
 DEFAULT_POINTS, DEFAULT_REPEATS = 60, 8

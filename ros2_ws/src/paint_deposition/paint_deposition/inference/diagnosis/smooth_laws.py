@@ -18,7 +18,7 @@ from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_
 from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.covariates import Rays
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Knots of a curve; time is resolved more finely, as pumps pulsate.
 KNOTS, TIME_KNOTS = 12, 40

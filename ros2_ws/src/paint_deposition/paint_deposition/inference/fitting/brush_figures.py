@@ -7,7 +7,7 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.paint_used import efficiency
 from paint_deposition.inference.fitting.estimates import Estimate
-from paint_deposition.model.brush_law import BrushLaw
+from paint_deposition.model.brush import BrushLaw
 
 
 def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dict[str, Any] | None:

@@ -42,7 +42,7 @@ from paint_deposition.inference.readings.plausibility import (
     check_units_beside,
 )
 from paint_deposition.inference.readings.residuals import Residuals
-from paint_deposition.model.uniformity import sigma_n_closed_form
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 STARTS = 8
 # Residuals beyond this many standard deviations are named in a warning.
@@ -66,7 +66,7 @@ class PanelFit:
         return {
             **collapse.model_dump(),
             'index_m': index,
-            'sigma_n': None if index is None else sigma_n_closed_form(collapse, index),
+            'sigma_n': index and ParallelPasses.one_way(collapse).sigma_n(index),
             'rmse_um': self.collapse.residuals.rmse_um,
             'speed_m_per_s': float(self.panel.speed_m_per_s[0]),
         }

@@ -11,11 +11,16 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, shown_um
+from paint_deposition.film.integrator import (
+    FEW_RAYS,
+    FilmIntegrator,
+    Steps,
+    gauge_reading_um,
+)
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
 
 # Where effects act before the film has arrived: what they change, must be integrated again.
@@ -51,22 +56,22 @@ class Forward:
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""
         stages = self._stages(model)
-        return self._shown_um(self._each(_Part.film_um, stages), stages)
+        return self._gauge_reading_um(self._each(_Part.film_um, stages), stages)
 
     def terms(self, model: DepositionModel) -> 'Terms':
         """What the readings are made of, for r, sigma1, sigma2 and the effects of a model."""
         stages = self._stages(model)
         terms = self._each(_Part.terms, stages)
-        return Terms(model, lambda w: self._shown_um([w @ part for part in terms], stages))
+        return Terms(model, lambda w: self._gauge_reading_um([w @ part for part in terms], stages))
 
     def _each(
         self, work: Callable[['_Part', '_Stages'], np.ndarray], stages: list['_Stages']
     ) -> list[np.ndarray]:
         return list((self._pool.map if self._pool else map)(work, self._parts, stages))
 
-    def _shown_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
+    def _gauge_reading_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
         return np.concatenate([
-            shown_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
+            gauge_reading_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
             for part, film, one in zip(self._parts, films_um, stages, strict=True)
         ])  # fmt: skip
 

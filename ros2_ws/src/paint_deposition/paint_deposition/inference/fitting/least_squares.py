@@ -13,7 +13,7 @@ from paint_deposition.inference.fitting.forward import Forward, Terms
 from paint_deposition.inference.fitting.halton import halton
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN
-from paint_deposition.kernel.accumulation import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
+from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
 
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3

@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.model.coordinates import PATTERN, Coordinate
-from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern
 
 PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigma2_m')
 COS, SIN = 2, 3

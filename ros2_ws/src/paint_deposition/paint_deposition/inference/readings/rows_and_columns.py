@@ -3,7 +3,7 @@
 import numpy as np
 
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 FEWEST_ON_A_LINE = 3

@@ -9,7 +9,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import TABLE, ColourScale
 from paint_deposition.nodes.runtime.messages import white_marker
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 STEPS = 64

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.film.colour_tables import COOLWARM, VIRIDIS
+from paint_deposition.film.colour_scales import COOLWARM, VIRIDIS
 from paint_deposition.report.style import ACCENT, BEFORE, GRID, INK, MUTED
 
 CLEAR = 'rgba(0,0,0,0)'

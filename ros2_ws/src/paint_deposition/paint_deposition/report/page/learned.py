@@ -8,12 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, Ray
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.effects.learned.place import LearnedMap, places_m
+from paint_deposition.kernel.laws import Ray
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
     FILM_COLOURS,

@@ -12,7 +12,7 @@ from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import spread_over_surface
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.axes import across_axis, downhill_axis
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, axis, base_layout

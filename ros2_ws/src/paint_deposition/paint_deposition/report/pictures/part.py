@@ -11,7 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.half_edges import edges_of
+from paint_deposition.part.edges import edges_of
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.seen_faces import seen_faces
 from paint_deposition.report.pictures.view import SNAP_COSINE, View

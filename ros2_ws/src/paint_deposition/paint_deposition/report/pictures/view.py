@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.part.axes import downhill_axis
+from paint_deposition.part.orientation import downhill_axis
 
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9

@@ -13,7 +13,7 @@ from paint_deposition.files.json_files import write_json
 from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.part.axes import across_axis
+from paint_deposition.part.orientation import across_axis
 from paint_deposition.report.writers.write import writable
 
 COLUMNS = (

@@ -8,7 +8,7 @@ import scipy
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field
 
-# A fit asks for a few patterns again and again, for each part and each effect that it varies.
+# A fit needs a few patterns again and again, for each part and each effect that it varies.
 PEAKS_KEPT = 64
 
 

@@ -4,15 +4,12 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 
-from paint_deposition.model.collapse import Collapse, ThreeGaussianCollapse
+from paint_deposition.model.eq3_collapse import Collapse
 
 # Points of the period in the collapse's finest scale; the rule converges faster than any power.
 POINTS_PER_SCALE = 8.0
 FEWEST_POINTS = 32
-# Fourier terms are summed until the spectrum of the narrowest Gaussian has fallen to this.
-SPECTRUM_LIMIT = 1e-16
 
 
 @dataclass(frozen=True)
@@ -100,21 +97,6 @@ class ParallelPasses:
         return [(self.first, 0.0), (self.second, index_m)]
 
 
-def sigma_n_closed_form(collapse: ThreeGaussianCollapse, index_m: float) -> float:
-    """Eq. (5) for eq. (3) without quadrature.
-
-    By Poisson's sum the film's Fourier coefficients are the collapse's spectrum at multiples of
-    2 pi / index, and by Parseval's theorem its variance is the sum of their squares.
-    """
-    most = math.sqrt(-2.0 * math.log(SPECTRUM_LIMIT)) / collapse.finest_m
-    terms = max(1, math.ceil(most * index_m / (2.0 * math.pi)))
-    omega = 2.0 * math.pi / index_m * np.arange(1, terms + 1)[:, np.newaxis]
-    damping = np.exp(-0.5 * (omega * collapse.sigmas_m) ** 2)
-    phases = np.exp(-1j * omega * collapse.centres_m)
-    spectrum = (collapse.gains_um_m / 3.0 * damping * phases).sum(axis=1)
-    return float(np.sqrt(2.0 * np.sum(np.abs(spectrum) ** 2)) / abs(collapse.area_um_m))
-
-
 @dataclass(frozen=True)
 class Variation:
     """A film between two limits.
@@ -135,9 +117,6 @@ def variation(passes: list[tuple[Collapse, float]], low_m: float, high_m: float)
         passes: each pass's collapse and where its line lies [m].
         low_m, high_m: limits [m], in the interior for eq. (5) to be approached.
     """
-    gaussians = [(c, at) for c, at in passes if isinstance(c, ThreeGaussianCollapse)]
-    if len(gaussians) == len(passes):
-        return _variation_of_gaussians(gaussians, low_m, high_m)
     finest = min(collapse.finest_m for collapse, _ in passes)
     panels = max(1, math.ceil((high_m - low_m) / finest))
     nodes, weights = np.polynomial.legendre.leggauss(6)
@@ -148,30 +127,3 @@ def variation(passes: list[tuple[Collapse, float]], low_m: float, high_m: float)
     film = np.sum([collapse.thickness_um(x - centre) for collapse, centre in passes], axis=0)
     mean = float(weight @ film)
     return Variation(mean, math.sqrt(float(weight @ (film - mean) ** 2)) / mean)
-
-
-def _variation_of_gaussians(
-    passes: list[tuple[ThreeGaussianCollapse, float]], low_m: float, high_m: float
-) -> Variation:
-    """Pairwise products of Gaussians are Gaussians, whose integrals are error functions."""
-    area = np.concatenate([c.gains_um_m for c, _ in passes]) / 3.0
-    sigma = np.concatenate([c.sigmas_m for c, _ in passes])
-    centre = np.concatenate([c.centres_m + at for c, at in passes])
-    width = high_m - low_m
-    mean = float(area @ _share_between(centre, sigma, low_m, high_m)) / width
-
-    squares = sigma**2
-    both = squares[:, np.newaxis] + squares
-    apart = centre[:, np.newaxis] - centre
-    overlap = np.exp(-0.5 * apart**2 / both) / np.sqrt(2.0 * math.pi * both)
-    middle = (centre[:, np.newaxis] * squares + centre * squares[:, np.newaxis]) / both
-    narrow = np.sqrt(squares[:, np.newaxis] * squares / both)
-    inside = _share_between(middle, narrow, low_m, high_m)
-    mean_square = float(area @ (overlap * inside) @ area) / width
-    return Variation(mean, math.sqrt(max(mean_square - mean**2, 0.0)) / mean)
-
-
-def _share_between(centre: np.ndarray, sigma: np.ndarray, low: float, high: float) -> np.ndarray:
-    """Share of normal distributions between two limits."""
-    low_end, high_end = ((end - centre) / (math.sqrt(2.0) * sigma) for end in (low, high))
-    return 0.5 * (scipy.special.erf(high_end) - scipy.special.erf(low_end))

@@ -1,4 +1,4 @@
-"""The hot loop: flux of eqs. (1) and (2) summed over sub-steps and surface points.
+"""Eq. (2), the hot loop: its flux with eq. (1) summed over sub-steps and surface points.
 
 Points come in blocks that lie together; a block out of the pattern's reach is skipped whole, and
 within a block the loop over points is one SIMD loop without calls or branches. Each point's sum
@@ -21,8 +21,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.fast_math import exp2
-from paint_deposition.kernel.laws import Law, product
-from paint_deposition.kernel.ray import Ray
+from paint_deposition.kernel.laws import Law, Ray, product
 
 # Columns of a sub-step's row: emission point, tool axes x and y times Omega, tool axis z, shift
 # of the pattern on the model plane, dwell times relative flow times Omega^2, speed.

@@ -7,8 +7,15 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints, listed
-from paint_deposition.model.brush_law import SETTINGS, BrushLaw
+from paint_deposition.model.brush import (
+    BETWEEN,
+    MOST_BETWEEN,
+    SETTINGS,
+    Brush,
+    BrushLaw,
+    SetPoints,
+    listed,
+)
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
@@ -16,8 +23,8 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 WHERE = 'set-points of the atomizer'
 
 
-def told_instead(model: DepositionModel, brush: int, set_points: Sequence[float]) -> bool:
-    """Whether set-points tell which of several brushes sprays, and no number does."""
+def uses_set_points(model: DepositionModel, brush: int, set_points: Sequence[float]) -> bool:
+    """Whether set-points say which of several brushes sprays, and no number does."""
     unnamed = brush == ONLY_BRUSH or brush >= BETWEEN
     return unnamed and len(model.brushes) > 1 and any(value > 0.0 for value in set_points)
 
@@ -29,19 +36,19 @@ def with_set_points(
 
     Args:
         model: with several brushes.
-        set_points: in the order of SETTINGS; those that are not above 0 are not told.
+        set_points: in the order of SETTINGS; those that are not above 0 are not known.
 
     Raises:
         ModelError: they lie outside the calibrated brushes, or one is missing.
     """
     given = zip(SETTINGS, set_points, strict=True)
-    told = {name: float(value) for name, value in given if value > 0.0}
+    known = {name: float(value) for name, value in given if value > 0.0}
     calibrated = tuple(brush for brush in model.brushes if not brush.interpolated)
-    wanted = SetPoints.model_construct(None, **told)
+    wanted = SetPoints.model_construct(None, **known)
     # First, for it refuses what lies outside and what is missing.
     planar = BrushLaw(calibrated).pattern(WHERE, wanted)
     for brush in model.brushes:
-        if all(getattr(brush, name) == value for name, value in told.items()):
+        if all(getattr(brush, name) == value for name, value in known.items()):
             return model, brush.number
     number = max(BETWEEN, model.brushes[-1].number + 1)
     if number >= BETWEEN + MOST_BETWEEN:
@@ -54,29 +61,26 @@ def with_set_points(
         for name in ('solids', 'density_g_per_cm3')
         if len({getattr(brush, name) for brush in calibrated}) == 1
     }
-    new = Brush(number=number, planar=planar, interpolated=True, **told, **paint)
+    new = Brush(number=number, planar=planar, interpolated=True, **known, **paint)
     return model.model_copy(update={'brushes': (*model.brushes, new)}), number
 
 
 def require_its_brush(model: DepositionModel, change: TriggerChange) -> None:
-    """Refuse a change that the model cannot paint with.
-
-    Raises:
-        ModelError: its brush is not there, or its set-points lie outside the calibrated ones.
-    """
-    if told_instead(model, change.brush, change.set_points):
+    """Refuse by ModelError a change whose brush or set-points the model cannot paint with."""
+    if uses_set_points(model, change.brush, change.set_points):
         with_set_points(model, change.set_points)
     else:
         model.require_brushes([change.brush])
 
 
-def taken_over(model: DepositionModel, before: DepositionModel) -> DepositionModel:
-    """Another model with the brushes that set-points stood for before, by the same numbers.
+def with_brushes_of(model: DepositionModel, before: DepositionModel) -> DepositionModel:
+    """A model with the brushes that set-points stood for before, by the same numbers.
 
     Raises:
         ModelError: they lie outside its calibrated brushes.
     """
-    old = [brush for brush in before.brushes if brush.number >= BETWEEN]
+    there = {brush.number for brush in model.brushes}
+    old = [b for b in before.brushes if b.number >= BETWEEN and b.number not in there]
     if not old or len(model.brushes) <= 1:
         return model
     law = BrushLaw(tuple(brush for brush in model.brushes if not brush.interpolated))
@@ -84,7 +88,7 @@ def taken_over(model: DepositionModel, before: DepositionModel) -> DepositionMod
     return model.model_copy(update={'brushes': (*model.brushes, *new)})
 
 
-def by_set_points(
+def with_interpolated_brushes(
     trajectory: Trajectory, model: DepositionModel
 ) -> tuple[Trajectory, DepositionModel]:
     """A motion with the brushes that its set-points stand for, and the model that has them.
@@ -96,7 +100,7 @@ def by_set_points(
         return trajectory, model
     brushes = [brush for *_, brush in trajectory.triggers]
     for row, set_points in enumerate(trajectory.trigger_set_points.tolist()):
-        if trajectory.trigger_flow[row] > 0.0 and told_instead(model, brushes[row], set_points):
+        if trajectory.trigger_flow[row] > 0.0 and uses_set_points(model, brushes[row], set_points):
             try:
                 model, brushes[row] = with_set_points(model, set_points)
             except ModelError as error:

@@ -1,7 +1,7 @@
 """The 1D collapse: the film that one long straight pass leaves, across the direction of travel.
 
-Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians. What the 2D model,
-eqs. (1) and (2), leaves on a plane that the gun faces squarely is in ``film/pass_film.py``.
+Eq. (3) of Conner et al. (IROS 2002) is a model of its own, three Gaussians. What eq. (1) leaves
+along a line of the model plane is here, too; with eq. (2) and effects see ``film/pass_film.py``.
 """
 
 import math
@@ -13,6 +13,8 @@ import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.interpolate import CubicSpline
 
+from paint_deposition.model.eq1_pattern import PlanarPattern
+
 # Film below this share of the peak is left out of sums over passes.
 NEGLIGIBLE = 1e-9
 HALF_WIDTH_POINTS = 4001
@@ -22,31 +24,22 @@ class Collapse(Protocol):
     """A film profile across the direction of travel."""
 
     def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
-        """Film [um] at distances x [m] from the line that the gun followed."""
-        ...
+        """Film [um] at distances x (...) [m] from the line that the gun followed."""
 
     @property
     def area_um_m(self) -> float:
         """Integral of the film over x [um m]."""
-        ...
 
     @property
     def reach_m(self) -> float:
         """Distance beyond which the film is negligible [m]."""
-        ...
 
     @property
     def finest_m(self) -> float:
         """Scale on which the film changes; quadrature needs a few points in it [m]."""
-        ...
-
-    def mirrored(self) -> 'Collapse':
-        """The same pass with left and right exchanged."""
-        ...
 
     def scaled(self, factor: float) -> 'Collapse':
         """All thicknesses times a factor."""
-        ...
 
 
 def half_width_m(collapse: Collapse) -> float:
@@ -120,24 +113,10 @@ class ThreeGaussianCollapse(BaseModel):
         gains = {f'K{k + 1}_um_m': factor * gain for k, gain in enumerate(self.gains_um_m)}
         return self.model_copy(update=gains)
 
-    def mirrored(self) -> 'ThreeGaussianCollapse':
-        """The same pass with left and right exchanged."""
-        return ThreeGaussianCollapse(
-            K1_um_m=self.K2_um_m, K2_um_m=self.K1_um_m, K3_um_m=self.K3_um_m,
-            r1_m=self.r2_m, r2_m=self.r1_m,
-            sigma1_m=self.sigma2_m, sigma2_m=self.sigma1_m, sigma3_m=self.sigma3_m,
-        )  # fmt: skip
-
 
 @dataclass(frozen=True)
 class SampledCollapse:
-    """A profile given at a row of distances, zero beyond them; a cubic spline in between.
-
-    Attributes:
-        x_m: (N,) increasing [m].
-        film_um: (N,) [um]; next to nothing at both ends.
-        finest_m: scale on which it changes [m].
-    """
+    """A profile at (N,) rising distances, next to nothing at both ends; a cubic spline between."""
 
     x_m: np.ndarray
     film_um: np.ndarray
@@ -163,10 +142,56 @@ class SampledCollapse:
         """Distance beyond which there is no film [m]."""
         return float(np.abs(self.x_m[[0, -1]]).max())
 
-    def mirrored(self) -> 'SampledCollapse':
-        """The same pass with left and right exchanged."""
-        return SampledCollapse(-self.x_m[::-1], self.film_um[::-1].copy(), self.finest_m)
-
     def scaled(self, factor: float) -> 'SampledCollapse':
         """All thicknesses times a factor."""
         return SampledCollapse(self.x_m, factor * self.film_um, self.finest_m)
+
+
+# Nodes of the line integral in the narrower standard deviation: trapezoids of a Gaussian with
+# three of them are exact to 1e-15.
+NODES_PER_SIGMA = 4.0
+
+
+def line_integral_um_m_per_s(
+    planar: PlanarPattern, across_m: np.ndarray, travel_rad: float = 0.0
+) -> np.ndarray:
+    """(N,) eq. (1) integrated over lines of the model plane [um m/s].
+
+    The part of f that is odd along a line integrates to zero. What is left of it is smooth in u
+    with distance along the line = |across| sinh(u), though not in the distance itself.
+
+    Args:
+        across_m: (N,) distances of the lines from the centre, positive along tool z times travel.
+        travel_rad: direction of the lines in the tool's x-y frame.
+    """
+    p = planar
+    across = np.abs(np.atleast_1d(across_m)).astype(float)
+    far = p.radius_of_flux_m(1e-14)
+    step = p.sigma1_m / NODES_PER_SIGMA
+    along = step * np.arange(math.ceil(far / step) + 1)
+    ring = _even_sum(p.g1(across[:, np.newaxis], along), step)
+    # f is strongest at right angles to phi, ahead of it.
+    lopsided = p.K3 * math.cos(travel_rad - p.phi_rad)
+    if lopsided:
+        side = np.sign(across_m).reshape(across.shape) * lopsided
+        ring = ring + side * _ring_over_radius(p, across, far)
+    centre = np.exp(-0.5 * (across / p.sigma2_m) ** 2) / (p.sigma2_m * math.sqrt(2.0 * math.pi))
+    film = p.K1_cm3_per_s * ((1.0 - p.K2) * ring + p.K2 * centre)
+    return film.reshape(np.shape(across_m))
+
+
+def _ring_over_radius(p: PlanarPattern, across: np.ndarray, far: float) -> np.ndarray:
+    """|across| times the line integral of g1 over the radius; it vanishes at the centre."""
+    off_centre = np.maximum(across, 1e-12 * far)
+    step = p.sigma1_m / NODES_PER_SIGMA / far
+    u = step * np.arange(math.ceil(math.asinh(1e12) / step) + 1)
+    result = np.empty(len(across))
+    for row, distance in enumerate(off_centre):
+        used = u[: math.ceil(math.asinh(far / distance) / step) + 1]
+        result[row] = distance * _even_sum(p.g1(distance * np.cosh(used), 0.0), step)
+    return result
+
+
+def _even_sum(values: np.ndarray, step: float) -> np.ndarray:
+    """Trapezoids over the whole line for an even function sampled from 0 on, last axis."""
+    return step * (2.0 * values.sum(axis=-1) - values[..., 0])

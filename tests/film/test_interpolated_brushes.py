@@ -10,11 +10,10 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
-from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints
-from paint_deposition.model.brush_law import BrushLaw
+from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, BrushLaw, SetPoints
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
@@ -37,7 +36,7 @@ def motion(*changes: tuple[float, int, tuple[float, ...]]) -> Trajectory:
 
 
 def offline_um(given: Trajectory, model: DepositionModel = MODEL) -> np.ndarray:
-    numbered, known = by_set_points(given, model)
+    numbered, known = with_interpolated_brushes(given, model)
     known.require_brushes(numbered.brushes)
     path, _ = spray_path(numbered, 0.25, known.max_step_m)
     integrator = FilmIntegrator(lying_plane(), known)
@@ -117,13 +116,6 @@ def test_a_number_counts_more_than_set_points():
     assert np.array_equal(offline_um(told), offline_um(by_number))
 
 
-def test_a_model_of_one_pattern_paints_whatever_is_set():
-    one = DepositionModel()
-    told = motion((1.0, 0, OUTSIDE), (0.8, 0, MIDDLE), (0.0, 0, UNTOLD))
-    untold = replace(told, trigger_set_points=np.empty((0, 4)))
-    assert np.array_equal(offline_um(told, one), offline_um(untold, one))
-
-
 @pytest.mark.parametrize(
     ('set_points', 'words'),
     [
@@ -160,7 +152,7 @@ def test_a_bag_keeps_set_points_and_paint_tells_them_apart(tmp_path):
     read = read_trajectory(write_pose_bag(tmp_path / 'run', CHANGING), None, '/atomizer/state')
     assert np.array_equal(np.nan_to_num(read.trigger_set_points), CHANGING.trigger_set_points)
     assert np.array_equal(offline_um(read), offline_um(CHANGING))
-    numbered, known = by_set_points(read, MODEL)
+    numbered, known = with_interpolated_brushes(read, MODEL)
     assert numbered.notes[-1].endswith('set-points lie between brushes 1, 2 (2 different)')
     assert model_digest(known) == model_digest(MODEL)
     path, _ = spray_path(numbered)

@@ -1,0 +1,165 @@
+"""Edges of a mesh: which triangles share one, what hangs together, how far an edge is away.
+
+Half-edge h = 3 f + k runs from corner k of triangle f to its next corner.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+# Points whose neighbours are looked for at once.
+BLOCK = 4096
+# Pieces of edges so short that the nearest has one of the nearest middles [m].
+PIECE_M = 0.002
+CANDIDATES = 4
+# Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
+SEAM_M = 3e-4
+SEAM_COSINE = -0.9
+
+
+def half_edges_by_edge(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Sort the half-edges of (F, 3) faces so that those of one edge follow one another.
+
+    Returns:
+        (3 F,) half-edges by lower vertex, higher vertex and number; (E, 2) the edges' vertices,
+        lower first; (E + 1,) where in the half-edges those of each edge begin.
+    """
+    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    base = int(start.max(initial=0)) + 1
+    key = np.minimum(start, end) * base + np.maximum(start, end)
+    order = np.argsort(key, kind='stable')
+    key = key[order]
+    first = np.flatnonzero(np.diff(key, prepend=-1))
+    edges = np.stack(np.divmod(key[first], base), axis=1)
+    return order, edges, np.append(first, len(key))
+
+
+def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(E, 2) ends of the edges, lower first and in order, and (F, 3) which leaves each corner."""
+    order, edges, first = half_edges_by_edge(faces)
+    of_half_edge = np.empty(len(order), dtype=np.int64)
+    of_half_edge[order] = np.repeat(np.arange(len(edges)), np.diff(first))
+    return edges, of_half_edge.reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class Edges:
+    """Which half-edges lie on each other.
+
+    Attributes:
+        paired: (E, 2) of two triangles with the same winding, in the order of their vertices.
+        clashing: (C, 2) of two triangles of opposite winding.
+        single: (B,) those without a partner, or with several.
+    """
+
+    paired: np.ndarray
+    clashing: np.ndarray
+    single: np.ndarray
+
+    @staticmethod
+    def of(faces: np.ndarray) -> 'Edges':
+        """Match the edges of (F, 3) faces."""
+        order, _, first = half_edges_by_edge(faces)
+        count = np.diff(first)
+        two = first[:-1][count == 2]
+        pairs = np.stack([order[two], order[two + 1]], axis=1)
+        corners = faces.ravel()
+        opposed = corners[pairs[:, 0]] != corners[pairs[:, 1]]
+        single = np.sort(order[np.repeat(count != 2, count)])
+        return Edges(pairs[opposed], pairs[~opposed], single)
+
+
+def next_half_edge(half_edges: np.ndarray) -> np.ndarray:
+    """The half-edge that follows in the same triangle."""
+    return half_edges - half_edges % 3 + (half_edges + 1) % 3
+
+
+def half_edges_m(vertices_m: np.ndarray, faces: np.ndarray, half_edges: np.ndarray) -> np.ndarray:
+    """(H, 2, 3) ends of half-edges [m]."""
+    corners = faces.ravel()
+    return vertices_m[np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)]
+
+
+def connected(pairs: np.ndarray, count: int) -> tuple[int, np.ndarray]:
+    """How many groups (P, 2) pairs make of ``count`` members, and (count,) the group of each.
+
+    Groups are numbered in the order of their first members.
+    """
+    links = np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])
+    graph = scipy.sparse.coo_array(links, shape=(count, count))
+    return scipy.sparse.csgraph.connected_components(graph, directed=False)
+
+
+def near_pairs(
+    points_m: np.ndarray, others_m: np.ndarray, radius_m: float
+) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:
+    """Pairs of points and others within a radius, a block of points at a time.
+
+    Yields:
+        The block, and of each pair the row in the block, the row of the other and the distance.
+    """
+    tree = scipy.spatial.cKDTree(others_m)
+    for start in range(0, len(points_m), BLOCK):
+        block = slice(start, start + BLOCK)
+        near = scipy.spatial.cKDTree(points_m[block]).sparse_distance_matrix(
+            tree, radius_m, output_type='ndarray'
+        )
+        yield block, near['i'], near['j'], near['v']
+
+
+def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
+    """(N,) straight distance to the nearest of the (B, 2, 3) rim segments, inf without any [m]."""
+    if not len(rim_m):
+        return np.full(len(points_m), np.inf)
+    pieces = cut_segments(rim_m, PIECE_M)[0]
+    middles = scipy.spatial.cKDTree(pieces.mean(axis=1))
+    near = middles.query(points_m, k=min(CANDIDATES, len(pieces)))[1]
+    near = near.reshape(len(points_m), -1)
+    return _distance_m(points_m[:, None, :], pieces[near]).min(axis=1)
+
+
+def without_seams(segments_m: np.ndarray) -> np.ndarray:
+    """Leave out edges of triangles along which another patch continues the surface.
+
+    Args:
+        segments_m: (B, 2, 3) unpaired edges, each in the sense in which its triangle runs [m]:
+            the two sides of a seam run against each other.
+    """
+    if not len(segments_m):
+        return segments_m
+    pieces, segment = cut_segments(segments_m, PIECE_M)
+    middles = segments_m.mean(axis=1)
+    reach_m = 0.5 * PIECE_M + SEAM_M
+    near = scipy.spatial.cKDTree(middles).sparse_distance_matrix(
+        scipy.spatial.cKDTree(pieces.mean(axis=1)), reach_m, output_type='ndarray'
+    )
+    one, piece = near['i'], near['j']
+    along = segments_m[:, 1] - segments_m[:, 0]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    against = np.einsum('ni,ni->n', along[one], along[segment[piece]]) < SEAM_COSINE
+    touching = _distance_m(middles[one], pieces[piece]) < SEAM_M
+    free = np.ones(len(segments_m), dtype=bool)
+    free[one[against & touching]] = False
+    return segments_m[free]
+
+
+def _distance_m(points_m: np.ndarray, segments_m: np.ndarray) -> np.ndarray:
+    """(...) distances of points (..., 3) from segments (..., 2, 3) [m]."""
+    way = points_m - segments_m[..., 0, :]
+    along = segments_m[..., 1, :] - segments_m[..., 0, :]
+    length2 = np.maximum(np.sum(along * along, axis=-1), 1e-30)
+    share = np.clip(np.sum(way * along, axis=-1) / length2, 0.0, 1.0)
+    return np.linalg.norm(way - share[..., None] * along, axis=-1)
+
+
+def cut_segments(segments_m: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Equal pieces (P, 2, 3) no longer than wanted of (B, 2, 3) segments, and (P,) whose."""
+    along = segments_m[:, 1] - segments_m[:, 0]
+    count = np.maximum(1, np.ceil(np.linalg.norm(along, axis=1) / longest_m)).astype(int)
+    segment = np.repeat(np.arange(len(segments_m)), count)
+    step = np.arange(len(segment)) - np.repeat(np.cumsum(count) - count, count)
+    ends = (step[:, None] + np.array([0.0, 1.0])) / count[segment][:, None]
+    start = segments_m[segment, 0][:, None, :]
+    return start + ends[:, :, None] * along[segment][:, None, :], segment
