@@ -192,8 +192,9 @@ def _copy(
                 elif isinstance(inner, Message):
                     # The chunk that introduced the channel may be among the damaged ones.
                     channel = survey.channels.get(inner.channel_id)
-                    wanted = channel and (not topics or channel.topic in topics)
-                    if wanted and _is_kept(channel, survey, writer, recovery):
+                    if channel is None or (topics and channel.topic not in topics):
+                        continue
+                    if _is_kept(channel, survey, writer, recovery):
                         writer.write(channel.topic, inner.data, inner.log_time, inner.publish_time)
             on_bytes(stream.tell() - position)
             position = stream.tell()

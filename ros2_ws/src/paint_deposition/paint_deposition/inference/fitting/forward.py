@@ -180,7 +180,7 @@ class _Part:
             )  # fmt: skip
         integrator.use(model)
         moving = tuple(e for e in model.effects if _defines(e, ('on_path',)))
-        return integrator, self._steps(slope, model.projection, moving, model.shadow > 0.0)
+        return integrator, self._steps(slope, model.projection, moving, max(model.shadows) > 0.0)
 
     def _prepared(self, slope: bool, *_: object) -> Steps:
         """The path as the integrator's effects have it."""
