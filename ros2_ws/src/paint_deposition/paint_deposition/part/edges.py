@@ -19,26 +19,30 @@ SEAM_M = 3e-4
 SEAM_COSINE = -0.9
 
 
-def half_edges_by_edge(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def half_edges_by_edge(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Sort the half-edges of (F, 3) faces so that those of one edge follow one another.
 
     Returns:
-        (3 F,) half-edges by lower vertex, higher vertex and number; (E, 2) the edges' vertices,
-        lower first; (E + 1,) where in the half-edges those of each edge begin.
+        (3 F,) half-edges by lower vertex, higher vertex and number, and (E + 1,) where among them
+        those of each edge begin.
     """
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    base = int(start.max(initial=0)) + 1
-    key = np.minimum(start, end) * base + np.maximum(start, end)
+    start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
+    key = np.minimum(start, end)
+    key *= int(start.max(initial=0)) + 1
+    key += np.maximum(start, end)
     order = np.argsort(key, kind='stable')
     key = key[order]
-    first = np.flatnonzero(np.diff(key, prepend=-1))
-    edges = np.stack(np.divmod(key[first], base), axis=1)
-    return order, edges, np.append(first, len(key))
+    begins = np.ones(len(key), dtype=bool)
+    begins[1:] = key[1:] != key[:-1]
+    return order, np.append(np.flatnonzero(begins), len(key))
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(E, 2) ends of the edges, lower first and in order, and (F, 3) which leaves each corner."""
-    order, edges, first = half_edges_by_edge(faces)
+    order, first = half_edges_by_edge(faces)
+    half_edges, corners = order[first[:-1]], faces.ravel()
+    edges = np.stack([corners[half_edges], corners[next_half_edge(half_edges)]], axis=1)
+    edges.sort(axis=1)
     of_half_edge = np.empty(len(order), dtype=np.int64)
     of_half_edge[order] = np.repeat(np.arange(len(edges)), np.diff(first))
     return edges, of_half_edge.reshape(-1, 3)
@@ -61,7 +65,7 @@ class Edges:
     @staticmethod
     def of(faces: np.ndarray) -> 'Edges':
         """Match the edges of (F, 3) faces."""
-        order, _, first = half_edges_by_edge(faces)
+        order, first = half_edges_by_edge(faces)
         count = np.diff(first)
         two = first[:-1][count == 2]
         pairs = np.stack([order[two], order[two + 1]], axis=1)

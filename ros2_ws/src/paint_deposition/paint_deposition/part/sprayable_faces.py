@@ -106,7 +106,7 @@ def _places(surface: Surface) -> np.ndarray:
 
 def _neighbours(surface: Surface) -> np.ndarray:
     """(N, 2) triangles that share an edge."""
-    half_edges, _, first = half_edges_by_edge(_places(surface)[surface.faces])
+    half_edges, first = half_edges_by_edge(_places(surface)[surface.faces])
     follows = np.ones(len(half_edges), dtype=bool)
     follows[first[:-1]] = False
     same = np.flatnonzero(follows)
