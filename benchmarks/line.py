@@ -39,15 +39,15 @@ from tests.virtual_paint_shop.line import (  # noqa: E402
 from tests.virtual_paint_shop.shop import Campaign as Job  # noqa: E402
 
 from paint_deposition.batch.cluster.finished import Finished  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
-from paint_deposition.files.gauge_readings import read_readings  # noqa: E402
-from paint_deposition.files.meshes import read_mesh  # noqa: E402
-from paint_deposition.files.motion_files import read_recording  # noqa: E402
 from paint_deposition.batch.line.causes import pooled  # noqa: E402
 from paint_deposition.batch.line.change_points import changes_of  # noqa: E402
 from paint_deposition.batch.line.job import line_cases  # noqa: E402
 from paint_deposition.batch.line.measured import Measured, measured_parts  # noqa: E402
 from paint_deposition.batch.line.series import series_of  # noqa: E402
+from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
+from paint_deposition.files.gauge_readings import read_readings  # noqa: E402
+from paint_deposition.files.meshes import read_mesh  # noqa: E402
+from paint_deposition.files.motion_files import read_recording  # noqa: E402
 from paint_deposition.model.pattern import PlanarPattern  # noqa: E402
 from paint_deposition.model.projection import Projection  # noqa: E402
 from paint_deposition.motion.path_builder import spray_path  # noqa: E402

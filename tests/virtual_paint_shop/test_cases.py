@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from .cases import GUESSED, KINDS, MESH_EDGES_M, READINGS, SIZES, draw_case, paint
+from worlds.record import KINDS
+
+from .amounts import true_amounts
+from .cases import GUESSED, MESH_EDGES_M, READINGS, SIZES, draw_case, paint
 from .gauge import GaugeNoise, measure, mistyped
 from .truths import library
 
@@ -79,13 +82,24 @@ def test_slips_are_those_of_fingers():
     assert found - {312.0, 13.2} == {10.0 * k + 1.2 for k in range(10) if k != 3}
 
 
+def test_amounts_are_compared_where_they_mean_the_same():
+    hidden = {'id': 'gun_wake', 'form': 'even', 'amplitude': 0.02}
+    assert true_amounts(hidden, [4]) == {'gun_wake.lag_s': 0.02}
+    step = {'id': 'flow_drift', 'form': 'step', 'amplitude': 0.02}
+    assert true_amounts(step, [4]) == {}
+    amount = true_amounts(step | {'form': ''}, [4])['flow_drift.drift_per_pass']
+    assert amount == pytest.approx(0.02, rel=0.02)
+
+
 @pytest.mark.slow
-def test_a_painted_case_knows_the_mark_of_each_effect():
-    case = draw_case(11, 'pair', ('gauge_zero', 'overspray_fog'))
-    case = replace(case, layout=('panel', 'door'))
-    campaign = paint(case, parcels=200_000)
-    assert [e.name for e in campaign.experiments] == list(case.layout)
-    for experiment in campaign.experiments:
-        table = experiment.readings
-        assert np.allclose(table.marks_um, case.amplitudes)
-        assert np.allclose(table.expected_um - table.clean_um, sum(case.amplitudes))
+def test_a_painted_case_knows_how_visible_each_effect_is():
+    case = draw_case(11, 'pair', ('gauge_zero', 'edge_build'))
+    quiet = GaugeNoise(floor_um=0.5, relative=0.0, session_offset_um=0.3, texture=0.01, level=0.02)
+    case = replace(case, layout=('panel', 'door'), amplitudes=(6.0, 0.6), noise=quiet, readings=80)
+    one, other = (paint(11, 'pair', case=c, parcels=100_000) for c in (
+        case, replace(case, amplitudes=(6.0, 1.2))))  # fmt: skip
+    assert one.hidden == ('gauge_zero', 'edge_build')
+    assert [p.name for p in one.parts] == list(case.layout)
+    assert min(one.strengths) > 1.0
+    assert other.strengths[0] == pytest.approx(one.strengths[0], rel=0.1)
+    assert 1.6 < other.strengths[1] / one.strengths[1] < 2.1

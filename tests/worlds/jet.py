@@ -569,8 +569,9 @@ def paint(
     runs = [draw_run(rng, plate, bell, film, standoff, bool(rng.random() < 0.35),
                      roll + np.pi * (rng.random() < 0.3), close)
             for plate, standoff in zip(plates, standoffs, strict=True)]  # fmt: skip
-    noise = Noise(rng.uniform(0.3, 0.9), rng.uniform(0.0, 0.012), rng.uniform(0.004, 0.02),
-                  rng.uniform(0.01, 0.05), rng.uniform(0.01, 0.05), rng.uniform(0.2, 0.8))  # fmt: skip
+    ranges = {'gauge_um': (0.3, 0.9), 'share': (0.0, 0.012), 'texture': (0.004, 0.02),
+              'reach_m': (0.01, 0.05), 'level': (0.01, 0.05), 'zero_um': (0.2, 0.8)}  # fmt: skip
+    noise = Noise(**{name: float(rng.uniform(*limits)) for name, limits in ranges.items()})
     times = int(rng.choice([0, 1, 2, 3], p=[0.4, 0.1, 0.35, 0.15]))  # 0: noise is stated
     readings = int(rng.uniform(50.0, 280.0) / count)
     parts, marks, pattern, own, sigma = [], [], [], [], []

@@ -22,7 +22,9 @@ SAME_AMOUNT = {'air_drift': ('square', 'carried'), 'gun_wake': ('even',)}
 
 
 def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
-    """Parameter values that stand for a truth; none where the laws cannot be compared.
+    """Values of parameters, `effect.parameter`, that stand for a truth.
+
+    None where the laws cannot be compared.
 
     Args:
         hidden: the truth's entry in ``truth.json``.
@@ -31,24 +33,24 @@ def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
     amplitude, truth = hidden['amplitude'], hidden['id']
     if hidden['form'] and hidden['form'] not in SAME_AMOUNT.get(truth, ()):
         return {}
-    if truth == 'tcp_offset':
-        angle = hidden['direction_rad']
-        return {
-            'offset_x_m': amplitude * np.cos(angle),
-            'offset_y_m': amplitude * np.sin(angle),
-        }
-    if truth == 'tcp_tilt':
-        angle = hidden['axis_rad']
-        return {'tilt_x_rad': amplitude * np.cos(angle), 'tilt_y_rad': amplitude * np.sin(angle)}
-    if truth == 'air_drift':
+    found: dict[str, float] = {}
+    if truth in ('tcp_offset', 'tcp_tilt'):
+        angle = hidden['direction_rad' if truth == 'tcp_offset' else 'axis_rad']
+        names = (
+            ('offset_x_m', 'offset_y_m') if truth == 'tcp_offset' else ('tilt_x_rad', 'tilt_y_rad')
+        )
+        found = dict(zip(names, amplitude * np.array([np.cos(angle), np.sin(angle)]), strict=True))
+    elif truth == 'air_drift':
         # The surface faces +y, so that its right side, seen by the gun, is -x.
         x, _, z = hidden['direction']
-        return {'shift_down_m': -amplitude * z, 'shift_across_m': -amplitude * x}
-    if truth == 'sag':
-        return {'run_m': amplitude / SAG_REFERENCE_UM}
-    if truth == 'flow_drift':
-        return {'drift_per_pass': float(np.mean([_growth(amplitude, n) for n in passes]))}
-    return {NAMES[truth]: amplitude} if truth in NAMES else {}
+        found = {'shift_down_m': -amplitude * z, 'shift_across_m': -amplitude * x}
+    elif truth == 'sag':
+        found = {'run_m': amplitude / SAG_REFERENCE_UM}
+    elif truth == 'flow_drift':
+        found = {'drift_per_pass': np.mean([_growth(amplitude, n) for n in passes])}
+    elif truth in NAMES:
+        found = {NAMES[truth]: amplitude}
+    return {f'{truth}.{name}': float(value) for name, value in found.items()}
 
 
 def _growth(drift: float, passes: int) -> float:
