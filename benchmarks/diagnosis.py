@@ -35,7 +35,7 @@ from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
 from worlds.record import KINDS, Painted  # noqa: E402
 
 WORLDS = {
-    'droplets': 'virtual_paint_shop.cases',
+    'droplets': 'worlds.droplets',
     'semi_real': 'worlds.semi_real',
     'jet': 'worlds.jet',
 }

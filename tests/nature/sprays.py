@@ -116,10 +116,7 @@ def _start(chosen: dict[Spray, np.ndarray], plane_m: float) -> dict:
     spread_m = float(np.sqrt(np.average(offset_m**2, weights=film_um)))
     planar = {'K1_cm3_per_s': volume, 'K2': 0.3, 'K3': 0.0, 'phi_rad': 0.0, 'r_m': spread_m,
               'sigma1_m': 0.5 * spread_m, 'sigma2_m': spread_m}  # fmt: skip
-    return {
-        'planar': planar,
-        'projection': {'model_plane_m': plane_m, 'emission_offset_m': 0.0},
-    }
+    return {'planar': planar, 'projection': {'model_plane_m': plane_m, 'emission_offset_m': 0.0}}
 
 
 def _write_panel(path: Path, frame: np.ndarray) -> None:

@@ -5,28 +5,17 @@ A case fixes the parts, the gun's path, the hidden cause and the gauge.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import block_diag
 
-from worlds.record import Painted, Part, detectability
-
-from .amounts import true_amounts
-from .conner import film_um
-from .draw import draw_jobs, stream
-from .gauge import GaugeNoise, measure
-from .jobs import Job
-from .parcels import Pattern
-from .shop import Campaign, Experiment, generate
+from .draw import stream
+from .gauge import GaugeNoise
+from .shop import Campaign, generate
 from .truths import Truth, library
 
 # Kernels of 12 mm probes then scatter by 0.4 % of the film, against a texture of 0.5 to 1.5 %.
-PARCELS, TRACED = 4_000_000, 0.004
-OFFSET_M = 0.05
-# Standard deviations of what a judge takes as free in a pattern; of lengths and volumes a share.
-FREE = {'K1_cm3_per_s': 0.5, 'K2': 0.2, 'K3': 0.2, 'phi_rad': 0.6, 'r_m': 0.25, 'sigma1_m': 0.25,
-        'sigma2_m': 0.25}  # fmt: skip
+PARCELS = 4_000_000
 SIZES = (0.5, 8.0)  # in typical sizes of the effect
 # The library's typical sizes are guesses: those of this shop are off by up to this factor.
 GUESSED = 2.0
@@ -85,50 +74,8 @@ def amplitude(truth: type[Truth], rng: np.random.Generator) -> float:
     return float(truth.of_size(guess * _log_uniform(rng, *SIZES), rng))
 
 
-def paint(
-    seed: int,
-    kind: str,
-    effects: tuple[str, ...] | None = None,
-    case: Case | None = None,
-    parcels: int = PARCELS,
-) -> Painted:
-    """A case painted and measured, with what a judge of a diagnosis needs to know.
-
-    Args:
-        effects: names of what is hidden, instead of a draw.
-        case: this one instead of the one of seed and kind.
-    """
-    case = draw_case(seed, kind, effects) if case is None else case
-    painted = _painted(case, parcels)
-    known, rng = library(), stream(seed, 61)
-    pattern, jobs = draw_jobs(
-        seed, [known[name](0.0) for name in case.truths], case.layout, OFFSET_M, None
-    )
-    parts, rows = [], []
-    for experiment, job in zip(painted.experiments, jobs, strict=True):
-        part, columns = _measured(case, experiment, rng)
-        table = experiment.readings
-        first = np.unique(table.point, return_index=True)[1]
-        slopes = _pattern_slopes_um(pattern, job, table.positions_m[first], table.normals[first])
-        parts.append(part)
-        rows.append((*columns, slopes))
-    marks, sigma, own, slopes = zip(*rows, strict=True)
-    free = np.hstack([np.concatenate(slopes), block_diag(*own)])
-    strengths = detectability(np.concatenate(marks), free, np.concatenate(sigma))
-    hidden = painted.truth['hidden']
-    passes = [job.plan.passes for job in jobs]
-    noise_from = 'stated' if case.stated else 'repeats'
-    return Painted(
-        'droplets', seed, kind, tuple(name.partition('~')[0] for name in case.truths),
-        tuple(parts), float(strengths[0]), tuple(strengths[1:].tolist()),
-        true_amounts(hidden[0], passes) if len(hidden) == 1 else {},
-        case.noise.level, case.noise.session_offset_um,
-        {'shape': 'conner', 'noise_from': noise_from, 'truths': case.truths,
-         'amplitudes': case.amplitudes, 'mesh_edge_m': case.mesh_edge_m},
-    )  # fmt: skip
-
-
-def _painted(case: Case, parcels: int) -> Campaign:
+def paint(case: Case, parcels: int = PARCELS) -> Campaign:
+    """The case's parts with their films; the noise in their readings is one draw of many."""
     each = -(-case.readings // len(case.layout))
     return generate(
         case.seed,
@@ -142,45 +89,6 @@ def _painted(case: Case, parcels: int) -> Campaign:
         parcels=parcels,
         mesh_edge_m=case.mesh_edge_m,
     )
-
-
-def _measured(
-    case: Case, experiment: Experiment, rng: np.random.Generator
-) -> tuple[Part, tuple[np.ndarray, ...]]:
-    """The part as read in one session, and marks, noise and own freedom of its points [um]."""
-    noise, table, unseen = case.noise, experiment.readings, experiment.heldout
-    session = measure(table.point, table.film_um, table.expected_um, noise, rng)
-    log, texture = experiment.log, np.hypot(noise.texture, TRACED)
-    part = Part(
-        experiment.name, experiment.vertices_m, experiment.faces, log.stamps_ns, log.positions_m,
-        log.quaternions_xyzw, log.trigger_stamps_ns, log.trigger_on, table.positions_m,
-        table.point, session.thickness_um, table.sigma_um if case.stated else None,
-        unseen.positions_m,
-        unseen.film_um * (session.level - 1.0) + unseen.expected_um + session.offset_um,
-        np.hypot(noise.sigma_um(unseen.expected_um), texture * unseen.film_um),
-    )  # fmt: skip
-    _, first, count = np.unique(table.point, return_index=True, return_counts=True)
-    film, marks = table.film_um[first], table.marks_um[first]
-    together = (table.expected_um - table.clean_um)[first]
-    gauge = noise.sigma_um(table.expected_um[first]) / np.sqrt(count)
-    own = np.column_stack([noise.level * film, np.full(film.size, noise.session_offset_um)])
-    sigma = np.hypot(gauge, texture * film)
-    return part, (np.column_stack([together, marks]), sigma, own)
-
-
-def _pattern_slopes_um(
-    pattern: Pattern, job: Job, points_m: np.ndarray, normals: np.ndarray
-) -> np.ndarray:
-    """(P, 7) change of the film with the pattern's parameters, each in its standard deviation."""
-    plain = film_um(pattern, job.motion, points_m, normals, 0.05)
-    columns = []
-    for name, deviation in FREE.items():
-        value = getattr(pattern, name)
-        step = 0.02 * deviation * (value if name.endswith(('_m', '_s')) else 1.0)
-        bent = film_um(replace(pattern, **{name: value + step}), job.motion, points_m, normals,
-                       0.05)  # fmt: skip
-        columns.append((bent - plain) / 0.02)
-    return np.stack(columns, axis=1)
 
 
 def _drawn_truths(kind: str, rng: np.random.Generator) -> tuple[str, ...]:

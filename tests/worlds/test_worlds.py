@@ -1,10 +1,14 @@
 """The worlds paint by eq. (2) where nothing is hidden, and by laws of their own else."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import paint_deposition as pd
-from worlds import jet, semi_real
+from virtual_paint_shop.cases import draw_case
+from virtual_paint_shop.gauge import GaugeNoise
+from worlds import droplets, jet, semi_real
 from worlds.record import KINDS, detectability
 
 WIDTH_M, FLOW = 0.09, 1.5
@@ -106,3 +110,26 @@ def test_a_mark_that_what_is_free_explains_is_not_detectable():
     assert inside < 0.01
     left = other - free @ np.linalg.lstsq(free, other, rcond=None)[0]
     assert alone == pytest.approx(np.linalg.norm(left) / 0.5, rel=1e-3)
+
+
+def test_amounts_are_compared_where_they_mean_the_same():
+    hidden = {'id': 'gun_wake', 'form': 'even', 'amplitude': 0.02}
+    assert droplets.true_amounts(hidden, [4]) == {'gun_wake.lag_s': 0.02}
+    step = {'id': 'flow_drift', 'form': 'step', 'amplitude': 0.02}
+    assert droplets.true_amounts(step, [4]) == {}
+    amount = droplets.true_amounts(step | {'form': ''}, [4])['flow_drift.drift_per_pass']
+    assert amount == pytest.approx(0.02, rel=0.02)
+
+
+@pytest.mark.slow
+def test_a_painted_case_knows_how_visible_each_effect_is():
+    case = draw_case(11, 'pair', ('gauge_zero', 'edge_build'))
+    quiet = GaugeNoise(floor_um=0.5, relative=0.0, session_offset_um=0.3, texture=0.01, level=0.02)
+    case = replace(case, layout=('panel', 'door'), amplitudes=(6.0, 0.6), noise=quiet, readings=80)
+    one, other = (droplets.paint(11, 'pair', case=c, parcels=100_000) for c in (
+        case, replace(case, amplitudes=(6.0, 1.2))))  # fmt: skip
+    assert one.hidden == ('gauge_zero', 'edge_build')
+    assert [p.name for p in one.parts] == list(case.layout)
+    assert min(one.strengths) > 1.0
+    assert other.strengths[0] == pytest.approx(one.strengths[0], rel=0.1)
+    assert 1.6 < other.strengths[1] / one.strengths[1] < 2.1
