@@ -66,10 +66,13 @@ def interval(
         low = beta.ppf(0.025, hits, trials - hits + 1) if hits else 0.0
         high = beta.ppf(0.975, hits + 1, trials - hits) if hits < trials else 1.0
         return float(low), float(high)
-    statistic = np.mean if statistic is None else statistic
     rng = np.random.default_rng(0)
     picks = rng.integers(len(groups), size=(RESAMPLED, len(groups)))
-    found = [statistic(np.concatenate([groups[k] for k in pick])) for pick in picks]
+    if statistic is None:
+        sums, counts = (np.array([of(group) for group in groups]) for of in (np.sum, np.size))
+        found = sums[picks].sum(axis=1) / counts[picks].sum(axis=1)
+    else:
+        found = [statistic(np.concatenate([groups[k] for k in pick])) for pick in picks]
     low, high = np.quantile(found, [0.025, 0.975])
     return float(low), float(high)
 

@@ -54,6 +54,7 @@ def test_with_nothing_hidden_the_film_follows_eq_2(world, seed, tmp_path):
         assert np.abs(columns @ solved - part.unseen_um).max() < 0.005 * predicted.max()
 
 
+@pytest.mark.slow
 @worlds
 @pytest.mark.parametrize('kind', KINDS)
 def test_a_seed_gives_one_campaign_of_its_kind(world, kind):
@@ -71,6 +72,7 @@ def test_a_seed_gives_one_campaign_of_its_kind(world, kind):
         assert one.strength > 0.0
 
 
+@pytest.mark.slow
 @worlds
 def test_every_effect_changes_the_readings(world):
     names = semi_real.EFFECTS if world is semi_real else [
