@@ -20,7 +20,7 @@ from virtual_paint_shop.gauge import measure
 from virtual_paint_shop.jobs import Job
 from virtual_paint_shop.parcels import Pattern
 from virtual_paint_shop.shop import Experiment
-from virtual_paint_shop.truths import library
+from virtual_paint_shop.truths import choose
 
 from .record import Painted, Part, detectability
 
@@ -58,10 +58,9 @@ def paint(
     """
     case = draw_case(seed, kind, effects) if case is None else case
     painted = paint_case(case, parcels)
-    known, rng = library(), stream(seed, 61)
-    pattern, jobs = draw_jobs(
-        seed, [known[name](0.0) for name in case.truths], case.layout, OFFSET_M, None
-    )
+    rng, amplitudes = stream(case.seed, 61), dict(zip(case.truths, case.amplitudes, strict=True))
+    truths = choose(list(case.truths), stream(case.seed, 1), amplitudes)
+    pattern, jobs = draw_jobs(case.seed, truths, case.layout, OFFSET_M, None)
     parts, rows = [], []
     for experiment, job in zip(painted.experiments, jobs, strict=True):
         part, columns = _measured(case, experiment, rng)
