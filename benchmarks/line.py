@@ -18,8 +18,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-from benchmarks.campaigns import model_of
-from benchmarks.records import ROOT
+from benchmarks.records import ROOT, model_of
 from tests.reference import reference_film_um
 from tests.virtual_paint_shop.draw import stream
 from tests.virtual_paint_shop.gauge import measure

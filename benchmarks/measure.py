@@ -14,8 +14,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-from benchmarks.campaigns import model_of
-from benchmarks.records import add, kept, results_option
+from benchmarks.records import add, kept, model_of, results_option
 from tests.virtual_paint_shop.bench import Bench
 from tests.virtual_paint_shop.draw import draw_jobs, stream
 from tests.virtual_paint_shop.gauge import GaugeNoise, measure

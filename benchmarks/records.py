@@ -11,6 +11,9 @@ from distributed import as_completed
 from tqdm import tqdm
 
 from paint_deposition.batch.cluster import workers
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -58,3 +61,10 @@ def _importable(run: Callable) -> Callable:
         return run
     module = sys.modules['__main__'].__spec__.name
     return getattr(importlib.import_module(module), run.__name__)
+
+
+def model_of(values: dict[str, float]) -> DepositionModel:
+    """The model of a pattern of the shop, by name."""
+    planar = PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields})
+    sizes = {name: values[name] for name in ('model_plane_m', 'emission_offset_m')}
+    return DepositionModel(planar=planar, projection=Projection(**sizes))

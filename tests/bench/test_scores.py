@@ -2,20 +2,25 @@
 
 import numpy as np
 import pytest
-from benchmarks.amounts import true_amounts
 from benchmarks.scores import (
     Row,
+    expected_calibration_error,
+    failures,
+    groups,
     interval,
     mistakes,
+    named_all,
     naming,
     reliability,
+    table,
+    wrong,
 )
 
 
 def result(case, **fields):
     return {
         'case': case,
-        'redraw': 0,
+        'world': 'jet',
         'unseen': [2.0, 1.1],
         'kind': 'effect',
         'hidden': ['edge_build'],
@@ -25,21 +30,26 @@ def result(case, **fields):
         'strength': 10.0,
         'strengths': [10.0],
         'readings': 100,
-        'bic': [],
         'unknown': None,
+        'amounts': [],
+        'seconds': 3.0,
+        'facts': {'shape': 'round', 'noise_from': 'stated'},
     } | fields
 
 
-RIGHT = result('a', accepted=['edge_build'], classes=[[['edge_build', 'corner_slowdown'], 0.9]])
-LISTED = result('b', verdict='undecided', classes=[[['edge_build'], 0.5], [['sag'], 0.3]])
+def group(probability, *members):
+    return [list(members), probability, members[0]]
+
+
+RIGHT = result('a', accepted=['edge_build'], classes=[group(0.9, 'edge_build', 'corner_slowdown')])
+LISTED = result('b', verdict='undecided', classes=[group(0.5, 'edge_build'), group(0.3, 'sag')])
 WRONG = result(
     'c',
     accepted=['sag', 'learned:time_s'],
-    classes=[[['sag'], 0.97], [['learned:time_s'], 1.0], [['edge_build'], 0.1]],
-    bic=['edge_build', 'sag'],
+    classes=[group(0.97, 'sag'), group(1.0, 'learned:time_s'), group(0.1, 'edge_build')],
 )
 BLAMED = result(
-    'd', kind='unknown', hidden=['unknown:x'], accepted=['sag'], classes=[[['sag'], 0.85]]
+    'd', kind='unknown', hidden=['unknown:x'], accepted=['sag'], classes=[group(0.85, 'sag')]
 )
 
 
@@ -48,34 +58,45 @@ def found(rows, label):
     return [value for _, value in row.values]
 
 
+def test_groups_are_those_accepted_and_no_learned_laws():
+    assert groups(RIGHT) == [{'edge_build', 'corner_slowdown'}]
+    assert groups(LISTED) == []
+    assert groups(WRONG) == [{'sag'}]
+    assert wrong(RIGHT) == []
+    assert wrong(WRONG) == [{'sag'}]
+
+
 def test_naming_counts_accepted_groups_of_strong_effects():
     rows = naming([RIGHT, LISTED, WRONG, BLAMED, result('e', strength=3.0)])
     assert found(rows, 'effect in the group named, over 8 sd') == [True, False, False]
     assert found(rows, 'named or listed') == [True, True, True]
     assert found(rows, 'named at 2 to 4 sd') == [False]
-    assert found(rows, 'stepwise BIC, first chosen') == [False, False, True]
 
 
 def test_a_pair_counts_where_both_are_strong():
     pair = {'kind': 'pair', 'hidden': ['sag', 'edge_build'], 'strengths': [9.0, 20.0]}
-    both = result(
-        'p',
-        accepted=['sag', 'edge_build'],
-        classes=[[['sag'], 1.0], [['edge_build'], 1.0]],
-        **pair,
-    )
+    classes = [group(1.0, 'sag'), group(1.0, 'edge_build')]
+    both = result('p', accepted=['sag', 'edge_build'], classes=classes, **pair)
     one = {**WRONG, **pair}
     weak = both | {'strengths': [7.0, 20.0]}
     rows = naming([both, one, weak])
+    assert named_all(both)
     assert found(rows, 'both of two effects, each over 8 sd') == [True, False]
     assert found(rows, 'at least one') == [True, True]
-    assert found(rows, 'stepwise BIC, both') == [False, True]
 
 
 def test_mistakes_are_counted_per_campaign():
     rows = mistakes([RIGHT, LISTED, WRONG, BLAMED])
     assert found(rows, 'wrong effects accepted, per campaign') == [0, 0, 1, 1]
     assert found(rows, 'unknown cause blamed on an effect') == [True]
+
+
+def test_failures_are_strong_causes_not_named_and_effects_wrongly_accepted():
+    weak = result('e', strength=3.0)
+    crash = {'case': 'f', 'kind': 'clean', 'error': 'ValueError: x'}
+    lines = failures([RIGHT, LISTED, WRONG, BLAMED, weak, crash]).splitlines()
+    assert [line[0] for line in lines] == ['f', 'b', 'c', 'd']
+    assert '6 campaigns, 1 errors' in table([RIGHT, LISTED, WRONG, BLAMED, weak, crash])
 
 
 def test_reliability_compares_stated_with_observed():
@@ -87,6 +108,21 @@ def test_reliability_compares_stated_with_observed():
     assert 'apart by 38 points' in high
     (top,) = (line for line in lines if line.startswith('  0.95 to 1.00'))
     assert '1 in 1' in top
+
+
+def test_the_calibration_error_is_weighted_by_groups():
+    # Bins: 0.1 right; 0.3 wrong; 0.5 right; 0.9 right and 0.85 wrong; 0.97 wrong.
+    error, count = expected_calibration_error([RIGHT, LISTED, WRONG, BLAMED])
+    assert count == 6
+    assert error == pytest.approx((0.9 + 0.3 + 0.5 + 2 * 0.375 + 0.97) / 6)
+
+
+def test_more_values_of_one_campaign_do_not_narrow_an_interval():
+    once = [(str(k), float(k % 3 == 0)) for k in range(30)]
+    often = [value for value in once for _ in range(20)]
+    np.testing.assert_allclose(interval(once), interval(often), atol=0.06)
+    apart = [(f'{case} {k}', value) for k, (case, value) in enumerate(often)]
+    assert np.ptp(interval(apart)) < 0.35 * np.ptp(interval(once))
 
 
 def test_an_interval_covers_as_often_as_it_says():
@@ -106,12 +142,3 @@ def test_never_is_not_known_from_few_campaigns():
     values = [(str(k % 3), 0.0) for k in range(60)]
     assert interval(values) == pytest.approx((0.0, 1.0 - 0.025 ** (1 / 3)))
     assert 'none' in str(Row('nothing', []))
-
-
-def test_amounts_are_compared_where_they_mean_the_same():
-    hidden = {'id': 'gun_wake', 'form': 'even', 'amplitude': 0.02}
-    assert true_amounts(hidden, [4]) == {'lag_s': 0.02}
-    step = {'id': 'flow_drift', 'form': 'step', 'amplitude': 0.02}
-    assert true_amounts(step, [4]) == {}
-    amount = true_amounts(step | {'form': ''}, [4])['drift_per_pass']
-    assert amount == pytest.approx(0.02, rel=0.02)

@@ -119,14 +119,8 @@ class Part:
     def edge_distance(self, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         """Distance to the nearest free edge seen from the front (negative outside), metres."""
         lean = np.hypot(1.0, self.taper_m / self.height_m)
-        return np.minimum.reduce(
-            [
-                0.5 * self.width_m - x,
-                (x - self.left(z)) / lean,
-                z + 0.0 * x,
-                self.height_m - z + 0.0 * x,
-            ]
-        )
+        beside = 0.5 * self.width_m - x, (x - self.left(z)) / lean
+        return np.minimum.reduce([*beside, z + 0.0 * x, self.height_m - z + 0.0 * x])
 
     def surface_mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (v, 3) and faces (f, 3) of the surface alone, normals toward the gun."""
@@ -137,13 +131,8 @@ class Part:
         x = self.left(z) + share * (0.5 * self.width_m - self.left(z))
         vertices = self.point(x, z + 0.0 * x).reshape(-1, 3)
         i = (np.arange(rows - 1)[:, None] * columns + np.arange(columns - 1)[None, :]).ravel()
-        faces = np.concatenate(
-            [
-                np.stack([i, i + columns, i + 1], 1),
-                np.stack([i + 1, i + columns, i + columns + 1], 1),
-            ]
-        )
-        return vertices, faces
+        lower, upper = (i, i + columns, i + 1), (i + 1, i + columns, i + columns + 1)
+        return vertices, np.concatenate([np.stack(lower, 1), np.stack(upper, 1)])
 
     def mesh(self, edge_m: float = 0.012) -> tuple[np.ndarray, np.ndarray]:
         """The surface and whatever stands in front of it, as one mesh."""
@@ -159,45 +148,20 @@ def draw_door(rng: np.random.Generator) -> Part:
     height = rng.uniform(0.70, 1.00)
     ridge_slope, ridge_radius = rng.uniform(0.10, 0.28), rng.uniform(0.08, 0.25)
     hollow_slope, hollow_radius = rng.uniform(0.20, 0.45), rng.uniform(0.15, 0.40)
+    ridge_at, hollow_at = height * rng.uniform(0.48, 0.64), height * rng.uniform(0.22, 0.34)
     bends = [
-        Bend(
-            'z',
-            height * rng.uniform(0.48, 0.64),
-            -1.0,
-            -ridge_slope,
-            ridge_slope * ridge_radius / 4,
-        ),
-        Bend(
-            'z',
-            height * rng.uniform(0.22, 0.34),
-            -1.0,
-            hollow_slope,
-            hollow_slope * hollow_radius / 4,
-        ),
+        Bend('z', ridge_at, -1.0, -ridge_slope, ridge_slope * ridge_radius / 4),
+        Bend('z', hollow_at, -1.0, hollow_slope, hollow_slope * hollow_radius / 4),
     ]
     width = rng.uniform(0.90, 1.30)
     if rng.random() < 0.4:
         slope = rng.choice([-1.0, 1.0]) * rng.uniform(0.06, 0.16)
         radius = rng.uniform(0.10, 0.30)
-        bends.append(
-            Bend(
-                'x',
-                width * rng.uniform(-0.3, 0.3),
-                rng.choice([-1.0, 1.0]),
-                slope,
-                abs(slope) * radius / 4,
-            )
-        )
-    return Part(
-        'door',
-        width,
-        height,
-        crown_x_m=rng.uniform(3.0, 8.0),
-        crown_z_m=rng.uniform(1.5, 4.0),
-        twist=rng.uniform(-0.04, 0.04),
-        taper_m=rng.uniform(0.0, 0.08),
-        bends=tuple(bends),
-    )
+        at, side = width * rng.uniform(-0.3, 0.3), rng.choice([-1.0, 1.0])
+        bends.append(Bend('x', at, side, slope, abs(slope) * radius / 4))
+    crowns = rng.uniform(3.0, 8.0), rng.uniform(1.5, 4.0)
+    twist, taper = rng.uniform(-0.04, 0.04), rng.uniform(0.0, 0.08)
+    return Part('door', width, height, *crowns, twist, taper, tuple(bends))
 
 
 def flat_panel(width_m: float, height_m: float) -> Part:

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_edt
 from .doors import OUTLINE_MARGIN_M, Part
 from .parcels import Parcels
 
-PROBE_RADIUS_M = 0.012
+PROBE_RADIUS_M, BELL_RADIUS_M = 0.012, 0.025
 GRID_M = 0.004
 _NEWTON_STEPS = 8
 # a cached kernel remembers its module's name; pytest may import this folder under a shorter one
@@ -78,36 +78,10 @@ def _surface(x, z, x0, z0, step, fields):
 
 @_compiled
 def _fly(
-    tcp0,
-    tcp1,
-    turn0,
-    turn1,
-    drift,
-    count,
-    px,
-    py,
-    mobility,
-    narrowing,
-    growth,
-    plane,
-    offset,
-    bell_radius,
-    x0,
-    z0,
-    step,
-    fields,
-    points,
-    cx0,
-    cz0,
-    cell,
-    starts,
-    members,
-    cells_x,
-    cells_z,
-    far,
-    radius,
-    capacity,
-):
+    tcp0, tcp1, turn0, turn1, drift, count, px, py, mobility, narrowing, growth, plane, offset,
+    bell_radius, x0, z0, step, fields, points, cx0, cz0, cell, starts, members, cells_x, cells_z,
+    far, radius, capacity,
+):  # fmt: skip
     hit_point = np.empty(capacity, np.int32)
     hit_slice = np.empty(capacity, np.int32)
     hit_moment = np.empty(capacity)
@@ -119,18 +93,14 @@ def _fly(
     for k in range(tcp0.shape[0]):
         for emitted in range(count[k]):
             m = (emitted + 0.5) / count[k]
-            qx, qy, wide, carried = (
-                px[parcel],
-                py[parcel],
-                1.0 - narrowing[parcel],
-                mobility[parcel],
-            )
+            qx, qy = px[parcel], py[parcel]
+            wide, carried = 1.0 - narrowing[parcel], mobility[parcel]
             parcel = parcel + 1 if parcel + 1 < pool else 0
             for a in range(3):
                 for b in range(3):
                     c[a, b] = turn0[k, a, b] + m * (turn1[k, a, b] - turn0[k, a, b])
                 o[a] = tcp0[k, a] + m * (tcp1[k, a] - tcp0[k, a]) - offset * c[a, 2]
-            bx, by, bz = (carried * drift[k, 0], carried * drift[k, 1], carried * drift[k, 2])
+            bx, by, bz = carried * drift[k, 0], carried * drift[k, 1], carried * drift[k, 2]
             # slope of the flight per metre along the tool's axis, and its intercept there
             fx = (c[0, 0] * qx + c[0, 1] * qy) * wide / plane + c[0, 2]
             fy = (c[1, 0] * qx + c[1, 1] * qy) * wide / plane + c[1, 2]
@@ -151,11 +121,8 @@ def _fly(
                     bending = growth * bent / (share * (1.0 - start_share) * plane)
                 else:
                     bent, bending = 0.0, 0.0
-                x, y, z = (
-                    gx + axial * fx + bx * bent,
-                    gy + axial * fy + by * bent,
-                    gz + axial * fz + bz * bent,
-                )
+                x, y = gx + axial * fx + bx * bent, gy + axial * fy + by * bent
+                z = gz + axial * fz + bz * bent
                 ex, ey, ez = fx + bx * bending, fy + by * bending, fz + bz * bending
                 make_surface, slope_x, slope_z = _surface(x, z, x0, z0, step, fields)
                 miss = y - make_surface
@@ -208,15 +175,9 @@ def _fly(
 
 
 def fly(
-    part: Part,
-    slices: Slices,
-    parcels: Parcels,
-    air: Air,
-    points_m: np.ndarray,
-    model_plane_m: float,
-    emission_offset_m: float,
-    parcels_total: int,
-) -> Landings:
+    part: Part, slices: Slices, parcels: Parcels, air: Air, points_m: np.ndarray,
+    model_plane_m: float, emission_offset_m: float, parcels_total: int,
+) -> Landings:  # fmt: skip
     """Trace about `parcels_total` parcels and keep those that land within a probe.
 
     Each slice emits parcels in proportion to its duration, taken in turn from the pool, one
@@ -230,43 +191,19 @@ def fly(
     capacity = max(int(0.02 * parcels_total), 1000)
     while True:
         found, point, k, moment, hits = _fly(
-            slices.tcp_0_m,
-            slices.tcp_1_m,
-            slices.turn_0,
-            slices.turn_1,
-            air.drift_m,
-            count,
-            parcels.x_m,
-            parcels.y_m,
-            parcels.mobility,
-            air.narrowing,
-            air.growth,
-            model_plane_m,
-            emission_offset_m,
-            0.025,
-            x0,
-            z0,
-            GRID_M,
-            fields,
-            points_m,
-            *cells,
-            PROBE_RADIUS_M,
-            capacity,
-        )
+            slices.tcp_0_m, slices.tcp_1_m, slices.turn_0, slices.turn_1, air.drift_m, count,
+            parcels.x_m, parcels.y_m, parcels.mobility, air.narrowing, air.growth, model_plane_m,
+            emission_offset_m, BELL_RADIUS_M, x0, z0, GRID_M, fields, points_m, *cells,
+            PROBE_RADIUS_M, capacity,
+        )  # fmt: skip
         if found >= 0:
             break
         capacity *= 3
     point, k, moment, hits = point[:found], k[:found], moment[:found], hits[:found]
     flow = slices.flow_0_cm3_per_s[k] * (1 - moment) + slices.flow_1_cm3_per_s[k] * moment
-    return Landings(
-        point,
-        hits[:, 0] * flow * (duration / count)[k],
-        slices.time_0_s[k] + moment * duration[k],
-        hits[:, 1:4],
-        hits[:, 4],
-        hits[:, 5],
-        hits[:, 6:9],
-    )
+    film, time_s = hits[:, 0] * flow * (duration / count)[k], slices.time_0_s[k]
+    time_s = time_s + moment * duration[k]
+    return Landings(point, film, time_s, hits[:, 1:4], hits[:, 4], hits[:, 5], hits[:, 6:9])
 
 
 def film_um(landings: Landings, points: int, kept: np.ndarray | float = 1.0) -> np.ndarray:

@@ -145,34 +145,19 @@ def scatter(
 
 
 def tabulate(
-    part: Part,
-    spots: Spots,
-    film: np.ndarray,
-    expected: np.ndarray,
-    clean: np.ndarray,
-    marks: np.ndarray,
-    noise: GaugeNoise,
-    offset: float,
-    rng: np.random.Generator,
-) -> Readings:
+    part: Part, spots: Spots, film: np.ndarray, expected: np.ndarray, clean: np.ndarray,
+    marks: np.ndarray, noise: GaugeNoise, offset: float, rng: np.random.Generator,
+) -> Readings:  # fmt: skip
     """One row per reading: first every point once, then the repeats."""
     rounds = [np.flatnonzero(spots.repeats > n) for n in range(spots.repeats.max())]
     row = np.concatenate(rounds)
-    positions = part.point(spots.x_m, spots.z_m)
-    normals = part.normal(spots.x_m, spots.z_m)
     names = np.array([f'P{n + 1:03d}' for n in range(spots.x_m.size)])
+    at, normals = (of(spots.x_m, spots.z_m) for of in (part.point, part.normal))
     return Readings(
-        names[row],
-        spots.group[row],
-        positions[row],
-        normals[row],
-        noise.read(expected[row], rng, offset),
-        noise.sigma_um(expected[row]),
-        film[row],
-        expected[row],
-        clean[row],
-        marks[row],
-    )
+        names[row], spots.group[row], at[row], normals[row],
+        noise.read(expected[row], rng, offset), noise.sigma_um(expected[row]), film[row],
+        expected[row], clean[row], marks[row],
+    )  # fmt: skip
 
 
 def keep_clear(part: Part, spots: Spots) -> Spots:

@@ -127,11 +127,9 @@ def draw_plan(
 def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
     """Serpentine passes from the top down (or the left on), joined by rounded links."""
     stretches, ends = [], []
-    along = (
-        (-0.5 * part.width_m, 0.5 * part.width_m)
-        if plan.direction == 'horizontal'
-        else (0.0, part.height_m)
-    )
+    along = (0.0, part.height_m)
+    if plan.direction == 'horizontal':
+        along = (-0.5 * part.width_m, 0.5 * part.width_m)
     for number in range(plan.passes):
         rank = plan.passes - 1 - number if plan.from_below else number
         place = (0.5 * (plan.passes - 1) - rank) * plan.index_m
@@ -201,11 +199,8 @@ def moved(
     motion: Motion, tcp_m: np.ndarray | None = None, turn: np.ndarray | None = None
 ) -> Motion:
     """The same timing with other poses."""
-    return replace(
-        motion,
-        tcp_m=motion.tcp_m if tcp_m is None else tcp_m,
-        turn=motion.turn if turn is None else turn,
-    )
+    poses = {'tcp_m': tcp_m, 'turn': turn}
+    return replace(motion, **{name: one for name, one in poses.items() if one is not None})
 
 
 def orthonormal(turn: np.ndarray) -> np.ndarray:
@@ -226,13 +221,8 @@ def _pass(
         x, z = np.full_like(knots, -place), knots
     on_x = np.clip(x, -0.5 * part.width_m, 0.5 * part.width_m)
     on_z = np.clip(z, 0.0, part.height_m)
-    normal = np.mean(
-        [
-            part.normal(on_x, np.clip(on_z + d, 0.0, part.height_m))
-            for d in (-0.06, -0.03, 0.0, 0.03, 0.06)
-        ],
-        axis=0,
-    )
+    near = [np.clip(on_z + d, 0.0, part.height_m) for d in (-0.06, -0.03, 0.0, 0.03, 0.06)]
+    normal = np.mean([part.normal(on_x, z_near) for z_near in near], axis=0)
     square = np.array([0.0, 1.0, 0.0])
     axis = -((1.0 - plan.follow) * square + plan.follow * normal)
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
@@ -263,11 +253,9 @@ def _in_time(stretches: list, ends: list, plan: Plan) -> Motion:
     axis = gaussian_filter1d(np.concatenate(axes), 12.0, axis=0, mode='nearest')
     path = np.concatenate([[0.0], np.cumsum(_steps(tcp))])
     corners = path[np.flatnonzero(np.diff(number) != 0)]
-    reversal = (
-        np.min(np.abs(path[:, None] - corners[None, :]), axis=1)
-        if corners.size
-        else (np.full(path.size, np.inf))
-    )
+    reversal = np.full(path.size, np.inf)
+    if corners.size:
+        reversal = np.min(np.abs(path[:, None] - corners[None, :]), axis=1)
     speed = plan.speed_m_per_s * (1.0 - 0.5 * np.exp(-((reversal / 0.03) ** 2)))
     time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
     across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])

@@ -43,6 +43,17 @@ class Campaign:
     truth: dict
 
 
+@dataclass(frozen=True)
+class Taking:
+    """How a part is measured."""
+
+    readings: int
+    repeats: int
+    heldout: int
+    style: str | None  # None for any
+    noise: GaugeNoise
+
+
 def generate(
     seed: int,
     truth: str | list[str] | None = None,
@@ -78,22 +89,10 @@ def generate(
     truths = choose(truth, stream(seed, 1), amplitude, scale)
     pattern, jobs = draw_jobs(seed, truths, experiments, emission_offset_m, gun, follow)
     brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
+    jobs = [replace(job, plan=replace(job.plan, brushes=tuple(brushes))) for job in jobs]
+    taking = Taking(readings, repeats, heldout, style, noise)
     painted = [
-        _paint(
-            seed,
-            n,
-            replace(job, plan=replace(job.plan, brushes=tuple(brushes))),
-            pattern,
-            truths,
-            readings,
-            repeats,
-            heldout,
-            style,
-            noise,
-            parcels,
-            mesh_edge_m,
-            brushes,
-        )
+        _paint(seed, n, job, pattern, truths, taking, parcels, mesh_edge_m, brushes)
         for n, job in enumerate(jobs)
     ]
     return _campaign(seed, pattern, painted, truths, brushes)
@@ -134,33 +133,20 @@ def panel_study(
     )
     part = flat_panel(0.6, 2 * index_m + 0.5)
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
-    painted = [
-        _paint(
-            seed, 0, job, pattern, truths, readings, repeats, heldout, 'columns', noise, parcels
-        )
-    ]
+    taking = Taking(readings, repeats, heldout, 'columns', noise)
+    painted = [_paint(seed, 0, job, pattern, truths, taking, parcels)]
     return _campaign(seed, pattern, painted, truths)
 
 
 def _paint(
-    seed: int,
-    number: int,
-    job: Job,
-    pattern: Pattern,
-    truths: list[Truth],
-    readings: int,
-    repeats: int,
-    heldout: int,
-    style: str | None,
-    noise: GaugeNoise,
-    parcels: int,
-    mesh_edge_m: float = 0.012,
-    brushes: dict[int, Pattern] | None = None,
-) -> Experiment:
-    rng = stream(seed, 40 + number)
-    style = style or str(rng.choice(['columns', 'rows', 'random']))
-    spots = keep_clear(job.part, layout(job.part, style, readings, repeats, rng))
-    x, z = scatter(job.part, heldout, rng, 0.015)
+    seed: int, number: int, job: Job, pattern: Pattern, truths: list[Truth], taking: Taking,
+    parcels: int, mesh_edge_m: float = 0.012, brushes: dict[int, Pattern] | None = None,
+) -> Experiment:  # fmt: skip
+    rng, noise = stream(seed, 40 + number), taking.noise
+    style = taking.style or str(rng.choice(['columns', 'rows', 'random']))
+    spots = layout(job.part, style, taking.readings, taking.repeats, rng)
+    spots = keep_clear(job.part, spots)
+    x, z = scatter(job.part, taking.heldout, rng, 0.015)
     others = keep_clear(job.part, Spots(x, z, np.full(x.size, ''), np.ones(x.size, int)))
     at_x = np.concatenate([spots.x_m, others.x_m])
     at_z = np.concatenate([spots.z_m, others.z_m])
@@ -177,29 +163,11 @@ def _paint(
     offset = noise.session_offset_um * rng.normal()
     tables = []
     for chosen, part in ((spots, slice(0, first)), (others, slice(first, None))):
-        tables.append(
-            tabulate(
-                job.part,
-                chosen,
-                film[part],
-                expected[part],
-                clean[part],
-                marks[part],
-                noise,
-                offset,
-                rng,
-            )
-        )
-    vertices, faces = job.part.mesh(mesh_edge_m)
+        films = film[part], expected[part], clean[part], marks[part]
+        tables.append(tabulate(job.part, chosen, *films, noise, offset, rng))
+    log = record(job.motion, job.plan.sample_s, rng)
     return Experiment(
-        job.name,
-        job.part,
-        job.plan,
-        vertices,
-        faces,
-        record(job.motion, job.plan.sample_s, rng),
-        *tables,
-        visible,
+        job.name, job.part, job.plan, *job.part.mesh(mesh_edge_m), log, *tables, visible
     )
 
 
@@ -227,14 +195,8 @@ def _campaign(
 
 
 def _facts(e: Experiment) -> dict:
-    plan = e.plan
-    return {
-        'direction': plan.direction,
-        'index_m': plan.index_m,
-        'passes': plan.passes,
-        'standoff_m': plan.standoff_m,
-        'speed_m_per_s': plan.speed_m_per_s,
-        'gun_margin_m': plan.gun_margin_m,
+    named = ('direction', 'index_m', 'passes', 'standoff_m', 'speed_m_per_s', 'gun_margin_m')
+    return {name: getattr(e.plan, name) for name in named} | {
         'poses': len(e.log.stamps_ns),
         'readings': len(e.readings),
         'mean_film_um': float(e.readings.film_um.mean()),

@@ -91,6 +91,7 @@ def test_clean_film_on_a_door_is_equation_2():
     assert np.std(film - theory) < 0.3
 
 
+@pytest.mark.slow
 def test_parcels_land_where_embree_finds_the_surface():
     rng = np.random.default_rng(2)
     door = draw_door(rng)

@@ -31,6 +31,11 @@ class Scene:
     nominal: Motion  # as logged
 
 
+def between(**limits: tuple) -> dict[str, tuple]:
+    """Ranges of parameters, by name."""
+    return limits
+
+
 @dataclass(frozen=True)
 class Truth:
     """The neutral truth: nothing is hidden."""
@@ -45,6 +50,8 @@ class Truth:
     most = np.inf  # largest amplitude that a shop would still paint with
     unit = ''
     sign = 'positive'  # 'positive', 'negative' or 'either'
+    ranges = between()  # of further parameters: low, high and, of several, how many
+    of_covariates: tuple[str, ...] = ()  # members that are functions of covariates alone
 
     @classmethod
     def draw(
@@ -68,7 +75,7 @@ class Truth:
 
     @classmethod
     def details(cls, rng: np.random.Generator) -> dict:
-        return {}
+        return {name: rng.uniform(*limits) for name, limits in cls.ranges.items()}
 
     def staging(self) -> dict:
         """What the shop must arrange so that the effect can occur at all."""
@@ -124,31 +131,36 @@ def changes_flight(truth: Truth) -> bool:
     )
 
 
+def variant(base: type[Truth], form: str, why: str, **members: object) -> type[Truth]:
+    """Another form of an effect's law: `members` in the place of the base's, `why` in words."""
+    plain_members = {
+        name: staticmethod(one) if callable(one) and name in base.of_covariates else one
+        for name, one in members.items()
+    }
+    kind = type(
+        f'{base.__name__.strip("_")}_{form}',
+        (base,),
+        {'form': form, '__doc__': why} | plain_members,
+    )
+    _VARIANTS.append(kind)
+    return kind
+
+
+# A class remembers its subclasses weakly.
+_VARIANTS: list[type[Truth]] = []
+
+
 def library() -> dict[str, type[Truth]]:
     """All truths by name: ids of the effects, 'id~form', 'unknown:...' and 'footprint:...'."""
-    from . import (
-        footprints,
-        forms_film,
-        forms_gun,
-        forms_landing,
-        truths_film,
-        truths_gun,
-        truths_landing,
-        unknowns,
-    )
+    from . import strange, truths_film, truths_gun, truths_landing  # noqa: F401
 
-    modules = (truths_gun, truths_landing, truths_film, unknowns, footprints)
-    modules += (forms_gun, forms_landing, forms_film)
-    found = [
-        c
-        for m in modules
-        for c in vars(m).values()
-        if isinstance(c, type)
-        and issubclass(c, Truth)
-        and c.__module__ == m.__name__
-        and not c.__name__.startswith('_')
-    ]
-    return {c.name(): c for c in found}
+    found, left = {}, [Truth]
+    while left:
+        one = left.pop(0)
+        left += one.__subclasses__()
+        if one is not Truth and not one.__name__.startswith('_'):
+            found[one.name()] = one
+    return found
 
 
 def choose(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import RectBivariateSpline
 
-from .truths import KAPPA_REF_PER_M, Truth
+from .truths import KAPPA_REF_PER_M, Truth, between, variant
 
 SAG_REFERENCE_UM = 20.0
 
@@ -18,6 +18,7 @@ class Sag(Truth):
 
     id, family, typical, unit = 'sag', 'lateral shift', 0.06, 'um m'
     most = 0.5
+    power, yield_um = 3.0, 0.0
 
     def on_film(self, film_um, x, z, scene, film_at):
         part = scene.part
@@ -32,15 +33,18 @@ class Sag(Truth):
         return film_um + change.ev(x, z)
 
     def run_down(self, film_um, dz_m):
-        return run_down(film_um, dz_m, self.amplitude)
+        return run_down(film_um, dz_m, self.amplitude, self.power, self.yield_um)
+
+
+variant(Sag, 'yield',
+        'Paint with a yield stress: only film above 8 um runs, and then like a thinner one.',
+        yield_um=8.0)  # fmt: skip
+variant(Sag, 'shear_thinning', 'A power-law fluid of index 0.6: flux ~ T^(2 + 1 / 0.6).',
+        power=2.0 + 1.0 / 0.6)  # fmt: skip
 
 
 def run_down(
-    film_um: np.ndarray,
-    dz_m: float,
-    volume_um_m: float,
-    power: float = 3.0,
-    yield_um: float = 0.0,
+    film_um: np.ndarray, dz_m: float, volume_um_m: float, power: float = 3.0, yield_um: float = 0.0
 ) -> np.ndarray:
     """Film (columns, heights bottom to top) after running down.
 
@@ -67,6 +71,16 @@ class OversprayFog(Truth):
         return film_um + self.amplitude
 
 
+class FogThinsOut(OversprayFog):
+    """A cloud over the part's middle that thins out towards its sides by a third."""
+
+    form = 'thins_out'
+
+    def on_film(self, film_um, x, z, scene, film_at):
+        side = np.abs(x) / (0.5 * scene.part.width_m)
+        return film_um + self.amplitude * (1.0 - 0.35 * side**2)
+
+
 class FogGradient(Truth):
     """Overspray that settles more below: a (1 - height share)^1.5."""
 
@@ -75,7 +89,25 @@ class FogGradient(Truth):
 
     def on_film(self, film_um, x, z, scene, film_at):
         share = np.clip(z / scene.part.height_m, 0.0, 1.0)
-        return film_um + self.amplitude * (1.0 - share) ** 1.5
+        return film_um + self.amplitude * self.settled(share)
+
+    def settled(self, share: np.ndarray) -> np.ndarray:
+        return (1.0 - share) ** 1.5
+
+
+variant(FogGradient, 'exponential',
+        "Fog that is used up on its way down from the exhaust's eddy: e-fold over a third.",
+        settled=lambda self, share: np.exp(-3.0 * share))  # fmt: skip
+
+
+class FogLayer(FogGradient):
+    """A layer of fog over the floor that reaches up to some height of the part."""
+
+    form = 'layer'
+    ranges = between(top=(0.25, 0.6))
+
+    def settled(self, share):
+        return 1.0 / (1.0 + np.exp((share - self.drawn['top']) / 0.07))
 
 
 class GaugeGain(Truth):
@@ -105,8 +137,22 @@ class GaugeCurvatureBias(Truth):
     """
 
     id, family, typical, unit = 'gauge_curvature_bias', 'curvature', 1.2, 'um'
-    most = 6.0
+    most, probe_m = 6.0, 0.005
+    of_covariates = ('too_much',)
 
     def on_gauge(self, film_um, x, z, scene):
-        low, high = scene.part.curvature_over(x, z, 0.005)
-        return film_um - 2.0 * self.amplitude * np.tanh(0.5 * (low + high) / KAPPA_REF_PER_M)
+        low, high = scene.part.curvature_over(x, z, self.probe_m)
+        return film_um + self.amplitude * self.too_much((low + high) / KAPPA_REF_PER_M)
+
+    @staticmethod
+    def too_much(k: np.ndarray) -> np.ndarray:
+        return -2.0 * np.tanh(0.5 * k)
+
+
+variant(GaugeCurvatureBias, 'linear',
+        'The air gap under a probe of 12 mm grows in proportion to the curvature.',
+        probe_m=0.012, too_much=lambda k: -k)  # fmt: skip
+variant(GaugeCurvatureBias, 'ridge',
+        'A probe with a guide foot: reads high on ridges, saturating, and little low in hollows.',
+        probe_m=0.008,
+        too_much=lambda k: np.where(k < 0, -k / (1.0 - 0.3 * k), -0.3 * k))  # fmt: skip

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from .flight import Air, Slices
 from .jobs import Motion, moved
 from .parcels import Parcels
-from .truths import DOWN, Scene, Truth, with_drift
+from .truths import DOWN, Scene, Truth, between, variant, with_drift
 
 
 class TcpOffset(Truth):
@@ -19,10 +19,7 @@ class TcpOffset(Truth):
 
     id, family, typical, unit = 'tcp_offset', 'lateral shift', 0.004, 'm'
     most = 0.04
-
-    @classmethod
-    def details(cls, rng):
-        return {'direction_rad': rng.uniform(-np.pi, np.pi)}
+    ranges = between(direction_rad=(-np.pi, np.pi))
 
     def on_motion(self, motion: Motion, scene: Scene) -> Motion:
         a = self.drawn['direction_rad']
@@ -45,10 +42,7 @@ class TcpTilt(Truth):
 
     id, family, typical, unit = 'tcp_tilt', 'lateral shift', np.deg2rad(1.5), 'rad'
     most = np.deg2rad(12.0)
-
-    @classmethod
-    def details(cls, rng):
-        return {'axis_rad': rng.uniform(-np.pi, np.pi)}
+    ranges = between(axis_rad=(-np.pi, np.pi))
 
     def on_motion(self, motion: Motion, scene: Scene) -> Motion:
         a = self.drawn['axis_rad']
@@ -95,20 +89,39 @@ class CornerSlowdown(Truth):
     """
 
     id, family, typical, unit = 'corner_slowdown', 'boundary', 0.3, '1'
-    most = 2.5
-
-    @classmethod
-    def details(cls, rng):
-        return {'reach_m': rng.uniform(0.22, 0.38)}
+    most, ranges = 2.5, between(reach_m=(0.22, 0.38))
+    of_covariates = ('longer',)
 
     def dwell(self, reversal_m: np.ndarray) -> np.ndarray:
-        share = np.minimum(reversal_m / self.drawn['reach_m'], 1.0)
-        peak = 1.0 + self.amplitude
-        return peak / np.sqrt(1.0 + share * (peak**2 - 1.0))
+        return self.longer(reversal_m / self.drawn['reach_m'], 1.0 + self.amplitude)
+
+    @staticmethod
+    def longer(share: np.ndarray, peak: float) -> np.ndarray:
+        return peak / np.sqrt(1.0 + np.minimum(share, 1.0) * (peak**2 - 1.0))
 
     def on_flow(self, flow: Callable, scene: Scene) -> Callable:
         nominal = scene.nominal
         return lambda t: flow(t) * self.dwell(np.interp(t, nominal.time_s, nominal.reversal_m))
+
+
+def _ramp(share: np.ndarray, peak: float) -> np.ndarray:
+    return 1.0 / (1.0 / peak + (1.0 - 1.0 / peak) * np.minimum(share, 1.0))
+
+
+def _half_cosine(share: np.ndarray, peak: float) -> np.ndarray:
+    return _ramp(0.5 * (1.0 - np.cos(np.pi * np.minimum(share, 1.0))), peak)
+
+
+variant(CornerSlowdown, 'exponential',
+        'A servo that lags: the dwell dies away like a relaxation.',
+        ranges=between(reach_m=(0.08, 0.18)),
+        longer=lambda share, peak: 1.0 + (peak - 1.0) * np.exp(-share))  # fmt: skip
+variant(CornerSlowdown, 'cosine',
+        'A ramp with limited jerk: the speed follows half a cosine.',
+        longer=_half_cosine)  # fmt: skip
+variant(CornerSlowdown, 'ramp',
+        'A path override that lets the speed grow in proportion to the way.',
+        longer=_ramp)  # fmt: skip
 
 
 class TriggerLag(Truth):
@@ -116,10 +129,7 @@ class TriggerLag(Truth):
 
     id, family, typical, unit = 'trigger_lag', 'boundary', 0.08, 's'
     most = 0.6
-
-    @classmethod
-    def details(cls, rng):
-        return {'fall_ratio': rng.uniform(0.3, 0.8)}
+    ranges = between(fall_ratio=(0.3, 0.8))
 
     def staging(self) -> dict:
         return {'gun': 'near_edge'}
@@ -160,12 +170,16 @@ class GunWake(Truth):
     """The plume trails the moving gun: a parcel at the model plane lags by v x amplitude."""
 
     id, family, typical, unit = 'gun_wake', 'time', 0.020, 's'
-    most = 0.15
+    most, growth = 0.15, None
 
     def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
         duration = (slices.time_1_s - slices.time_0_s)[:, None]
         velocity = (slices.tcp_1_m - slices.tcp_0_m) / duration
-        return with_drift(air, -self.amplitude * velocity)
+        carried = with_drift(air, -self.amplitude * velocity)
+        return carried if self.growth is None else replace(carried, growth=self.growth)
+
+
+variant(GunWake, 'even', 'The plume is left behind at an even rate all along its way.', growth=1.0)
 
 
 class AirDrift(Truth):
@@ -176,7 +190,7 @@ class AirDrift(Truth):
     """
 
     id, family, typical, unit = 'air_drift', 'lateral shift', 0.015, 'm'
-    most = 0.12
+    most, growth = 0.12, None
 
     @classmethod
     def details(cls, rng):
@@ -184,4 +198,119 @@ class AirDrift(Truth):
         return {'direction': DOWN.copy() if rng.random() < 0.75 else side}
 
     def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
-        return with_drift(air, self.amplitude * np.asarray(self.drawn['direction']))
+        carried = with_drift(air, self.amplitude * np.asarray(self.drawn['direction']))
+        return carried if self.growth is None else replace(carried, growth=self.growth)
+
+
+variant(AirDrift, 'square',
+        'Droplets still fast: a steady draught displaces them with the square of the way.',
+        growth=2.0)  # fmt: skip
+variant(AirDrift, 'carried',
+        "Droplets at the draught's own speed: displaced in proportion to the way.",
+        growth=1.0)  # fmt: skip
+
+
+class TiltBentBracket(TcpTilt):
+    """A bent bracket turns the bell about a pivot behind it, so that it moves aside as well."""
+
+    form = 'bent_bracket'
+    ranges = TcpTilt.ranges | between(pivot_m=(0.03, 0.12))
+
+    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+        tilted = super().on_motion(motion, scene)
+        aside = self.drawn['pivot_m'] * (tilted.turn[:, :, 2] - motion.turn[:, :, 2])
+        return moved(tilted, tcp_m=tilted.tcp_m + aside)
+
+
+class MisalignmentSwing(PartMisalignment):
+    """The door hangs on its upper edge and swings out: `amplitude` at the lower edge."""
+
+    form = 'swing'
+
+    @classmethod
+    def details(cls, rng):
+        return {'side': rng.choice([-1.0, 1.0])}
+
+    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+        part = scene.part
+        if part.kind != 'door':
+            return motion
+        hanger = np.array([0.0, 0.0, part.height_m])
+        angle = self.drawn['side'] * self.amplitude / part.height_m
+        back = Rotation.from_rotvec([-angle, 0.0, 0.0]).as_matrix()
+        return moved(motion, (motion.tcp_m - hanger) @ back.T + hanger, back @ motion.turn)
+
+
+class TriggerDelay(TriggerLag):
+    """A valve with a dead time: the flow follows the trigger late, and at once."""
+
+    form = 'delay'
+
+    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+        motion = scene.nominal
+        late = self.amplitude * np.where(motion.trigger_on, 1.0, self.drawn['fall_ratio'])
+        level = flow(motion.trigger_s[motion.trigger_on] + 1e-6).mean()
+        delayed = replace(motion, trigger_s=np.maximum.accumulate(motion.trigger_s + late))
+        return lambda t: level * delayed.commanded(t)
+
+
+class FlowSettling(FlowDrift):
+    """A pump that settles after the start: exponential, `amplitude` per pass on the average."""
+
+    form = 'settling'
+    ranges = between(share=(0.15, 0.5))
+
+    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+        first, passes, length = _spraying(scene)
+        tau = self.drawn['share'] * length
+        whole = self.amplitude * (passes - 1) / (1.0 - np.exp(-length / tau))
+        return lambda t: flow(t) * (1.0 - whole * (np.exp(-np.maximum(t - first, 0) / tau) - 0.5))
+
+
+class FlowStep(FlowDrift):
+    """A regulator that jumps once while the part is painted."""
+
+    form = 'step'
+    ranges = between(at=(0.3, 0.7))
+
+    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+        first, passes, length = _spraying(scene)
+        at, half = first + self.drawn['at'] * length, 0.35 * self.amplitude * (passes - 1)
+        return lambda t: flow(t) * (1.0 + half * np.tanh((t - at) / (0.03 * length)))
+
+
+class FlowByPass(FlowDrift):
+    """A dosing cylinder that is set anew before each pass: the same flow all along the pass."""
+
+    form = 'by_pass'
+
+    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+        starts = scene.nominal.trigger_s[scene.nominal.trigger_on]
+        middle = 0.5 * (starts.size - 1)
+
+        def drifting(t):
+            number = np.maximum(np.searchsorted(starts, t, side='right') - 1, 0)
+            return flow(t) * (1.0 + self.amplitude * (number - middle))
+
+        return drifting
+
+
+class DriftByHeight(AirDrift):
+    """A downdraught that gathers speed toward the exhaust in the floor."""
+
+    form = 'by_height'
+
+    @classmethod
+    def details(cls, rng):
+        return {'direction': DOWN.copy(), 'gain_per_m': rng.uniform(0.4, 1.2)}
+
+    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+        here = 1.0 + self.drawn['gain_per_m'] * (0.45 - slices.tcp_0_m[:, 2:])
+        down = np.asarray(self.drawn['direction'])
+        return with_drift(air, self.amplitude * np.maximum(here, 0.1) * down)
+
+
+def _spraying(scene: Scene) -> tuple[float, int, float]:
+    """(first trigger, passes, time from it to the last)."""
+    first, last = scene.nominal.trigger_s[0], scene.nominal.trigger_s[-1]
+    return first, int(scene.nominal.pass_number.max()) + 1, last - first

@@ -1,27 +1,40 @@
-"""Hidden effects where the parcels land: field, bounce, losses on the way, things in between."""
+"""Hidden effects where the parcels land: field, bounce, losses on the way, things in between.
+
+Nobody has measured these laws closely. Each further form follows from one of the mechanisms that
+are held to be behind the effect, with the same reference as the effect's first law.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import trimesh
+from scipy.interpolate import RectBivariateSpline
 
-from .doors import Part
+from .doors import OUTLINE_MARGIN_M, Part
 from .flight import Air, Landings, Slices
 from .parcels import Parcels
-from .truths import KAPPA_REF_PER_M, Scene, Truth, with_narrowing
+from .truths import KAPPA_REF_PER_M, Scene, Truth, between, variant, with_narrowing
+
+GRID_M = 0.01
+RIM_M = np.array([0.03, 0.06, 0.09, 0.12])
+HORIZON_M = np.array([0.01, 0.02, 0.04, 0.07, 0.11, 0.16])
+AROUND = np.arange(12) * np.pi / 6
 
 
 class IncidenceAttraction(Truth):
     """Charged droplets are drawn to surface that turns away (a > 0), or bounce off it (a < 0).
 
-    With u = 1/cos - 1 of each parcel's own incidence: gain 1 + a u / (1 + u / 0.8), saturating;
-    bounce 1 / (1 + |a| u).
+    Gain 1 + a away, bounce 1 / (1 + |a| away); with u = 1/cos - 1 of each parcel's own incidence
+    away = u for a bounce and u / (1 + u / 0.8), saturating, for a gain.
     """
 
     id, family, typical, unit = 'incidence_attraction', 'incidence', 1.0, '1'
     most = 6.0
+    of_covariates = ('away',)
 
     @classmethod
     def of_size(cls, size, rng):
@@ -29,10 +42,36 @@ class IncidenceAttraction(Truth):
         return amount if rng.random() < 0.7 else -0.6 * amount
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
-        away = 1.0 / np.maximum(landings.cos_incidence, 0.2) - 1.0
+        away = self.away(np.maximum(landings.cos_incidence, 0.2), self.amplitude >= 0)
         if self.amplitude >= 0:
-            return 1.0 + self.amplitude * away / (1.0 + away / 0.8)
+            return 1.0 + self.amplitude * away
         return 1.0 / (1.0 - self.amplitude * away)
+
+    @staticmethod
+    def away(cosine: np.ndarray, gains: bool) -> np.ndarray:
+        u = 1.0 / cosine - 1.0
+        return u / (1.0 + u / 0.8) if gains else u
+
+
+def _late(cosine, gains):
+    return 0.7 * np.maximum(np.arccos(np.minimum(cosine, 1.0)) - np.deg2rad(12.0), 0.0)
+
+
+variant(IncidenceAttraction, 'tangent',
+        "A droplet's sideways momentum counts: tan^2 of the incidence, saturating.",
+        away=lambda cosine, gains: 0.5 * np.minimum(cosine**-2 - 1.0, 2.5))  # fmt: skip
+variant(IncidenceAttraction, 'late',
+        'Nothing up to 12 degrees, where the field is still along the spray; linear beyond.',
+        away=_late)  # fmt: skip
+
+
+class IncidencePower(IncidenceAttraction):
+    """A power of the cosine, as sticking laws of thermal spraying have it."""
+
+    form, most = 'power', 1.2
+
+    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+        return np.maximum(landings.cos_incidence, 0.2) ** -self.amplitude
 
 
 class ConvexAttraction(Truth):
@@ -42,12 +81,24 @@ class ConvexAttraction(Truth):
     """
 
     id, family, typical, unit = 'convex_attraction', 'curvature', 0.15, '1'
-    most = 1.0
+    most, over_m = 1.0, 0.015
+    of_covariates = ('gain',)
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
-        low, _ = _curvature(landings, scene, 0.015)
-        k = np.maximum(-low, 0.0) / KAPPA_REF_PER_M
-        return 1.0 + self.amplitude * (1.0 - np.exp(-k)) / (1.0 - np.exp(-1.0))
+        low, _ = _curvature(landings, scene, self.over_m)
+        return 1.0 + self.amplitude * self.gain(np.maximum(-low, 0.0) / KAPPA_REF_PER_M)
+
+    @staticmethod
+    def gain(k: np.ndarray) -> np.ndarray:
+        return (1.0 - np.exp(-k)) / (1.0 - np.exp(-1.0))
+
+
+variant(ConvexAttraction, 'root',
+        'Field of a rounded wedge grows like a root of its curvature.', over_m=0.025,
+        gain=lambda k: (np.sqrt(k + 0.02) - np.sqrt(0.02)) / 0.87)  # fmt: skip
+variant(ConvexAttraction, 'cylinder',
+        'Field ~ 1 / radius as on a cylinder, seen over 40 mm; saturates at corona onset.',
+        over_m=0.040, gain=lambda k: np.minimum(k, 4.0))  # fmt: skip
 
 
 class FaradayShielding(Truth):
@@ -55,6 +106,7 @@ class FaradayShielding(Truth):
 
     id, family, typical, unit = 'faraday_shielding', 'curvature', 0.15, '1'
     most = 1.0
+    of_covariates = ('measure',)
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         _, high = _curvature(landings, scene, 0.030)
@@ -62,30 +114,105 @@ class FaradayShielding(Truth):
         return np.exp(-self.amplitude * k**0.8)
 
 
+class _Recess(FaradayShielding):
+    """Shielding by a measure of the recess that is 1 in a valley of 250 mm radius."""
+
+    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+        x, z = landings.position_m[:, 0], landings.position_m[:, 2]
+        recess = np.maximum(_on_grid(scene.part, self.measure).ev(x, z), 0.0)
+        if self.form == 'depth':
+            return 1.0 / (1.0 + self.amplitude * recess)
+        return np.exp(-self.amplitude * recess)
+
+
+def _depth(part: Part, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    rises = np.array([_rise(part, x, z, a, RIM_M).max(axis=0) for a in AROUND])
+    below = np.minimum(rises[:6], rises[6:]).max(axis=0)
+    return below / (0.5 * KAPPA_REF_PER_M * RIM_M[-1] ** 2)
+
+
+def _hidden_sky(part: Part, x: np.ndarray, z: np.ndarray) -> np.ndarray:
+    hidden = 0.0
+    for a in AROUND:
+        tangent = (_rise(part, x, z, a, HORIZON_M) / HORIZON_M[:, None, None]).max(axis=0)
+        hidden = hidden + tangent**2 / (1.0 + tangent**2) * (tangent > 0) / AROUND.size
+    return hidden / 0.036
+
+
+variant(_Recess, 'depth',
+        'Field lines end on the rims: what counts is the depth below the lower of two rims.',
+        measure=_depth)  # fmt: skip
+variant(_Recess, 'wide',
+        'A field that does not see bends narrower than the space charge before them: 80 mm.',
+        measure=lambda part, x, z: part.curvature_over(x, z, 0.080)[1] / KAPPA_REF_PER_M,
+        )  # fmt: skip
+variant(_Recess, 'sky_view',
+        'Droplets come from every side: the share of the half space that the recess hides.',
+        measure=_hidden_sky)  # fmt: skip
+
+
 class EdgeBuild(Truth):
-    """Field concentration at free edges: 1 + a / (1 + (d / reach)^2) at distance d."""
+    """Field concentration at free edges: 1 + a gain(d), d the distance in reaches."""
 
     id, family, typical, unit = 'edge_build', 'boundary', 0.25, '1'
-    most = 2.0
-
-    @classmethod
-    def details(cls, rng):
-        return {'reach_m': rng.uniform(0.015, 0.035)}
+    most, ranges = 2.0, between(reach_m=(0.015, 0.035))
+    of_covariates = ('gain',)
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
         x, z = landings.position_m[:, 0], landings.position_m[:, 2]
         d = np.maximum(scene.part.edge_distance(x, z), 0.0) / self.drawn['reach_m']
-        return 1.0 + self.amplitude / (1.0 + d**2)
+        return np.maximum(1.0 + self.amplitude * self.gain(d), 0.0)
+
+    @staticmethod
+    def gain(d: np.ndarray) -> np.ndarray:
+        return 1.0 / (1.0 + d**2)
+
+
+variant(EdgeBuild, 'exponential',
+        'The fringe field of an earthed sheet that is near others of its size decays like e^-d.',
+        ranges=between(reach_m=(0.01, 0.08)), gain=lambda d: np.exp(-d))  # fmt: skip
+variant(EdgeBuild, 'gaussian',
+        'The sharp field of the edge, blurred by droplets that coast past it.',
+        ranges=between(reach_m=(0.02, 0.06)), gain=lambda d: np.exp(-0.5 * d**2))  # fmt: skip
+variant(EdgeBuild, 'ramp',
+        'A band of even slope, drawn up by surface tension until the film gelled.',
+        ranges=between(reach_m=(0.03, 0.12)), gain=lambda d: np.maximum(1.0 - d, 0.0))  # fmt: skip
+variant(EdgeBuild, 'power',
+        'Field at the rim of a thin conducting sheet ~ d^-1/2 (Jackson), blunted by its '
+        'thickness; minus 1/3, so that it ends eight reaches away.',
+        ranges=between(reach_m=(0.01, 0.03)),
+        gain=lambda d: np.maximum(1.5 * ((1.0 + d) ** -0.5 - 1.0 / 3.0), 0.0))  # fmt: skip
+variant(EdgeBuild, 'flow',
+        'A fat edge: paint flows to the edge out of a band beside it, and none is lost.',
+        ranges=between(reach_m=(0.01, 0.04)),
+        gain=lambda d: (np.exp(-d) - 0.4 * np.exp(-0.4 * d)) / 0.6)  # fmt: skip
 
 
 class StandoffEfficiency(Truth):
-    """Droplets are lost under way: e^(-a s / Omega), s = own path beyond the model plane."""
+    """Droplets are lost under way: e^(-a s), s = own path beyond the model plane over Omega."""
 
     id, family, typical, unit = 'standoff_efficiency', 'standoff', 0.5, '1'
     most = 3.0
+    of_covariates = ('kept',)
 
     def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
-        return np.exp(-self.amplitude * landings.beyond_m / scene.pattern.model_plane_m)
+        return self.kept(landings.beyond_m / scene.pattern.model_plane_m, self.amplitude)
+
+    @staticmethod
+    def kept(s: np.ndarray, a: float) -> np.ndarray:
+        return np.exp(-a * s)
+
+
+variant(StandoffEfficiency, 'linear',
+        'Transfer efficiency falls linearly with the way, as measured over short ranges.',
+        kept=lambda s, a: np.clip(1.0 - a * s, 0.05, 3.0))  # fmt: skip
+variant(StandoffEfficiency, 'power',
+        'Losses of a jet that entrains air and slows down: a power of the way.',
+        kept=lambda s, a: np.maximum(1.0 + s, 0.3) ** -a)  # fmt: skip
+variant(StandoffEfficiency, 'runaway',
+        'Small droplets are lost at once where the jet ends: losses grow with the square.',
+        kept=lambda s, a: np.exp(-0.5 * a * (np.maximum(1.0 + s, 0.0) ** 2 - 1.0)),
+        )  # fmt: skip
 
 
 class PatternSpread(Truth):
@@ -97,9 +224,18 @@ class PatternSpread(Truth):
 
     id, family, typical, unit, sign = 'pattern_spread', 'standoff', 0.3, '1', 'either'
     most = 0.8
+    by_size = (0.7, 0.6)  # of the smallest droplet, and how much more of the largest
 
     def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
-        return with_narrowing(air, self.amplitude * (0.7 + 0.6 * parcels.size))
+        least, more = self.by_size
+        return with_narrowing(air, self.amplitude * (least + more * parcels.size))
+
+
+variant(PatternSpread, 'uniform', 'Shaping air that holds every droplet alike.',
+        by_size=(1.0, 0.0))  # fmt: skip
+variant(PatternSpread, 'small_droplets',
+        'Shaping air that holds the small droplets; large ones fly through it.',
+        by_size=(1.6, -1.2))  # fmt: skip
 
 
 class Occlusion(Truth):
@@ -145,9 +281,8 @@ class Occlusion(Truth):
         if scene.part.obstacle is None:
             return 1.0
         mesh = trimesh.Trimesh(*scene.part.mesh(), process=False)
-        start = landings.position_m + 0.0015 * scene.part.normal(
-            landings.position_m[:, 0], landings.position_m[:, 2]
-        )
+        normal = scene.part.normal(landings.position_m[:, 0], landings.position_m[:, 2])
+        start = landings.position_m + 0.0015 * normal
         return 1.0 - mesh.ray.intersects_any(start, landings.rim_m - start).astype(float)
 
 
@@ -155,16 +290,8 @@ def _swept(
     part: Part, x: np.ndarray, z: np.ndarray, side: np.ndarray, near_m: float, far_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """A closed body along the surface line (x, z), `near_m` to `far_m` in front, +- side wide."""
-    surface, out = part.point(x, z), np.array([0.0, 1.0, 0.0])
-    rings = np.stack(
-        [
-            surface - side + near_m * out,
-            surface + side + near_m * out,
-            surface + side + far_m * out,
-            surface - side + far_m * out,
-        ],
-        axis=1,
-    )
+    near, far = (part.point(x, z) + np.array([0.0, off, 0.0]) for off in (near_m, far_m))
+    rings = np.stack([near - side, near + side, far + side, far - side], axis=1)
     count = len(x) - 1
     corner = np.arange(count)[:, None] * 4 + np.arange(4)[None, :]
     after = np.roll(corner, -1, axis=1)
@@ -173,7 +300,27 @@ def _swept(
     return rings.reshape(-1, 3), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
+def _rise(
+    part: Part, x: np.ndarray, z: np.ndarray, azimuth: float, reach_m: np.ndarray
+) -> np.ndarray:
+    """(reaches, ...) how far the part rises above the point's tangent plane, 0 beyond its rim."""
+    along = reach_m[:, None, None]
+    at_x, at_z = x + along * np.cos(azimuth), z + along * np.sin(azimuth)
+    y_x, y_z = part.slope(x, z)
+    plane = part.height(x, z) + y_x * (at_x - x) + y_z * (at_z - z)
+    rise = part.height(at_x, at_z) - plane
+    return np.where(part.edge_distance(at_x, at_z) > 0.0, rise, 0.0)
+
+
+@lru_cache(maxsize=8)
+def _on_grid(part: Part, measure: Callable) -> RectBivariateSpline:
+    """A slowly varying measure of the surface, tabulated."""
+    margin = OUTLINE_MARGIN_M
+    x = np.arange(-0.5 * part.width_m - margin, 0.5 * part.width_m + margin + GRID_M, GRID_M)
+    z = np.arange(-margin, part.height_m + margin + GRID_M, GRID_M)
+    gx, gz = np.meshgrid(x, z, indexing='ij')
+    return RectBivariateSpline(x, z, measure(part, gx, gz), kx=1, ky=1)
+
+
 def _curvature(landings: Landings, scene: Scene, reach_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """At the gauge points' landings the curvature hardly varies; taken at each landing anyway."""
-    x, z = landings.position_m[:, 0], landings.position_m[:, 2]
-    return scene.part.curvature_over(x, z, reach_m)
+    return scene.part.curvature_over(landings.position_m[:, 0], landings.position_m[:, 2], reach_m)

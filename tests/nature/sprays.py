@@ -1,0 +1,151 @@
+"""Campaigns rebuilt from real sprays: what one nozzle laid into one-inch troughs at three heights.
+
+The table (``patternator_two_nozzles.csv``) is read where it is and never shipped. Its lengths are
+scaled by 1:4, so that a height of 20, 30 or 40 in becomes a standoff of 127, 190 or 254 mm and a
+trough every 6.35 mm; its volumes by one factor for each nozzle, so that the highest reading is
+30 um. Each spray is one straight pass across a panel, the TCP at the nozzle's mouth, and the
+troughs are readings in one line across the pass.
+
+What eq. (2) lacks is known: the width grows as the height to a power below 1, and the volume
+stays.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import trimesh
+import yaml
+from scipy.spatial.transform import Rotation
+
+from virtual_paint_shop.files import write_bag
+from virtual_paint_shop.jobs import Log
+
+NOZZLES = ('E8003', 'PSERQ8004')
+HEIGHTS_IN = (20, 30, 40)
+SCALE_M_PER_IN = 0.0254 / 4.0
+PEAK_UM = 30.0
+PANEL_M = (0.5, 0.8)  # along the pass, across it
+SPEED_M_PER_S, POSE_EVERY_S, RUN_M = 0.2, 0.05, 1.5
+# How the panel hangs, as columns of the way of the pass, of the troughs, and off the panel.
+HANGING = {
+    'column': np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]]),
+    'row': np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
+    'lying': np.eye(3),
+}
+
+Spray = tuple[int, int]  # height in inches, repetition
+
+
+@cache
+def sprays(table: Path, nozzle: str) -> dict[Spray, np.ndarray]:
+    """(troughs, 2) offset across the pass [m] and film [um] of each spray of a nozzle."""
+    found = defaultdict(list)
+    with table.open(newline='') as file:
+        for row in csv.DictReader(file):
+            if row['nozzle'] == nozzle:
+                spray = int(row['boom_height_in']), int(row['repetition'])
+                found[spray].append((float(row['trough_in']), float(row['collected_ml'])))
+    peak = max(ml for rows in found.values() for _, ml in rows)
+    factors = (SCALE_M_PER_IN, PEAK_UM / peak)
+    return {spray: np.array(rows) * factors for spray, rows in found.items()}
+
+
+def spray_campaign(
+    table: Path,
+    nozzle: str,
+    folder: Path,
+    *,
+    heights_in: Sequence[int] = HEIGHTS_IN,
+    as_repeats: bool = False,
+    hanging: str = 'column',
+    told_times: float = 1.0,
+    told_off_m: float = 0.0,
+) -> Path:
+    """Write the campaign of a nozzle into an empty folder and return its ``campaign.yaml``.
+
+    Args:
+        table: ``patternator_two_nozzles.csv``.
+        nozzle: one of NOZZLES.
+        folder: where to.
+        heights_in: which of the heights [in].
+        as_repeats: the sprays of one height are repeats on one panel (an experiment for each
+            height) instead of panels of their own (an experiment for each spray).
+        hanging: 'column' and 'row' for the line of readings on an upright panel, 'lying' for one
+            that looks up.
+        told_times, told_off_m: the recorded poses have the true standoff so many times, and so
+            much beside it [m].
+    """
+    chosen = {s: rows for s, rows in sprays(table, nozzle).items() if s[0] in heights_in}
+    parts: dict[str, list[Spray]] = defaultdict(list)
+    for height, repetition in chosen:
+        name = f'height_{height}' + ('' if as_repeats else f'_spray_{repetition}')
+        parts[name].append((height, repetition))
+    folder.mkdir(parents=True, exist_ok=True)
+    frame = HANGING[hanging]
+
+    def told_m(height_in: float) -> float:
+        return told_times * height_in * SCALE_M_PER_IN + told_off_m
+
+    _write_panel(folder / 'panel.stl', frame)
+    entries = []
+    for name, of_part in parts.items():
+        _write_pass(folder / name, frame, told_m(of_part[0][0]))
+        _write_readings(folder / f'{name}.csv', frame, [chosen[spray] for spray in of_part])
+        entries.append({
+            'name': name, 'mesh': 'panel.stl', 'trajectory': name, 'pose_topic': '/atomizer/pose',
+            'state_topic': '/atomizer/state', 'measurements': f'{name}.csv',
+            'down': [0.0, 0.0, -1.0],
+        })  # fmt: skip
+    plane_m = told_m(float(np.median(heights_in)))
+    (folder / 'model.yaml').write_text(yaml.safe_dump(_start(chosen, plane_m)))
+    path = folder / 'campaign.yaml'
+    path.write_text(yaml.safe_dump({'model': 'model.yaml', 'experiments': entries}))
+    return path
+
+
+def _start(chosen: dict[Spray, np.ndarray], plane_m: float) -> dict:
+    """A first guess of the pattern from the first spray: the volume and the width of one pass."""
+    offset_m, film_um = next(iter(chosen.values())).T
+    volume = float(np.sum(film_um) * SCALE_M_PER_IN * SPEED_M_PER_S)
+    spread_m = float(np.sqrt(np.average(offset_m**2, weights=film_um)))
+    planar = {'K1_cm3_per_s': volume, 'K2': 0.3, 'K3': 0.0, 'phi_rad': 0.0, 'r_m': spread_m,
+              'sigma1_m': 0.5 * spread_m, 'sigma2_m': spread_m}  # fmt: skip
+    return {'planar': planar, 'projection': {'model_plane_m': plane_m, 'emission_offset_m': 0.0}}
+
+
+def _write_panel(path: Path, frame: np.ndarray) -> None:
+    along, across = 0.5 * PANEL_M[0], 0.5 * PANEL_M[1]
+    corners = np.array(
+        [[-along, -across, 0], [along, -across, 0], [along, across, 0], [-along, across, 0]]
+    )
+    faces = [[0, 1, 2], [0, 2, 3]]
+    trimesh.Trimesh(corners @ frame.T, faces, process=False).export(path)
+
+
+def _write_pass(folder: Path, frame: np.ndarray, standoff_m: float) -> None:
+    """One pass with the gun open from well before the panel until well behind it."""
+    time_s = np.arange(0.0, RUN_M / SPEED_M_PER_S + POSE_EVERY_S, POSE_EVERY_S)
+    stamps = 1_700_000_000_000_000_000 + np.rint(time_s * 1e9).astype(np.int64)
+    way = np.zeros((len(time_s), 3))
+    way[:, 0], way[:, 2] = SPEED_M_PER_S * time_s - 0.5 * RUN_M, standoff_m
+    # The tool's z looks at the panel, its x along the troughs.
+    tool = Rotation.from_matrix(frame @ np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1]])).as_quat()
+    log = Log(stamps, way @ frame.T, np.tile(tool, (len(time_s), 1)), stamps[:1], np.array([True]))
+    write_bag(log, folder)
+
+
+def _write_readings(path: Path, frame: np.ndarray, of_part: Sequence[np.ndarray]) -> None:
+    """The troughs of all sprays of a part; where there are several, they are repeats."""
+    with path.open('w', newline='') as file:
+        out = csv.writer(file)
+        out.writerow(['x_m', 'y_m', 'z_m', 'thickness_um', 'point'])
+        for offset_m, film_um in np.concatenate(of_part).tolist():
+            trough = round(offset_m / SCALE_M_PER_IN)
+            place = np.round(frame[:, 1] * offset_m, 5)
+            out.writerow([*place.tolist(), round(film_um, 3), f'T{trough:+d}'])

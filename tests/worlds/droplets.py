@@ -1,0 +1,162 @@
+"""The world of traced droplets: cases of the virtual paint shop, measured and judged.
+
+Amounts can be compared only where truth and law mean the same by their parameters: errors of the
+tool, shifts at the model plane, delays, levels and volumes, each in the form of its law that has
+the amount. Attraction, shielding or losses follow laws of their own in the shop.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from virtual_paint_shop.cases import PARCELS, Case, draw_case
+from virtual_paint_shop.cases import paint as paint_case
+from virtual_paint_shop.conner import film_um
+from virtual_paint_shop.draw import draw_jobs, stream
+from virtual_paint_shop.gauge import measure
+from virtual_paint_shop.jobs import Job
+from virtual_paint_shop.parcels import Pattern
+from virtual_paint_shop.shop import Experiment
+from virtual_paint_shop.truths import choose
+
+from .record import Painted, Part, detectability
+
+OFFSET_M = 0.05
+# Scatter of the film by the number of droplets traced, a share.
+TRACED = 0.004
+# Standard deviations of what a judge takes as free in a pattern; of lengths and volumes a share.
+FREE = {'K1_cm3_per_s': 0.5, 'K2': 0.2, 'K3': 0.2, 'phi_rad': 0.6, 'r_m': 0.25, 'sigma1_m': 0.25,
+        'sigma2_m': 0.25}  # fmt: skip
+NAMES = {
+    'flow_drift': 'drift_per_pass',
+    'gauge_zero': 'offset_um',
+    'gun_wake': 'lag_s',
+    'overspray_fog': 'fog_um',
+    'pose_lag': 'lag_s',
+    'tcp_standoff': 'offset_z_m',
+}
+SAG_REFERENCE_UM = 20.0
+# Other forms of a law that mean the same by their amount: a shift at the model plane.
+SAME_AMOUNT = {'air_drift': ('square', 'carried'), 'gun_wake': ('even',)}
+
+
+def paint(
+    seed: int,
+    kind: str,
+    effects: tuple[str, ...] | None = None,
+    case: Case | None = None,
+    parcels: int = PARCELS,
+) -> Painted:
+    """A case painted and measured, with what a judge of a diagnosis needs to know.
+
+    Args:
+        effects: names of what is hidden, instead of a draw.
+        case: this one instead of the one of seed and kind.
+    """
+    case = draw_case(seed, kind, effects) if case is None else case
+    painted = paint_case(case, parcels)
+    rng, amplitudes = stream(case.seed, 61), dict(zip(case.truths, case.amplitudes, strict=True))
+    truths = choose(list(case.truths), stream(case.seed, 1), amplitudes)
+    pattern, jobs = draw_jobs(case.seed, truths, case.layout, OFFSET_M, None)
+    parts, rows = [], []
+    for experiment, job in zip(painted.experiments, jobs, strict=True):
+        part, columns = _measured(case, experiment, rng)
+        table = experiment.readings
+        first = np.unique(table.point, return_index=True)[1]
+        slopes = _pattern_slopes_um(pattern, job, table.positions_m[first], table.normals[first])
+        parts.append(part)
+        rows.append((*columns, slopes))
+    marks, sigma, own, slopes = zip(*rows, strict=True)
+    free = np.hstack([np.concatenate(slopes), block_diag(*own)])
+    strengths = detectability(np.concatenate(marks), free, np.concatenate(sigma))
+    hidden = painted.truth['hidden']
+    passes = [job.plan.passes for job in jobs]
+    noise_from = 'stated' if case.stated else 'repeats'
+    return Painted(
+        'droplets', seed, kind, tuple(name.partition('~')[0] for name in case.truths),
+        tuple(parts), float(strengths[0]), tuple(strengths[1:].tolist()),
+        true_amounts(hidden[0], passes) if len(hidden) == 1 else {},
+        case.noise.level, case.noise.session_offset_um,
+        {'shape': 'conner', 'noise_from': noise_from, 'truths': case.truths,
+         'amplitudes': case.amplitudes, 'mesh_edge_m': case.mesh_edge_m},
+    )  # fmt: skip
+
+
+def _measured(
+    case: Case, experiment: Experiment, rng: np.random.Generator
+) -> tuple[Part, tuple[np.ndarray, ...]]:
+    """The part as read in one session, and marks, noise and own freedom of its points [um]."""
+    noise, table, unseen = case.noise, experiment.readings, experiment.heldout
+    session = measure(table.point, table.film_um, table.expected_um, noise, rng)
+    log, texture = experiment.log, np.hypot(noise.texture, TRACED)
+    part = Part(
+        experiment.name, experiment.vertices_m, experiment.faces, log.stamps_ns, log.positions_m,
+        log.quaternions_xyzw, log.trigger_stamps_ns, log.trigger_on, table.positions_m,
+        table.point, session.thickness_um, table.sigma_um if case.stated else None,
+        unseen.positions_m,
+        unseen.film_um * (session.level - 1.0) + unseen.expected_um + session.offset_um,
+        np.hypot(noise.sigma_um(unseen.expected_um), texture * unseen.film_um),
+    )  # fmt: skip
+    _, first, count = np.unique(table.point, return_index=True, return_counts=True)
+    film, marks = table.film_um[first], table.marks_um[first]
+    together = (table.expected_um - table.clean_um)[first]
+    gauge = noise.sigma_um(table.expected_um[first]) / np.sqrt(count)
+    own = np.column_stack([noise.level * film, np.full(film.size, noise.session_offset_um)])
+    sigma = np.hypot(gauge, texture * film)
+    return part, (np.column_stack([together, marks]), sigma, own)
+
+
+def _pattern_slopes_um(
+    pattern: Pattern, job: Job, points_m: np.ndarray, normals: np.ndarray
+) -> np.ndarray:
+    """(P, 7) change of the film with the pattern's parameters, each in its standard deviation."""
+    plain = film_um(pattern, job.motion, points_m, normals, 0.05)
+    columns = []
+    for name, deviation in FREE.items():
+        value = getattr(pattern, name)
+        step = 0.02 * deviation * (value if name.endswith(('_m', '_s')) else 1.0)
+        bent = film_um(replace(pattern, **{name: value + step}), job.motion, points_m, normals,
+                       0.05)  # fmt: skip
+        columns.append((bent - plain) / 0.02)
+    return np.stack(columns, axis=1)
+
+
+def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
+    """Values of parameters, `effect.parameter`, that stand for a truth.
+
+    None where the laws cannot be compared.
+
+    Args:
+        hidden: the truth's entry in ``truth.json``.
+        passes: number of passes of each experiment.
+    """
+    amplitude, truth = hidden['amplitude'], hidden['id']
+    if hidden['form'] and hidden['form'] not in SAME_AMOUNT.get(truth, ()):
+        return {}
+    found: dict[str, float] = {}
+    if truth in ('tcp_offset', 'tcp_tilt'):
+        angle = hidden['direction_rad' if truth == 'tcp_offset' else 'axis_rad']
+        names = (
+            ('offset_x_m', 'offset_y_m') if truth == 'tcp_offset' else ('tilt_x_rad', 'tilt_y_rad')
+        )
+        found = dict(zip(names, amplitude * np.array([np.cos(angle), np.sin(angle)]), strict=True))
+    elif truth == 'air_drift':
+        # The surface faces +y, so that its right side, seen by the gun, is -x.
+        x, _, z = hidden['direction']
+        found = {'shift_down_m': -amplitude * z, 'shift_across_m': -amplitude * x}
+    elif truth == 'sag':
+        found = {'run_m': amplitude / SAG_REFERENCE_UM}
+    elif truth == 'flow_drift':
+        found = {'drift_per_pass': np.mean([_growth(amplitude, n) for n in passes])}
+    elif truth in NAMES:
+        found = {NAMES[truth]: amplitude}
+    return {f'{truth}.{name}': float(value) for name, value in found.items()}
+
+
+def _growth(drift: float, passes: int) -> float:
+    """Mean growth from pass to pass where the flow is linear about the middle of the job."""
+    half = 0.5 * (passes - 1)
+    return ((1.0 + drift * half) / (1.0 - drift * half)) ** (1.0 / (passes - 1)) - 1.0
