@@ -11,7 +11,9 @@ import numpy as np
 from scipy.special import fdtr
 
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import Explanation, explanations, law_errors
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, Explanation, explanations, law_errors
+from paint_deposition.inference.diagnosis.mixture import Mixture
+from paint_deposition.inference.fitting.remainder import Remainder
 from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability, testability
@@ -107,8 +109,9 @@ class Run:
         kept = frozenset(effect.id for effect in self.candidates_in(fit))
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
         null = NullModel.around(fit, free)
-        found = explanations(self.study, fit, self.candidates)
-        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+        found = [e for e in explanations(self.study, fit, self.candidates) if e.cause != FOOTPRINT]
+        remainder = Remainder.of(self.study, fit)
+        space = Mixture(null, remainder, found, self.study.noise.degrees_of_freedom)
         if self.testable is None:
             self.testable = testability(space, self.seed)
         return space
