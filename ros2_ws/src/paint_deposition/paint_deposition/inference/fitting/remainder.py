@@ -15,6 +15,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES
+from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_basis
 from paint_deposition.inference.fitting.smooth_fields import root_of_field
 from paint_deposition.inference.fitting.study import Study
@@ -30,6 +31,11 @@ PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
 # Lengths of correlation, in root mean square radii of the pattern, and of the footprint in steps.
 LENGTHS, FOOTPRINT_LENGTHS = (0.2, 0.6), (2.0, 6.0)
 NEGLIGIBLE = 1e-3
+# Exponents of the tails differ from those of Gaussians by so much.
+TAILS = 0.5
+# Sprays wander sideways by this share of the pattern's root mean square radius.
+WANDER = 0.008
+SHIFT_M = 1e-3
 WIDE = 3.0
 MOST_RELATIVE = 1.0
 FAR = 1e6
@@ -77,13 +83,12 @@ class Remainder:
                 for length in FOOTPRINT_LENGTHS
             ]) for size in FOOTPRINTS
         )
+        tails = basis.film_um @ tail_directions(model.patterns, basis.settings['reach_m']) / sigma
+        footprint = tuple(np.hstack([TAILS * tails, columns]) for columns in footprint)
         film = np.maximum(study.forward.predict_um(model), 0.0)
         owner = campaign.experiment_of
         thickest = np.array([film[owner == k].max() for k in range(len(campaign.experiments))])
         scale = np.sqrt(film * thickest[owner])[:, np.newaxis] / sigma
-        group = alike(campaign.experiments)
-        width = max(rms_radius_m(p) for p in model.patterns)
-        shared = np.bincount(group)[group] > 1
 
         def fields(label: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, ...]:
             found = []
@@ -97,12 +102,18 @@ class Remainder:
                 found.append(scale * columns)
             return tuple(found)
 
+        group = alike(campaign.experiments)
+        width = max(rms_radius_m(p) for p in model.patterns)
         pattern = fit.parameters.pattern
         between = np.array([c.between_jobs for c in pattern.coordinates]) / WIDE
         between[[pattern.entries(row)[0] for row in range(pattern.count)]] = 0.0
         shapes = fit.jacobian[:, : len(pattern)] * between
         alone = np.hstack([shapes * (group[owner] == k)[:, np.newaxis] for k in range(group.max() + 1)])
         if group.max() == 0: alone = alone[:, :0]
+        wander = WANDER * width * shift_directions(study, model) / sigma
+        own = group[owner][:, np.newaxis] == np.arange(group.max() + 1)
+        alone = np.hstack([alone, *(wander[:, [k]] * own for k in range(2))])
+        shared = np.bincount(group)[group] > 1
         settings = fields(group, np.ones(len(study), dtype=bool))
         return Remainder(
             footprint,
@@ -144,6 +155,34 @@ def relative_flux(patterns, reach_m) -> np.ndarray:
         for p in patterns
     ) / len(patterns)
     return np.repeat(flux, WAVES)
+
+
+def tail_directions(patterns, reach_m) -> np.ndarray:
+    """(K, 2) relative change of the flux as the tails of ring and centre get shorter or longer."""
+    radius = np.linspace(0.0, reach_m, RADII)
+    found = np.zeros((RADII, 2))
+    for p in patterns:
+        ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
+        for k, (part, u) in enumerate((
+            (ring, (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2)),
+            (centre, radius**2 / (2.0 * p.sigma2_m**2)),
+        )):
+            change = part / (ring + centre) * u * np.log(np.maximum(u, 1e-9))
+            found[:, k] += np.clip(change, -1.0 / TAILS, 1.0 / TAILS) / len(patterns)
+    wave = np.eye(WAVES)[0]
+    return np.kron(found, wave[:, np.newaxis])
+
+
+def shift_directions(study: Study, model: DepositionModel) -> np.ndarray:
+    """(P, 2) change of the film as the pattern moves along the tool's x and y axes [um/m]."""
+    here = study.forward.predict_um(model)
+    old = model.effect('tcp_offset') or TcpOffset()
+    moved = []
+    for name in ('offset_x_m', 'offset_y_m'):
+        step = -SHIFT_M if getattr(old, name) > 0.0 else SHIFT_M
+        shifted = old.model_copy(update={name: getattr(old, name) + step})
+        moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
+    return np.stack(moved, axis=1)
 
 
 def rms_radius_m(pattern: PlanarPattern) -> float:
