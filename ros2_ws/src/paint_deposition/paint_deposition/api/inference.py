@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
@@ -136,7 +137,9 @@ def diagnose(
     start, known = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
     reaches = () if known else short_reaches(found.study.campaign, found.model)
-    return replace(found, library=library, remarks=(*found.remarks, *map(str, reaches)))
+    found = replace(found, remarks=(*found.remarks, *map(str, reaches)))
+    progress('looking for what to measure and spray next')
+    return with_proposals(found, library)
 
 
 def refit(

@@ -231,8 +231,6 @@ def _write(
 ) -> list[Path]:
     tell('comparing before and after')
     _ = diagnosis.comparisons
-    tell('looking for what to measure and spray next')
-    _ = diagnosis.proposals
     tell('writing the report')
     return write_results(diagnosis, output, start=start, pictures=pictures, drawing=drawing)
 

@@ -88,9 +88,9 @@ class ReportData:
         return tuple(comparison.model for comparison in self.comparisons)
 
     @property
-    def proposals(self) -> tuple[list[Place], list[Spray]]:
+    def proposals(self) -> tuple[Sequence[Place], Sequence[Spray]]:
         """What to measure and what to spray next."""
-        return self.diagnosis.proposals if self.diagnosis else ([], [])
+        return self.diagnosis.proposals if self.diagnosis else ((), ())
 
     @property
     def history(self) -> list[dict[str, Any]]:

@@ -62,15 +62,14 @@ class _Tried:
 
 
 @on_one_thread
-def propose_for(
-    diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
-) -> tuple[list[Place], list[Spray]]:
-    """Places and sprays that would settle a diagnosis between the explanations that compete.
+def with_proposals(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> Diagnosis:
+    """A diagnosis with places and sprays that would settle between the competing explanations.
 
     Without two of them nothing is proposed.
     """
     rivals = rivals_of(diagnosis, library)
-    return ([], []) if rivals is None else propose(rivals)
+    proposals = ((), ()) if rivals is None else propose(rivals)
+    return replace(diagnosis, library=library, proposals=proposals)
 
 
 def propose(rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:

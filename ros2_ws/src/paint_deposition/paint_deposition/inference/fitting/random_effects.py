@@ -98,7 +98,7 @@ def random_effects(
         'gauge zero', 'µm', sessions, SESSION_UM * _contrasts(len(sessions)),
         SESSION_UM * shares @ _contrasts(len(sessions)) / sigma_um[:, np.newaxis],
     )  # fmt: skip
-    return tuple(effects for effects in (level, zero) if len(effects.names) > 1)
+    return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
 def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:

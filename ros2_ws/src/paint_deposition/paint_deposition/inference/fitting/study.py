@@ -158,21 +158,17 @@ class Study:
         )
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
-        """The P points beside predictions (P,) for them [um]."""
-        return Residuals(self.measured_um, self._levelled(predicted_um), self.sigma_um)
+        """The P points beside predictions (P,) for them [um].
 
-    def _levelled(self, predicted_um: np.ndarray) -> np.ndarray:
-        """With the measured level on parts painted with something switched off.
-
-        How much paint arrives then is not the model's to predict.
+        This is the one residual that all results quote: what the nuisance directions explain,
+        such as the levels in which parts differ, is estimated and counts as predicted.
         """
-        levelled = predicted_um.copy()
-        for number, experiment in enumerate(self.campaign.experiments):
-            rows = self.campaign.experiment_of == number
-            if experiment.switched_off and predicted_um[rows].any():
-                weight = predicted_um[rows] / self.sigma_um[rows] ** 2
-                levelled[rows] *= (weight @ self.measured_um[rows]) / (weight @ predicted_um[rows])
-        return levelled
+        nuisance = self.nuisance
+        misfit = (self.measured_um - predicted_um) / self.sigma_um
+        precision = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
+        amounts = np.linalg.solve(precision, nuisance.T @ misfit)
+        levelled_um = predicted_um + self.sigma_um * (nuisance @ amounts)
+        return Residuals(self.measured_um, levelled_um, self.sigma_um)
 
     def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
         """The same for each experiment on its own."""
