@@ -26,7 +26,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.measuring_points import MeasuringPoints
 from paint_deposition.files.tables.layout import Layout
-from paint_deposition.inference.fitting.slips import Slip
+from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.film import point_rows
 from paint_deposition.report.page.report import write_report
@@ -429,8 +429,8 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
 
 
 def test_readings_left_out_and_levels_of_parts_are_shown(tmp_path, diagnosis, comparisons):
-    slip = Slip('door: P007', 312.0, 30.9, 1.2)
-    study = replace(diagnosis.study, slips=(slip,))
+    slip = Outlier('door: P007', 312.0, 30.9, 1.2)
+    study = replace(diagnosis.study, outliers=(slip,))
     told = replace(diagnosis, study=study)
     beside = tuple(replace(comparison, study=study) for comparison in comparisons)
     tell(tmp_path / 'report.html', told, beside)

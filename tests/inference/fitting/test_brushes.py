@@ -15,17 +15,17 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
+from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import Brush
 from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.report.writers.calibration import write_calibration
 
 PHI_RAD = 0.1

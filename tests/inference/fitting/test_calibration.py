@@ -19,12 +19,12 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate, started_from
-from paint_deposition.inference.fitting.collapse_fit import fit_collapse
+from paint_deposition.inference.fitting.panel_fit import fit_collapse
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.writers.calibration import write_calibration
 from virtual_paint_shop.shop import panel_study
 

@@ -9,8 +9,11 @@ import pytest
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.gauge_noise import gauge_noise
-from paint_deposition.inference.readings.outliers import gross_outliers, left_out_lines
+from paint_deposition.inference.readings.gauge_noise import (
+    gauge_noise,
+    gross_outliers,
+    left_out_lines,
+)
 from paint_deposition.inference.readings.readings import Readings
 
 # Numbers of readings at each point.

@@ -19,12 +19,12 @@ from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
-from paint_deposition.inference.fitting.panel_reach import Reach, short_reaches
+from paint_deposition.inference.fitting.brushes import with_brushes_of
+from paint_deposition.inference.fitting.panel_fit import Reach, short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
-from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.geometry import require_paint
+from paint_deposition.inference.readings.plausibility import require_paint
 
 Progress = Callable[[str], None]
 MOST_MODELS = 6
@@ -76,11 +76,11 @@ def compare(
     progress('fitting the pattern')
     reaches: tuple[Reach, ...] = ()
     if model is None:
-        study, fit = sifted(campaign, bell, starts=STARTS)
+        study, fit = clean_and_fit(campaign, bell, starts=STARTS)
         model = fit.model
         reaches = short_reaches(study.campaign, model)
     else:
-        study, _ = sifted(campaign, model, model.effects)
+        study, _ = clean_and_fit(campaign, model, model.effects)
     progress('comparing')
     return replace(compared(study, model), warnings=tuple(map(str, reaches)))
 
@@ -105,7 +105,7 @@ def compare_models(
     for model in models.values():
         model.require_brushes(campaign.brushes)
     first = next(iter(models.values()))
-    study, _ = sifted(campaign, first, first.effects)
+    study, _ = clean_and_fit(campaign, first, first.effects)
     found = {}
     for name, model in models.items():
         progress(f'comparing {name}')

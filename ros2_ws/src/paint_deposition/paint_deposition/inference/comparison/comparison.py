@@ -6,13 +6,13 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.stats import spearmanr
 
-from paint_deposition.inference.comparison.rank_correlation import rank_correlation
-from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.geometry import geometry_by_experiment
+from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.residuals import Residuals
 
 
@@ -82,7 +82,7 @@ class Comparison:
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'readings': len(self.readings),
             'noise': self.study.noise_figures,
-            'left_out': [slip.to_dict() for slip in self.study.slips],
+            'left_out': [outlier.to_dict() for outlier in self.study.outliers],
             'misfits': [
                 {'experiment': m.experiment, 'kind': m.kind, 'label': m.label}
                 | m.residuals.figures()
@@ -134,8 +134,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     dependences = []
     for covariate in study.covariates(model):
         if covariate.varies:
-            found = rank_correlation(covariate.values, points.residual_um)
-            dependences.append(Dependence(covariate.name, *found))
+            found = spearmanr(covariate.values, points.residual_um)
+            dependences.append(Dependence(covariate.name, *map(float, found)))
     return Comparison(
         study,
         readings,

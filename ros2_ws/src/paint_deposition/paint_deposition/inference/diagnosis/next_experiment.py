@@ -11,15 +11,20 @@ from itertools import permutations
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.proposals import Place, Spray, chance_of_settling
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
 from paint_deposition.inference.diagnosis.separation import Imitation, Predicted, imitate
 from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
-from paint_deposition.inference.diagnosis.standing import KEY, Stand, spots, suits
+from paint_deposition.inference.diagnosis.stationary_spray import (
+    KEY,
+    StationarySpray,
+    spots,
+    suits,
+)
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans, Readings
@@ -149,7 +154,7 @@ def _tried(
         return None
     stand = None
     if spot is not None:
-        stand = Stand.before(new, spot, rivals.fit.model, _most_um(study))
+        stand = StationarySpray.before(new, spot, rivals.fit.model, _most_um(study))
         if stand is None:
             return None
         new = stand.sprayed(new)
@@ -164,9 +169,9 @@ def _tried(
     if len(together) != len(study) + len(film_um):
         return None
     sigma_um = together.sigma_um[len(study) :]
-    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.free_there(forward, sigma_um)])
+    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.nuisance_at(forward, sigma_um)])
     free = np.hstack([free, together.nuisance])
-    there = rivals.there(Campaign((new,)), forward, sigma_um)
+    there = rivals.predictions_at(Campaign((new,)), forward, sigma_um)
     predicted = [here.with_more(more) for here, more in zip(rivals.here, there, strict=True)]
     apart = compared(free, predicted)
     spray = Spray(
@@ -186,7 +191,9 @@ def _most_um(study: Study) -> float:
     return float(study.measured_um.max()) if wanted is None else wanted
 
 
-def _in_words(study: Study, experiment: Experiment, change: Change, stand: Stand | None) -> str:
+def _in_words(
+    study: Study, experiment: Experiment, change: Change, stand: StationarySpray | None
+) -> str:
     what = f'the same passes {change.words}'
     if stand is not None:
         # Its words tell the distance already.
@@ -226,9 +233,9 @@ def _places(rivals: Rivals, seed: int) -> list[Place]:
     film_um, sigma_um = together.measured_um, together.sigma_um
     if len(taken) != len(film_um):
         return []
-    free = rivals.free_there(together.forward, sigma_um)
+    free = rivals.nuisance_at(together.forward, sigma_um)
     free = np.hstack([free, together.nuisance])
-    predicted = rivals.there(together.campaign, together.forward, sigma_um)
+    predicted = rivals.predictions_at(together.campaign, together.forward, sigma_um)
     usable = ~taken & (film_um > PAINTED * np.mean(study.measured_um))
     places: list[Place] = []
     pair = compared(free[taken], [p.select(taken) for p in predicted])[0]

@@ -24,7 +24,7 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass,
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Significance level of the test that something is missing.

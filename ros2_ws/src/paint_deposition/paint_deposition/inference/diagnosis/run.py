@@ -33,7 +33,7 @@ from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
-from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
 
@@ -84,7 +84,7 @@ class Run:
         self.start = start
         self.known, self.remarks = usable(known, campaign)
         effects = (*start.effects, *neutral)
-        self.study, self.fit = sifted(campaign, start, effects, STARTS, seed, self.known)
+        self.study, self.fit = clean_and_fit(campaign, start, effects, STARTS, seed, self.known)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None

@@ -233,7 +233,7 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
-            'left_out': [slip.to_dict() for slip in self.study.slips],
+            'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),
         }

@@ -13,31 +13,38 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.film.paint_used import impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.fitting.brush_figures import brush_figures
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
-from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
-from paint_deposition.inference.fitting.estimates import Correlation, Estimate, correlations, estimates
-from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.one_thread import on_one_thread
-from paint_deposition.inference.fitting.panel_reach import shifts, short_reaches
+from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
+from paint_deposition.inference.fitting.estimates import (
+    Correlation,
+    Estimate,
+    correlations,
+    estimates,
+)
+from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
+from paint_deposition.inference.fitting.panel_fit import (
+    CollapseFit,
+    fit_collapse,
+    shifts,
+    short_reaches,
+)
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import posterior_of
-from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.uniformity import sigma_n_closed_form
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.geometry import geometry_by_experiment
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.plausibility import (
     check_enough,
     check_panel,
     check_readings,
     check_units_beside,
+    geometry_by_experiment,
 )
 from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.model.uniformity import sigma_n_closed_form
 
 STARTS = 8
 # Residuals beyond this many standard deviations are named in a warning.
@@ -130,7 +137,7 @@ class Calibration:
             'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
             'converged': self.fit.converged,
             'noise': study.noise_figures,
-            'left_out': [slip.to_dict() for slip in study.slips],
+            'left_out': [outlier.to_dict() for outlier in study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'warnings': list(self.warnings),
         }
@@ -181,8 +188,8 @@ def calibrate(
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
-    progress('looking for slips among the readings')
-    study, _ = sifted(campaign, model, model.effects, seed=seed)
+    progress('looking for outliers among the readings')
+    study, _ = clean_and_fit(campaign, model, model.effects, seed=seed)
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')

@@ -11,9 +11,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.facet_error import facet_errors_um
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, fit_readings
+from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import RandomEffects, random_effects
-from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate, Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
@@ -61,7 +61,7 @@ class Study:
         sigma_um: (P,) their standard deviations, with the film's texture [um].
         noise: of single readings.
         texture: of the film.
-        slips: single readings that were left out, see ``sifted``.
+        outliers: single readings that were left out, see ``clean_and_fit``.
         facet_um: (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
     """
 
@@ -71,7 +71,7 @@ class Study:
     sigma_um: np.ndarray
     noise: GaugeNoise
     texture: Texture = Texture()
-    slips: tuple[Slip, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
     facet_um: np.ndarray | None = None
     _rays: dict = field(default_factory=dict, repr=False)
 
@@ -114,12 +114,12 @@ class Study:
         sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
         return replace(self, sigma_um=sigma_um, facet_um=facet_um)
 
-    def without(self, slips: dict[int, Slip]) -> 'Study':
+    def without(self, outliers: dict[int, Outlier]) -> 'Study':
         """The same without some points, by their row."""
-        if not slips:
+        if not outliers:
             return self
-        kept = ~np.isin(np.arange(len(self)), list(slips))
-        return replace(self.of_points(kept), slips=tuple(slips.values()))
+        kept = ~np.isin(np.arange(len(self)), list(outliers))
+        return replace(self.of_points(kept), outliers=tuple(outliers.values()))
 
     def of_points(self, kept: np.ndarray) -> 'Study':
         """The same with some of the points only, (P,) bool.
@@ -133,7 +133,7 @@ class Study:
         facet_um = None if self.facet_um is None else self.facet_um[kept]
         return Study(
             campaign, self.forward.at(campaign), campaign.means.mean_um,
-            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.slips,
+            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.outliers,
             facet_um,
         )  # fmt: skip
 
@@ -192,7 +192,7 @@ class Study:
     @property
     def left_out(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
-        return (*self.campaign.notes, *map(str, self.slips))
+        return (*self.campaign.notes, *map(str, self.outliers))
 
     @property
     def noise_figures(self) -> dict[str, Any]:

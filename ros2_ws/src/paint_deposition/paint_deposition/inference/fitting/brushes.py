@@ -1,12 +1,19 @@
-"""The model that a campaign of several brushes starts from."""
+"""Brushes of a campaign: the model to start from, and what a calibration says of them."""
+
+import math
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.model.brush import Brush, SetPoints, listed
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.film.paint_used import efficiency
+from paint_deposition.inference.fitting.estimates import Estimate
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.model.brush import Brush, SetPoints, listed
+from paint_deposition.model.brush_law import BrushLaw
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # What recordings tell of the process beside the flow, which they tell relative to the brush's.
 RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
@@ -51,3 +58,34 @@ def _set_points(campaign: Campaign, number: int) -> SetPoints:
         if told:
             found[name] = float(np.median(told))
     return SetPoints(**found)
+
+
+def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dict[str, Any] | None:
+    """Set-points and transfer efficiency of each brush, and the law between them.
+
+    None without brushes. The efficiency is that on a part which catches everything.
+
+    Args:
+        model: calibrated. parameters: its own, with uncertainties.
+    """
+    if not model.brushes:
+        return None
+    several = len(model.brushes) > 1
+    by_name = {value.name: value for value in parameters}
+    found: dict[str, Any] = {}
+    for brush in model.brushes:
+        share = efficiency(brush)
+        name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
+        relative = by_name[name].sigma / by_name[name].value
+        known = not math.isnan(share)
+        found[str(brush.number)] = {
+            **brush.set_points.model_dump(exclude_none=True),
+            'transfer_efficiency': share if known else None,
+            'transfer_efficiency_sigma': share * relative if known else None,
+        }
+    law = BrushLaw(model.brushes).exponents() if several else {}
+    exponents = {
+        of: {name: {'value': value, 'sigma': sigma} for name, (value, sigma) in each.items()}
+        for of, each in law.items()
+    }
+    return {'by_number': found, 'exponents': exponents}

@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.inference.readings.campaign import Experiment
 
 KEY = 'standing'
 # A shorter opening of the gun is mostly its trigger's; a longer one no spot needs [s].
@@ -23,7 +23,7 @@ OF_WHOLE_JOBS = ('order', 'level')
 
 
 @dataclass(frozen=True)
-class Stand:
+class StationarySpray:
     """A gun that sprays on one spot, square to the part.
 
     Attributes:
@@ -47,7 +47,7 @@ class Stand:
     @staticmethod
     def before(
         experiment: Experiment, row: int, model: DepositionModel, most_um: float
-    ) -> 'Stand | None':
+    ) -> 'StationarySpray | None':
         """Before a measured point, with roll, standoff and flow of the passes over the part.
 
         Args:
@@ -79,7 +79,7 @@ class Stand:
         dwell = STEP_S * math.floor(most_um / rate / STEP_S + 1e-9)
         if not SHORTEST_S <= dwell <= LONGEST_S:
             return None
-        return Stand(
+        return StationarySpray(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
             flow, float(experiment.means.mean_um[row]), rate * dwell, brush,
         )  # fmt: skip
