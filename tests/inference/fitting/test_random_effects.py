@@ -51,14 +51,6 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
 
 
-def test_nothing_put_in_gives_nothing_notable():
-    study = Study.of(Campaign((part('left'), part('right'))))
-    found = estimated(study, np.zeros(len(study)))
-    assert len(found) == 4
-    assert all(amount.value == pytest.approx(0.0) for amount in found.values())
-    assert not any(amount.is_notable for amount in found.values())
-
-
 def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
     study = Study.of(Campaign((part('left', 'Monday'), part('right', 'Monday'), part('roof'))))
     level, zero = study.random_effects

@@ -31,14 +31,6 @@ def test_repeats_are_averaged_in_order_of_first_appearance():
     assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
 
 
-def test_readings_without_labels_are_points_of_their_own():
-    assert len(PointMeans.of(Readings.of(np.zeros((3, 3)), [1.0, 2.0, 3.0])).first) == 3
-
-
-def test_no_readings_are_no_points():
-    assert len(PointMeans.of(at_points('', [])).mean_um) == 0
-
-
 def test_one_label_at_two_places_is_refused():
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])

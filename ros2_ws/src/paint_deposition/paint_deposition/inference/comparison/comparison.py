@@ -131,11 +131,11 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
         points.predicted_um[campaign.means.owner],
         study.noise.sigma_um,
     )
-    dependences = []
-    for covariate in study.covariates(model):
-        if covariate.varies:
-            found = spearmanr(covariate.values, points.residual_um)
-            dependences.append(Dependence(covariate.name, *map(float, found)))
+    dependences = [
+        Dependence(one.name, *map(float, spearmanr(one.values, points.residual_um)))
+        for one in study.covariates(model)
+        if one.varies
+    ]
     return Comparison(
         study,
         readings,

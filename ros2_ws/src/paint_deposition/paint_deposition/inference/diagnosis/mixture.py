@@ -14,9 +14,9 @@ import numpy as np
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.model_space import (
-    CREDIBLE, DRAWS, LEAST_BESIDE, PRIOR, SIZES, SURE, Group, Model, ModelSpace,
+    DRAWS, LEAST_BESIDE, PRIOR, SIZES, SURE, Model, ModelSpace,
 )
-from paint_deposition.inference.fitting.remainder import Remainder, Sizes
+from paint_deposition.inference.fitting.remainder import Remainder
 
 # So many sizes are kept at most, and none whose share of the posterior is smaller.
 MOST, LEAST_SHARE = 4, 0.02

@@ -96,14 +96,10 @@ def compared(free: np.ndarray, predicted: Sequence[Predicted]) -> list[_Pair]:
     return sorted(found, key=lambda pair: pair.imitation.separation)
 
 
-def _now(rivals: Rivals) -> _Pair:
-    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
-    return compared(free, rivals.here)[0]
-
-
 def _sprays(rivals: Rivals) -> list[Spray]:
-    now = _now(rivals).imitation.separation
-    parts = _telling(rivals)
+    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
+    now = compared(free, rivals.here)[0].imitation.separation
+    parts = _parts_that_show_most(rivals)
     made = _best([_tried(rivals, part, change, now) for part in parts for change in MENU])
     if made:
         best = made[0].experiment
@@ -128,7 +124,7 @@ def _best(tried: Sequence[_Tried | None]) -> list[_Tried]:
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
 
-def _telling(rivals: Rivals) -> list[Experiment]:
+def _parts_that_show_most(rivals: Rivals) -> list[Experiment]:
     """The experiments on which what competes shows most."""
     campaign = rivals.study.campaign
     shown = sum(predicted.change**2 for predicted in rivals.here)
@@ -154,7 +150,9 @@ def _tried(
         return None
     stand = None
     if spot is not None:
-        stand = StationarySpray.before(new, spot, rivals.fit.model, _most_um(study))
+        # The thickest film that may be sprayed on a spot: that wanted, else that measured.
+        most_um = study.campaign.target_um or float(study.measured_um.max())
+        stand = StationarySpray.before(new, spot, rivals.fit.model, most_um)
         if stand is None:
             return None
         new = stand.sprayed(new)
@@ -185,12 +183,6 @@ def _tried(
     return _Tried(experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
 
 
-def _most_um(study: Study) -> float:
-    """The thickest film that may be sprayed on a spot: that wanted, else that measured."""
-    wanted = study.campaign.target_um
-    return float(study.measured_um.max()) if wanted is None else wanted
-
-
 def _in_words(
     study: Study, experiment: Experiment, change: Change, stand: StationarySpray | None
 ) -> str:
@@ -216,8 +208,7 @@ def _with_readings(
     experiment: Experiment, positions_m: np.ndarray, film_um: np.ndarray, noise_um: float
 ) -> Experiment:
     """The experiment with predicted films (P,) [um] as its readings."""
-    noise = np.full(len(film_um), noise_um)
-    readings = Readings.of(positions_m, film_um, sigma_um=noise)
+    readings = Readings.of(positions_m, film_um, sigma_um=np.full(len(film_um), noise_um))
     return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
                    used=np.ones(len(readings), dtype=bool))  # fmt: skip
 

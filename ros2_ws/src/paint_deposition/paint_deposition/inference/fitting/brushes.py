@@ -71,21 +71,19 @@ def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dic
     if not model.brushes:
         return None
     several = len(model.brushes) > 1
-    by_name = {value.name: value for value in parameters}
-    found: dict[str, Any] = {}
+    relative = {value.name: value.sigma / value.value for value in parameters if value.value}
+    by_number: dict[str, Any] = {}
     for brush in model.brushes:
         share = efficiency(brush)
         name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
-        relative = by_name[name].sigma / by_name[name].value
         known = not math.isnan(share)
-        found[str(brush.number)] = {
+        by_number[str(brush.number)] = {
             **brush.set_points.model_dump(exclude_none=True),
             'transfer_efficiency': share if known else None,
-            'transfer_efficiency_sigma': share * relative if known else None,
+            'transfer_efficiency_sigma': share * relative[name] if known else None,
         }
-    law = BrushLaw(model.brushes).exponents() if several else {}
     exponents = {
         of: {name: {'value': value, 'sigma': sigma} for name, (value, sigma) in each.items()}
-        for of, each in law.items()
+        for of, each in (BrushLaw(model.brushes).exponents() if several else {}).items()
     }
-    return {'by_number': found, 'exponents': exponents}
+    return {'by_number': by_number, 'exponents': exponents}

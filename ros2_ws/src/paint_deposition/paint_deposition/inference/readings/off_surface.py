@@ -1,9 +1,14 @@
-"""Why points lie off a part: another unit, another frame, or single wrong points."""
+"""Readings off the part, and why: another unit, another frame, or single wrong points."""
 
 import numpy as np
 
+from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.part.surface import Surface
 
+# Readings further from the surface, or facing more away from it, do not belong to the part.
+MAX_DISTANCE_M = 0.02
+MAX_ANGLE_RAD = np.radians(60.0)
 # Ways in which a file may have been meant, by the factor on its positions.
 OTHER_UNITS = {
     0.001: 'they fit in millimetres: the file says metres, or its unit is wrong',
@@ -19,20 +24,46 @@ SPOT = 0.01
 ALIKE = 0.25
 
 
-def lie_on_a_spot(surface: Surface, positions_m: np.ndarray) -> bool:
+def refuse_off_surface(
+    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
+) -> None:
+    """Refuse points (P,) that are this far from the surface [m]."""
+    far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
+    if not len(far):
+        if _lie_on_a_spot(surface, readings.positions_m):
+            hint = _hint(surface, readings.positions_m)
+            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
+        return
+    worst = far[np.argmax(distance_m[far])]
+    where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
+    raise ReadingsError(
+        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
+        f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
+        f'm (limit {MAX_DISTANCE_M:g}); {_hint(surface, readings.positions_m)}'
+    )
+
+
+def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
+    """Refuse points whose normals (P,) are turned this far from the surface's [rad]."""
+    away = np.flatnonzero(angle_rad > MAX_ANGLE_RAD)
+    if len(away):
+        worst = away[np.argmax(angle_rad[away])]
+        raise ReadingsError(
+            f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
+            f"surface, point '{readings.point[means.first[worst]]}' by "
+            f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
+        )
+
+
+def _lie_on_a_spot(surface: Surface, positions_m: np.ndarray) -> bool:
     """Whether readings (N, 3) [m] huddle on a spot of the part and fit a thousand times larger."""
     longest = np.ptp(surface.vertices_m, axis=0).max()
     huddled = len(positions_m) > 1 and np.ptp(positions_m, axis=0).max() < SPOT * longest
     return bool(huddled) and _fits(surface, 1000.0 * positions_m)
 
 
-def off_surface_hint(surface: Surface, positions_m: np.ndarray) -> str:
-    """Both bounding boxes and the likely cause, in one line.
-
-    Args:
-        surface: the part.
-        positions_m: (N, 3) of the readings [m].
-    """
+def _hint(surface: Surface, positions_m: np.ndarray) -> str:
+    """Both bounding boxes and the likely cause, in one line."""
     vertices = surface.vertices_m
     boxes = f'the readings span {_box_words(positions_m)} m and the part {_box_words(vertices)} m'
     for factor, words in OTHER_UNITS.items():
