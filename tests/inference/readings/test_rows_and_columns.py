@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from booth import panel, path_of, serpentine
-from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
+from paint_deposition.inference.readings.placement import columns_or_rows
 from paint_deposition.motion.path import SprayPath
 
 

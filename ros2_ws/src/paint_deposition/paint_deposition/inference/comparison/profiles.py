@@ -13,7 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
-from paint_deposition.inference.readings.rows_and_columns import FEWEST_ON_A_LINE, passes_are_level
+from paint_deposition.inference.readings.placement import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis
 from paint_deposition.part.points import SurfacePoints
@@ -55,7 +55,6 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     A model's line runs through the readings of a group, and along the middle of a strip.
 
     Args:
-        study: the readings.
         models: whose lines are wanted; single passes are those of the last.
     """
     found = []
@@ -77,7 +76,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
 
 @dataclass(frozen=True)
 class _Line:
-    """Readings in order along an axis, and the places (n, 3) through which the model's line runs."""
+    """Readings in order along an axis, and places (n, 3) along which the model's line runs."""
 
     label: str
     axis: str

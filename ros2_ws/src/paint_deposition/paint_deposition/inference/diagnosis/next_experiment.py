@@ -138,10 +138,7 @@ def _tried(
     """How well the readings would separate with this spray, None where it cannot be done.
 
     Args:
-        rivals: what competes.
-        experiment: the part that is painted anew.
         change: what is done otherwise.
-        now: separation without the spray.
         spot: measured point before which the gun stands still; None: it runs the passes.
     """
     study = rivals.study

@@ -149,11 +149,8 @@ def choose(
     """Choose points for the gauge.
 
     Args:
-        part: what was painted how.
         count: of points. repeats: of these to be read twice, for the noise of the gauge.
         foot_m: of the gauge, from its middle to its rim; the distance kept from edges [m].
-        seed: of the places tried and of the noise simulated.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the part has no room for so many points.
@@ -226,7 +223,6 @@ def power_of(
     Args:
         part: what was painted how. vertices: (P,) where it is read.
         freedom: degrees of freedom of the noise estimate.
-        seed: of the noise simulated.
     """
     space = part.space(part.study(vertices), freedom)
     null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]

@@ -48,12 +48,8 @@ def refit(
     """Fit the model without and with an effect, and compare the evidence of the two.
 
     Args:
-        campaign: the readings.
         start: the model so far; its effects are refitted too.
         added: the effect or learned law, or None to fit what is there.
-        library: effects to test for beside it, by id.
-        seed: of starts and simulated deviations.
-        progress: called with a line for each step of the work.
         known: what an earlier job told of the start's parameters: the prior.
 
     Raises:

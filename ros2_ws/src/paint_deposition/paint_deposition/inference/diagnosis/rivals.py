@@ -59,7 +59,6 @@ class Rivals:
     """All explanations that compete, linear around one fit.
 
     Attributes:
-        study: the readings at hand.
         fit: where to linearise; what competes may be part of its model.
         found: the explanations. here: what each predicts for the readings at hand.
         scales: mean and standard deviation of each covariate at the readings at hand.
@@ -76,7 +75,6 @@ class Rivals:
         """Fit each explanation to the readings beside everything else that the model has.
 
         Args:
-            study: the readings.
             fit: where to linearise.
             names: for each the effect, or the covariate of a shapeless cause.
         """

@@ -51,8 +51,6 @@ class StationarySpray:
         """Before a measured point, with roll, standoff and flow of the passes over the part.
 
         Args:
-            experiment: the part, and how it was painted.
-            row: of the point.
             model: its pattern and projection tell the film on a flat spot, which is the least
                 favourable one: elsewhere the paint lands on more surface.
             most_um: film that must not be exceeded [um].

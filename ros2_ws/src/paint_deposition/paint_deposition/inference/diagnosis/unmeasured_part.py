@@ -33,7 +33,6 @@ class UnmeasuredPart:
     """A part as it was, or will be, painted.
 
     Attributes:
-        surface: the part, turned to the gun.
         path: sub-steps of the gun's motion.
         model: as far as it is known.
         library: effects that may be missing, by id.
@@ -100,7 +99,6 @@ class UnmeasuredPart:
         """What the diagnosis would search.
 
         Args:
-            study: of the readings.
             freedom: degrees of freedom of the noise estimate.
         """
         fit = self.fit(study)

@@ -64,9 +64,6 @@ def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dic
     """Set-points and transfer efficiency of each brush, and the law between them.
 
     None without brushes. The efficiency is that on a part which catches everything.
-
-    Args:
-        model: calibrated. parameters: its own, with uncertainties.
     """
     if not model.brushes:
         return None

@@ -82,7 +82,6 @@ class Calibration:
         study: the campaign, ready for inference. fit: the fit of all parameters.
         parameters: of the pattern and of varied effects, with uncertainties.
         correlations: of pairs, strongest first.
-        residuals: of each experiment's points.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
         warnings: what the reader must know, a sentence each.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
@@ -173,11 +172,8 @@ def calibrate(
     """Fit the pattern, and the amplitudes of the start's effects, to all readings.
 
     Args:
-        campaign: painted parts with readings.
         start: fixes projection and effects and is a first guess of the pattern; default: a 50 mm
             bell, whose pattern is then guessed from the first panel.
-        seed: of the further starts.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.

@@ -35,11 +35,8 @@ def clean_and_fit(
     """A campaign prepared for inference without its outliers, and the pattern fitted to it.
 
     Args:
-        campaign: the readings and how the parts were painted.
         start: first guess of the pattern; its effects are refitted, too.
         effects: those whose amplitudes may be varied later.
-        starts, seed: of the fit.
-        known: of the parameters from another job.
 
     Raises:
         ReadingsError: readings in another unit, with the remedy.

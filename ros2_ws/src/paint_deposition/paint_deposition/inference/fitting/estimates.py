@@ -79,17 +79,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
-        found.append(
-            Estimate(
-                name,
-                float(values[k]),
-                float(sigma[k]),
-                float(low[k]),
-                float(high[k]),
-                not reason,
-                reason,
-            )
-        )
+        figures = map(float, (values[k], sigma[k], low[k], high[k]))
+        found.append(Estimate(name, *figures, not reason, reason))
     return tuple(found)
 
 

@@ -112,7 +112,6 @@ def fit_readings(
     """Find the most probable values (maximum a posteriori).
 
     Args:
-        forward: predicts the points.
         measured_um, sigma_um: (P,) point means and their standard deviations [um].
         parameters: what is varied; its start model is the first start.
         starts: how many starts; others are the best of many shapes of the pattern around the

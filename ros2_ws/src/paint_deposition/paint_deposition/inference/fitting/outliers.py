@@ -11,7 +11,7 @@ closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
@@ -64,15 +64,9 @@ class FittedPoints:
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
-        return FittedPoints(
-            self.residual_um[rows],
-            self.predicted_um[rows],
-            self.gauge_um[rows],
-            self.free_um[rows],
-            self.experiment_of[rows],
-            self.positions_m[rows],
-            tuple(Covariate(c.name, c.values[rows]) for c in self.covariates),
-        )
+        *arrays, covariates = (getattr(self, field.name) for field in fields(self))
+        some = tuple(Covariate(c.name, c.values[rows]) for c in covariates)
+        return FittedPoints(*(values[rows] for values in arrays), some)
 
 
 @dataclass(frozen=True)
@@ -178,13 +172,13 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
             yield share * film * root, np.log(0.5 / len(roots) / len(SHARES))
 
 
-# Prior probability that a reading is a outlier, and the posterior one from which it counts as one.
-SLIP, SURE = 0.01, 0.9
-# Slips are rare: where a greater share of the points would be some, the model is at fault.
+# Prior probability of an outlier, and the posterior one from which a reading counts as one.
+RARE, SURE = 0.01, 0.9
+# They are rare: where a greater share of the points would be some, the model is at fault.
 MOST = 0.05
 # Fewer points say too little of each other.
 FEWEST = 20
-# A outlier of the pen is proposed if it explains the reading to within this many standard deviations.
+# What was probably meant is proposed if it is expected to within this many standard deviations.
 NEAR = 3.0
 
 
@@ -233,7 +227,6 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[f
     expected of sound readings.
 
     Args:
-        misfit: P points beside a fitted model.
         single: (P,) whether a point was read only once.
     """
     count = len(single)
@@ -244,9 +237,9 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[f
     film, left = np.mean(misfit.predicted_um), misfit
     while True:
         scatter = left.scatter
-        # Nothing is known of a outlier but that it is a number of the size of the film.
+        # Nothing is known of an outlier but that it is a number of the size of the film.
         wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
-        log_odds = np.log(SLIP / (1.0 - SLIP)) + wild - scatter.log_density
+        log_odds = np.log(RARE / (1.0 - RARE)) + wild - scatter.log_density
         log_odds[~single[kept]] = -np.inf
         worst = int(np.argmax(log_odds))
         if expit(log_odds[worst]) < SURE:

@@ -154,9 +154,7 @@ def shifts(
     """(n, k) by how much the fit's vector moves without the readings at the ends.
 
     Args:
-        study: the readings. fit: to all of them.
         reaches: panels whose ends are left out, strip by strip.
-        fitted: repeats the fit.
     """
     moved = []
     for strip_m in STRIPS_M:

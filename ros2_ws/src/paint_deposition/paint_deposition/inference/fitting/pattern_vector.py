@@ -113,12 +113,7 @@ class PatternVector:
         return found
 
     def out_of(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all.
-
-        Args:
-            whole: with these brushes and others.
-            vector: (n,) its entries.
-        """
+        """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all."""
         rows = [whole.brushes.index(number) for number in self.brushes]
         slope = np.zeros((len(self), len(whole)))
         for row, there in enumerate(rows):

@@ -31,7 +31,6 @@ class RandomEffects:
     Attributes:
         kind: 'part level', or 'gauge zero'.
         unit: of their amounts.
-        names: of the n parts or gauge sessions.
         mixing: (n, n) amounts in the unit for amplitudes of unit variance.
         columns: (P, n) directions over the noise, for amplitudes of unit variance.
     """
@@ -106,7 +105,6 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
 
     Args:
         fit: whose first nuisance directions are those of the random effects.
-        effects: of the study.
     """
     mean, covariance = fit.amplitudes
     found, first = [], 0

@@ -8,9 +8,12 @@ import numpy as np
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.gauge_noise import left_out_lines
-from paint_deposition.inference.readings.off_surface import refuse_off_surface, refuse_other_side
+from paint_deposition.inference.readings.placement import (
+    columns_or_rows,
+    refuse_off_surface,
+    refuse_other_side,
+)
 from paint_deposition.inference.readings.readings import PointMeans, Readings
-from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface

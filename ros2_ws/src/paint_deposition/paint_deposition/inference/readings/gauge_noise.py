@@ -57,7 +57,6 @@ def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
     """A line for each point at which some of several readings were left out.
 
     Args:
-        taken: all readings of a part.
         used: (N,) whether they are used.
     """
     lines = []

@@ -59,7 +59,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     """Refuse readings that no film gives.
 
     Args:
-        readings: as taken.
         sigma_um: (N,) standard deviation of a reading [um].
 
     Raises:
@@ -114,7 +113,6 @@ def check_units_beside(
     """Refuse points that agree with a robust fit if they are taken for another unit.
 
     Args:
-        readings: as taken.
         measured_um, expected_um: (P,) point means, and the film expected there [um].
 
     Raises:
@@ -168,7 +166,6 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> None:
     """Refuse an experiment in which no paint lands at any measured point.
 
     Args:
-        campaign: painted parts with readings.
         model: its pattern and projection count, its effects do not.
 
     Raises:
