@@ -53,12 +53,6 @@ def fitted_transect(station: np.ndarray, depth: np.ndarray) -> Transect:
     return Transect(station, depth, three, float(height), float(sigma))
 
 
-def aicc(residual: np.ndarray, parameters: int) -> float:
-    """Akaike's criterion for few data; the noise counts as a parameter."""
-    n, k = len(residual), parameters + 1
-    return n * math.log(np.mean(residual**2)) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
-
-
 @dataclass(frozen=True)
 class Spot:
     """A static radial profile at 130 mm and eq. (1) without asymmetry fitted to it."""

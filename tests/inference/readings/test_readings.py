@@ -50,20 +50,6 @@ def test_noise_is_pooled_within_points():
     assert noise.sigma_um == pytest.approx(np.sqrt(squares / 6), rel=1e-3)
 
 
-def test_noise_keeps_the_shape_of_a_usual_gauge():
-    random = np.random.default_rng(1)
-    film = np.repeat(random.uniform(0.0, 200.0, 400), 2)
-    sigma = 1.5 * np.hypot(0.7, 0.01 * film)
-    labels = np.repeat(np.arange(400).astype(str), 2)
-    readings = Readings.of(
-        np.zeros((800, 3)), film + sigma * random.normal(size=800), point=labels
-    )
-    noise = gauge_noise(readings)
-    assert noise.degrees_of_freedom == 400
-    # The standard error of a pooled deviation is 1 / sqrt(2 x 400) = 3.5 %.
-    assert noise.sigma_um / sigma == pytest.approx(np.ones(800), abs=0.1)
-
-
 def test_one_label_on_two_parts_is_two_points_of_one_gauge():
     first, second = at_points('aab', [1.0, 2.0, 9.0]), at_points('aabbbb', [7.0, 8.0, 1, 2, 3, 4])
     parts = {'first': first, 'second': second}
