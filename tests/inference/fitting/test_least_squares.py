@@ -179,7 +179,7 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
     effects = [EFFECTS[name].typical() for name in ('tcp_tilt', 'overspray_fog', 'occlusion')]
     models = [TRUTH.with_effect(effect) for effect in effects]
     models += [TRUTH.with_effect(AirDrift(shift_down_m=0.002 * k)) for k in range(12)]
-    models += [TRUTH.model_copy(update={'projection': Projection(model_plane_m=0.3)}), TRUTH]
+    models += [TRUTH.model_copy(update={'projection': Projection(model_plane_m=0.25)}), TRUTH]
     alone = [Forward(forward.campaign).predict_um(model) for model in models]
     assert len({film.tobytes() for film in alone}) == len(models) - 2  # no drift; no shadow
     for _ in range(2):
