@@ -1,4 +1,4 @@
-"""What to measure and what to spray next, to tell apart the explanations that compete.
+"""What to measure and what to spray next, to separate the explanations that compete.
 
 Their separation, see ``separation``, is computed for the readings at hand and for these together
 with those of a further experiment. The experiment after which most probably one explanation is
@@ -185,7 +185,7 @@ def _in_words(
 ) -> str:
     what = f'the same passes {change.words}'
     if stand is not None:
-        # Its words tell the distance already.
+        # Its words give the distance already.
         otherwise = '' if change.kind == 'standoff' else change.words
         what = f'{stand.words}; {otherwise}'.removesuffix('; ')
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what

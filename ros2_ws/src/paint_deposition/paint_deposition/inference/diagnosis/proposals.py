@@ -53,7 +53,7 @@ class Spray:
 
     Attributes:
         what: in words; names the part where there are several.
-        separates: the explanations that it is to tell apart, effect ids or 'unknown'.
+        separates: the explanations that it is to separate, effect ids or 'unknown'.
         separation: standard deviations between the two that are least apart with it.
         now: the same without it.
         readings: number of points to be measured on the new part.

@@ -50,7 +50,7 @@ def refit(
     Args:
         start: the model so far; its effects are refitted too.
         added: the effect or learned law, or None to fit what is there.
-        known: what an earlier job told of the start's parameters: the prior.
+        known: what is known of the start's parameters: the prior.
 
     Raises:
         ModelError: the model has the effect already, or its law cannot be learned here.

@@ -1,4 +1,4 @@
-"""A painted part before it is measured: what readings at any place would tell of the effects."""
+"""A painted part before it is measured: what readings at any place would say of effects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -36,7 +36,7 @@ class UnmeasuredPart:
         path: sub-steps of the gun's motion.
         model: as far as it is known.
         library: effects that may be missing, by id.
-        known: what earlier readings told of the model, or None.
+        known: what is known of the model from earlier readings, or None.
     """
 
     surface: Surface

@@ -15,14 +15,14 @@ from paint_deposition.model.brush import Brush, SetPoints, listed
 from paint_deposition.model.brush_law import BrushLaw
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
-# What recordings tell of the process beside the flow, which they tell relative to the brush's.
+# What recordings hold of the process beside the flow, which is relative to the brush's.
 RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 
 
 def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionModel:
     """A model with the brushes that painted a campaign's parts, and no others.
 
-    One pattern is the first guess of all brushes, with the set-points that the recordings tell.
+    One pattern is the first guess of all brushes, with the set-points of the recordings.
 
     Raises:
         ModelError: the model has brushes, but not one of these.
@@ -47,16 +47,16 @@ def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionMod
 
 
 def _set_points(campaign: Campaign, number: int) -> SetPoints:
-    """Those that the recordings with this brush alone tell."""
+    """Medians over the recordings with this brush alone."""
     found = {}
     for name in RECORDED:
-        told = [
+        recorded = [
             abs(e.settings[name])
             for e in campaign.experiments
             if e.brushes == {number} and e.settings.get(name)
         ]
-        if told:
-            found[name] = float(np.median(told))
+        if recorded:
+            found[name] = float(np.median(recorded))
     return SetPoints(**found)
 
 

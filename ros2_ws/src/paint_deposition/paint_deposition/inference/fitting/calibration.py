@@ -286,7 +286,7 @@ def _warnings(
         if not value.determined
     ]
     warnings += [
-        f'{pair.first} and {pair.second} can hardly be told apart (correlation '
+        f'{pair.first} and {pair.second} can hardly be separated (correlation '
         f'{pair.value:+.2f}): trust their combination, not each'
         for pair in pairs
         if pair.too_close

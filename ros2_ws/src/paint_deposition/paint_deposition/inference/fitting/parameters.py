@@ -115,7 +115,7 @@ class FreeParameters:
     Attributes:
         start: the model that fixes everything else, effects included.
         varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
-        known: what an earlier job told of them, or None.
+        known: what is known of them from an earlier job, or None.
     """
 
     start: DepositionModel

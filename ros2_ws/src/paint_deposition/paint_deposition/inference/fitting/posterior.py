@@ -39,7 +39,7 @@ def of_brushes(
 ) -> Posterior | None:
     """What is known of the brushes that painted a campaign.
 
-    Where nothing was calibrated, a model with several brushes still tells how they differ: their
+    Where nothing was calibrated, a model with several brushes still says how they differ: their
     level and size are open, and each may differ from the others as much as jobs do.
 
     Args:
@@ -63,7 +63,7 @@ def of_brushes(
 
 
 def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Posterior:
-    """The posterior of some brushes out of that of all; what else it tells stays."""
+    """The posterior of some brushes out of that of all; the rest of it stays."""
     if whole.brushes == kept.brushes:
         return known
     names = [c.name for c in whole.coordinates]

@@ -20,7 +20,7 @@ OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
-# An amount beyond this many of its standard deviations is worth telling.
+# An amount beyond this many of its standard deviations is worth a mention.
 NOTABLE = 2.0
 
 

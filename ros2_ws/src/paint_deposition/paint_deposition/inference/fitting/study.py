@@ -24,9 +24,9 @@ from paint_deposition.inference.readings.residuals import Residuals, root_mean_s
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-# What facets cost the film is left out below this share of the noise, and told of from this. The
+# What facets cost the film is left out below this share of the noise, and reported from this. The
 # estimate is off by this share of itself, see ``film.facet_error``.
-LEAST_FACETS, WORTH_TELLING, FACETS_OFF = 0.1, 1.0, 0.5
+LEAST_FACETS, WORTH_REPORTING, FACETS_OFF = 0.1, 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Study:
         return replace(self, texture=texture, sigma_um=sigma_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
-        """The same with what facets cost under a model, if it is worth telling from the noise.
+        """The same with what facets cost under a model, if it shows beside the noise.
 
         How much of it is true is fitted for each part: it is one of the nuisance directions. What
         it does not follow is noise of its own.
@@ -239,7 +239,7 @@ class Study:
         for name, direction in self._facets.items():
             off_um = np.abs(direction * self.sigma_um)
             worst = int(off_um.argmax())
-            if off_um[worst] > WORTH_TELLING * self.gauge_um[worst]:
+            if off_um[worst] > WORTH_REPORTING * self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
                     f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '

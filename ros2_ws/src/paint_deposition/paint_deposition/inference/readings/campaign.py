@@ -152,7 +152,7 @@ class Campaign:
         model_file: the start model's file, or None.
         name: that of its file, '' for none; errors compare within one campaign only.
         head: what the report says of part and batch, by key.
-        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not told.
+        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not known.
 
     Raises:
         ReadingsError: two experiments have one name.
@@ -207,8 +207,8 @@ class Campaign:
     def settings(self) -> dict[str, float]:
         """Mean over the experiments of each setting of the process that is known."""
         names = dict.fromkeys(name for e in self.experiments for name in e.settings)
-        told = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
-        return {name: float(np.mean(values)) for name, values in told.items()}
+        known = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
+        return {name: float(np.mean(values)) for name, values in known.items()}
 
     def without(self, left_out: np.ndarray) -> 'Campaign':
         """The same campaign without some of its readings (N,).

@@ -111,7 +111,7 @@ def columns_or_rows(surface: Surface, path: SprayPath, positions_m: np.ndarray) 
     Where points lie in both, the lines that cross the passes are taken.
 
     Args:
-        surface: the part, whose axes as the gun sees it tell left from right.
+        surface: the part, seen by the gun, which fixes left and right.
         positions_m: (P, 3) of the points [m].
     """
     right = positions_m @ across_axis(surface.outward, surface.down)

@@ -90,7 +90,7 @@ class Readings:
 
     @property
     def fingerprint(self) -> str:
-        """Twelve hexadecimal digits that tell these readings from any others."""
+        """Twelve hexadecimal digits that identify these readings."""
         table = np.column_stack([self.positions_m, self.thickness_um])
         return hashlib.sha256(np.ascontiguousarray(table).tobytes()).hexdigest()[:12]
 
