@@ -4,8 +4,8 @@ Readings are linear in the pattern's parameters and in the amplitudes of the eff
 effect changes at the chosen places beyond what the pattern can imitate is its noncentrality (D_s-
 optimality), and what another effect beside the pattern cannot imitate of it is their separation
 (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). A design is worth the probability that
-an effect is detected and separated from its nearest rival, averaged over the effects and over the sizes
-in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
+an effect is detected and separated from its nearest rival, averaged over the effects and over the
+sizes in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
 added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 1972).
 """
 
@@ -88,7 +88,7 @@ class Design:
 
     @property
     def worth(self) -> float:
-        """Probability that an effect is detected, and separated from its nearest rival; their mean."""
+        """Mean probability that an effect is detected, and separated from its nearest rival."""
         weights, tests = self.marks.weights, len(set(self.marks.effects))
         detected = weights @ power(self.noncentralities, tests)
         return float(0.5 * (detected + weights @ power(self.nearest()[2], tests)))
