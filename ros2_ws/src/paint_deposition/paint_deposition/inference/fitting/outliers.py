@@ -64,9 +64,13 @@ class FittedPoints:
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
-        *arrays, covariates = (getattr(self, field.name) for field in fields(self))
-        some = tuple(Covariate(c.name, c.values[rows]) for c in covariates)
-        return FittedPoints(*(values[rows] for values in arrays), some)
+        some: dict[str, Any] = {
+            one.name: getattr(self, one.name)[rows]
+            for one in fields(self)
+            if one.name != 'covariates'
+        }
+        covariates = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
+        return FittedPoints(**some, covariates=covariates)
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,9 @@ class Readings:
         """The chosen rows, by mask or indices."""
         names = ('positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session')
         columns = {name: getattr(self, name) for name in names}
-        some = {name: None if c is None else c[rows] for name, c in columns.items()}
+        some: dict[str, Any] = {
+            name: None if c is None else c[rows] for name, c in columns.items()
+        }
         return replace(self, **some)
 
     @property
