@@ -22,7 +22,7 @@ from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
-from paint_deposition.inference.fitting.slips import Slip
+from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
 from paint_deposition.report.page.tables import point_rows
@@ -373,8 +373,8 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
 
 
 def test_readings_left_out_and_levels_of_parts_are_shown(tmp_path, diagnosis, comparisons):
-    slip = Slip('door: P007', 312.0, 30.9, 1.2)
-    study = replace(diagnosis.study, slips=(slip,))
+    slip = Outlier('door: P007', 312.0, 30.9, 1.2)
+    study = replace(diagnosis.study, outliers=(slip,))
     told = replace(diagnosis, study=study)
     beside = tuple(replace(comparison, study=study) for comparison in comparisons)
     tell(tmp_path / 'report.html', told, beside)

@@ -1,7 +1,5 @@
 """Profiles along columns of readings."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,7 +7,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
@@ -64,18 +61,3 @@ def test_readings_without_rows_or_columns_fall_into_strips_with_a_line(tmp_path)
         assert len(profile.line_m) > len(profile.rows)
         middle = profile.lines_um[0][np.searchsorted(profile.line_m, profile.position_m)]
         assert middle == pytest.approx(predicted[profile.rows], rel=0.03)
-
-
-def test_readings_whose_groups_are_lost_have_the_same_profiles(tmp_path):
-    named = Study.of(small_campaign(tmp_path, experiments=('panel',)))
-    (panel,) = named.campaign.experiments
-    lost = replace(panel.readings, group=np.full(len(panel.readings), ''))
-    again = Experiment.of(panel.name, panel.surface, panel.path, lost)
-    found = Study.of(replace(named.campaign, experiments=(again,)))
-    before, after = (
-        {tuple(p.rows): p.lines_um for p in profiles_of(study, [DepositionModel()])}
-        for study in (named, found)
-    )
-    assert before.keys() == after.keys()
-    for rows, lines_um in before.items():
-        assert after[rows] == pytest.approx(lines_um)

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from booth import MODEL
+from booth import MODEL, panel
 from inference.diagnosis.linear import linear_fit
-from inference.diagnosis.readings_on_door import on_door, study_of
+from inference.diagnosis.readings_on_door import measured, on_door, study_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
@@ -17,6 +17,9 @@ from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.inference.diagnosis.explanations import LAW_ERROR, law_errors
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.part.surface import Surface
 
 EDGE = EdgeBuild(gain=0.3, length_m=0.05)
 
@@ -107,3 +110,26 @@ def test_an_effect_that_was_switched_off_has_no_error_on_that_part(study):
     owner = both.campaign.experiment_of
     assert found[owner == 0].max() > 0.05
     assert not found[owner == 1].any()
+
+
+def test_a_reading_where_no_paint_lands_has_no_error_of_a_free_law():
+    """On the back of a plate the model predicts exactly 0: nothing there is a share of a film."""
+    front = panel(0.4, 0.04)
+    back = front.vertices_m - [0.0, 0.002, 0.0], front.faces[:, ::-1] + len(front.vertices_m)
+    plate = Surface.from_triangles(
+        np.concatenate([front.vertices_m, back[0]]), np.concatenate([front.faces, back[1]]), 0.04
+    )
+    part = measured(plate, 'panel')
+    behind = part.readings.positions_m[0] - [0.0, 0.002, 0.0]
+    readings = Readings.of(
+        np.vstack([part.readings.positions_m, behind]),
+        np.append(part.readings.thickness_um, 0.0),
+        normals=np.vstack([part.readings.normals, -part.readings.normals[0]]),
+    )
+    study = study_of(Experiment.of('plate', plate, part.path, readings))
+    film_um = study.forward.predict_um(MODEL)
+    assert film_um[-1] == 0.0 < film_um[:-1].min()
+    assert type(EDGE).free_law == 'factor'
+    found = size(errors(study, EDGE))
+    assert found[-1] == pytest.approx(0.0)
+    assert found[:-1].max() > 0.05

@@ -1,17 +1,13 @@
-"""Fits of eqs. (1) to (3) to profiles measured on other people's machines, and their picture.
-
-python tests/inference/fitting/real_profiles.py DATA_FOLDER PICTURE draws them.
-"""
+"""Fits of eqs. (1) to (3) to profiles measured on other people's machines."""
 
 import math
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import curve_fit, least_squares
 
-from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
+from paint_deposition.inference.fitting.panel_fit import CollapseFit, fit_collapse
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection, flux_um_per_s
@@ -55,12 +51,6 @@ def fitted_transect(station: np.ndarray, depth: np.ndarray) -> Transect:
 
     (height, sigma), _ = curve_fit(gaussian, station, depth, [0.9, 70.0])
     return Transect(station, depth, three, float(height), float(sigma))
-
-
-def aicc(residual: np.ndarray, parameters: int) -> float:
-    """Akaike's criterion for few data; the noise counts as a parameter."""
-    n, k = len(residual), parameters + 1
-    return n * math.log(np.mean(residual**2)) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
 
 
 @dataclass(frozen=True)
@@ -158,59 +148,3 @@ def figures(folder: Path) -> dict[str, dict[str, float]]:
             'standoff_error': standoff_error,
         },
     }
-
-
-def draw(folder: Path, picture: Path) -> None:
-    """The three comparisons side by side."""
-    from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
-    from paint_deposition.report.style import ACCENT, COMPONENTS, INK, MUTED
-
-    figure = new_figure(13.0, 4.0)
-    left, middle, right = figure.subplots(1, 3)
-
-    one = transect(folder)
-    quiet(left, 'station [ft]', 'depth [in]', 'Moving sprinkler: eq. (3)')
-    x = np.linspace(-160.0, 160.0, 400)
-    for part, colour in zip(one.three.collapse.components_um(x), COMPONENTS, strict=True):
-        left.plot(x, part, color=colour, linewidth=1.0, linestyle='--')
-    left.plot(x, one.three.collapse.thickness_um(x), color=ACCENT, linewidth=1.8, label='eq. (3)')
-    single = one.height_in * np.exp(-0.5 * (x / one.sigma_ft) ** 2)
-    left.plot(x, single, color=MUTED, linewidth=1.4, label='one Gaussian')
-    left.plot(one.station_ft, one.depth_in, 'o', color=INK, markersize=4, label='measured')
-    left.set_ylim(0.0, 1.2)
-    legend(left, loc='upper right')
-
-    static = spot(folder)
-    quiet(middle, 'radius [mm]', 'thickness', 'Static magnetron at 130 mm: eq. (1)')
-    radius = np.linspace(0.0, 0.3, 300)
-    middle.plot(
-        1e3 * radius, static.pattern.flux_um_per_s(radius, 0.0),
-        color=ACCENT, linewidth=1.8, label='eq. (1)',
-    )  # fmt: skip
-    middle.plot(
-        1e3 * static.radius_m, static.thickness, 'o', color=INK, markersize=4,
-        label='measured',
-    )  # fmt: skip
-    middle.set_ylim(bottom=0.0)
-    legend(middle, loc='upper right')
-
-    coating = inclined(folder)
-    quiet(right, 'spray angle [deg]', 'thickness [um]', 'HVOF coating: eq. (2)')
-    normal = coating.thickness_um[coating.angle_deg == 90.0].mean()
-    angle = np.linspace(20.0, 90.0, 100)
-    right.plot(
-        angle, normal * np.sin(np.radians(angle)), color=ACCENT, linewidth=1.8, label='cosine law'
-    )
-    for standoff, colour in zip(np.unique(coating.standoff_mm), (*COMPONENTS, INK), strict=True):
-        there = coating.standoff_mm == standoff
-        right.plot(
-            coating.angle_deg[there], coating.thickness_um[there], 'o', color=colour,
-            markersize=4, label=f'{standoff:.0f} mm',
-        )  # fmt: skip
-    right.set_ylim(bottom=0.0)
-    legend(right, loc='lower right')
-    save_picture(figure, picture)
-
-
-if __name__ == '__main__':
-    draw(Path(sys.argv[1]), Path(sys.argv[2]))

@@ -12,15 +12,12 @@ from brushes import two_brushes
 from inference.fitting.panels import column, painted_by, passes
 from paint_deposition.api.inference import calibrate, compare, diagnose
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
-from paint_deposition.inference.fitting.least_squares import derivatives
+from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
+from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes
-from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import Brush
@@ -77,13 +74,6 @@ def test_patterns_survive_the_way_there_and_back():
     assert VECTOR.coordinates[9].name == 'brush_4.log_K3_ratio'
 
 
-def test_one_pattern_has_the_coordinates_of_the_pattern():
-    one = PatternVector()
-    assert one.coordinates == PATTERN
-    assert one.names == PATTERN_NAMES
-    assert PatternVector((5,)).coordinates == PATTERN
-
-
 @settings(max_examples=30)
 @given(st.lists(st.floats(-1.0, 1.0), min_size=13, max_size=13))
 def test_the_jacobian_is_that_of_the_coordinates(shifts):
@@ -102,19 +92,6 @@ def test_the_jacobian_is_that_of_the_coordinates(shifts):
     steps = 1e-6 * np.eye(13)
     slopes = [(bounded(vector + s) - bounded(vector - s)) / 2e-6 for s in steps]
     np.testing.assert_allclose(VECTOR.jacobian(vector), np.array(slopes).T, atol=1e-6)
-
-
-@pytest.mark.slow
-def test_derivatives_of_the_readings_are_those_of_the_film(campaign):
-    model = TRUTH.with_effect(AirDrift(shift_down_m=0.01))
-    study = Study.of(campaign, model.effects)
-    parameters = FreeParameters.of(model, *model.effects)
-    vector = parameters.encode(model)
-    found = derivatives(study.forward, parameters, vector, np.ones(len(study)))
-    for k in range(len(VECTOR)):
-        step = 1e-5 * np.eye(len(vector))[k]
-        up, down = (study.forward.predict_um(parameters.decode(vector + s)) for s in (step, -step))
-        np.testing.assert_allclose(found[:, k], (up - down) / 2e-5, atol=2e-4)
 
 
 @pytest.mark.slow

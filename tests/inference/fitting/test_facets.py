@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from booth import MODEL, painted, path_of, serpentine
-from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -36,7 +36,7 @@ def study(edge_m: float, sigma_um: float = 0.1, count: int = 120) -> Study:
         sigma_um=np.full(count, sigma_um),
     )  # fmt: skip
     experiment = Experiment.of('fold', fold(edge_m), PATH, readings)
-    return sifted(Campaign((experiment,)), MODEL)[0]
+    return clean_and_fit(Campaign((experiment,)), MODEL)[0]
 
 
 @pytest.fixture(scope='module')

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, fit_linear, linear_fit
+from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, linear_fit
 from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
@@ -56,26 +56,6 @@ def test_what_nothing_is_known_of_keeps_its_weak_prior():
     assert both.centre[count:] == pytest.approx(WITH_EFFECT.weak_prior.centre[count:])
     assert both.factor[count:, count:] == pytest.approx(np.eye(len(WITH_EFFECT) - count))
     assert not both.factor[count:, :count].any()
-
-
-def test_effects_that_are_not_varied_have_no_part_in_the_prior():
-    known = correlated(WITH_EFFECT)
-    whole, part = replace(WITH_EFFECT, known=known).prior, replace(PARAMETERS, known=known).prior
-    count = len(PATTERN)
-    covariance = whole.factor @ whole.factor.T
-    assert part.factor @ part.factor.T == pytest.approx(covariance[:count, :count])
-
-
-def test_knowing_the_pattern_narrows_a_fit_of_few_readings():
-    jacobian = np.random.default_rng(3).normal(size=(5, len(PATTERN)))
-    data = jacobian @ KNOWN.prior.centre
-    weak, known = (fit_linear(jacobian, data, p) for p in (PARAMETERS, KNOWN))
-    assert known.vector == pytest.approx(KNOWN.prior.centre)
-    assert known.penalty == pytest.approx(0.0, abs=1e-12)
-    covariance = scaled_covariance(known)
-    assert (np.diag(covariance) < np.diag(scaled_covariance(weak))).all()
-    precision = jacobian.T @ jacobian + KNOWN.prior.precision
-    assert covariance == pytest.approx(np.linalg.inv(precision))
 
 
 def test_no_reading_counts_twice(campaign):

@@ -51,12 +51,15 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
 
 
-def test_nothing_put_in_gives_nothing_notable():
+def test_the_one_residual_is_beside_the_levels_of_the_parts():
     study = Study.of(Campaign((part('left'), part('right'))))
-    found = estimated(study, np.zeros(len(study)))
-    assert len(found) == 4
-    assert all(amount.value == pytest.approx(0.0) for amount in found.values())
-    assert not any(amount.is_notable for amount in found.values())
+    film_um = study.measured_um
+    off_um = np.where(study.campaign.experiment_of == 0, 0.03, -0.03) * film_um
+    moved = replace(study, measured_um=film_um + off_um)
+    assert moved.residuals(film_um).rmse_um < 0.2 * np.sqrt(np.mean(off_um**2))
+    # What all parts have in common is the model's.
+    common = replace(study, measured_um=1.03 * film_um)
+    assert common.residuals(film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
 def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():

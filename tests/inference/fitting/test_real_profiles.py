@@ -13,7 +13,6 @@ import pytest
 
 from inference.fitting.real_profiles import (
     LANE_SPACING_FT,
-    aicc,
     figures,
     fitted_spot,
     fitted_transect,
@@ -21,7 +20,6 @@ from inference.fitting.real_profiles import (
     share_on_the_axis,
     spot,
     table,
-    transect,
 )
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
@@ -80,27 +78,6 @@ def test_the_shipped_figures_are_those_of_the_measurements(shared_data):
     assert found.keys() == SHIPPED.keys()
     for equation, values in found.items():
         assert values == pytest.approx(SHIPPED[equation], rel=1e-4, abs=1e-9), equation
-
-
-def test_eq3_follows_a_moving_sprinkler_but_one_gaussian_would_do(shared_data):
-    measured = transect(shared_data)
-    residual = measured.three.residuals.residual_um
-    peak = measured.depth_in.max()
-    assert measured.three.residuals.rmse_um < 0.06 * peak
-    simple = measured.depth_in - measured.one_in
-    assert np.sqrt(np.mean(simple**2)) < 0.1 * peak
-    # Eight parameters on sixteen stations: the criterion for few data prefers two.
-    assert aicc(simple, 2) < aicc(residual, 8) - 10.0
-
-
-def test_overlapped_lanes_are_as_uneven_as_the_transect_itself(shared_data):
-    measured = transect(shared_data)
-    total = lanes_of(
-        lambda x: np.interp(x, measured.station_ft, measured.depth_in, left=0.0, right=0.0)
-    )
-    predicted = ParallelPasses.one_way(measured.three.collapse).sigma_n(LANE_SPACING_FT)
-    assert predicted == pytest.approx(total.std() / total.mean(), abs=0.01)
-    assert 0.10 < predicted < 0.13
 
 
 def test_eq1_follows_a_static_radial_profile_within_a_percent(shared_data):

@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.readings.gauge_noise import gauge_noise
-from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
+from paint_deposition.inference.readings.gauge_noise import (
+    ASSUMED_FREEDOM,
+    ENOUGH_REPEATS,
+    gauge_noise,
+)
 from paint_deposition.inference.readings.readings import (
     PointMeans,
     Readings,
@@ -28,14 +31,6 @@ def test_repeats_are_averaged_in_order_of_first_appearance():
     assert means.owner.tolist() == [0, 1, 2, 1, 0, 0]
 
 
-def test_readings_without_labels_are_points_of_their_own():
-    assert len(PointMeans.of(Readings.of(np.zeros((3, 3)), [1.0, 2.0, 3.0])).first) == 3
-
-
-def test_no_readings_are_no_points():
-    assert len(PointMeans.of(at_points('', [])).mean_um) == 0
-
-
 def test_one_label_at_two_places_is_refused():
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
@@ -53,20 +48,6 @@ def test_noise_is_pooled_within_points():
     assert noise.source == 'repeats'
     assert noise.degrees_of_freedom == 6
     assert noise.sigma_um == pytest.approx(np.sqrt(squares / 6), rel=1e-3)
-
-
-def test_noise_keeps_the_shape_of_a_usual_gauge():
-    random = np.random.default_rng(1)
-    film = np.repeat(random.uniform(0.0, 200.0, 400), 2)
-    sigma = 1.5 * np.hypot(0.7, 0.01 * film)
-    labels = np.repeat(np.arange(400).astype(str), 2)
-    readings = Readings.of(
-        np.zeros((800, 3)), film + sigma * random.normal(size=800), point=labels
-    )
-    noise = gauge_noise(readings)
-    assert noise.degrees_of_freedom == 400
-    # The standard error of a pooled deviation is 1 / sqrt(2 x 400) = 3.5 %.
-    assert noise.sigma_um / sigma == pytest.approx(np.ones(800), abs=0.1)
 
 
 def test_one_label_on_two_parts_is_two_points_of_one_gauge():

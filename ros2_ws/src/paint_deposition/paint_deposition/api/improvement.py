@@ -14,7 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.inference.fitting.posterior import drawn
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface

@@ -12,18 +12,19 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
-from paint_deposition.inference.fitting.panel_reach import Reach, short_reaches
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
+from paint_deposition.inference.fitting.panel_fit import Reach, short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
-from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.geometry import require_paint
+from paint_deposition.inference.readings.plausibility import require_paint
 
 Progress = Callable[[str], None]
 MOST_MODELS = 6
@@ -75,11 +76,11 @@ def compare(
     progress('fitting the pattern')
     reaches: tuple[Reach, ...] = ()
     if model is None:
-        study, fit = sifted(campaign, bell, starts=STARTS)
+        study, fit = clean_and_fit(campaign, bell, starts=STARTS)
         model = fit.model
         reaches = short_reaches(study.campaign, model)
     else:
-        study, _ = sifted(campaign, model, model.effects)
+        study, _ = clean_and_fit(campaign, model, model.effects)
     progress('comparing')
     return replace(compared(study, model), warnings=tuple(map(str, reaches)))
 
@@ -104,7 +105,7 @@ def compare_models(
     for model in models.values():
         model.require_brushes(campaign.brushes)
     first = next(iter(models.values()))
-    study, _ = sifted(campaign, first, first.effects)
+    study, _ = clean_and_fit(campaign, first, first.effects)
     found = {}
     for name, model in models.items():
         progress(f'comparing {name}')
@@ -136,7 +137,9 @@ def diagnose(
     start, known = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
     reaches = () if known else short_reaches(found.study.campaign, found.model)
-    return replace(found, library=library, remarks=(*found.remarks, *map(str, reaches)))
+    found = replace(found, remarks=(*found.remarks, *map(str, reaches)))
+    progress('looking for what to measure and spray next')
+    return with_proposals(found, library)
 
 
 def refit(

@@ -257,8 +257,6 @@ def _diagnose(
         diagnosis = diagnosed(data, model, posterior=posterior, seed=seed, progress=show)
         show('comparing before and after')
         _ = diagnosis.comparisons
-        show('looking for what to measure and spray next')
-        _ = diagnosis.proposals
         show('writing the report')
         files = write_results(diagnosis, output, start=start, pictures=pictures)
     say_all('note', data.understood)

@@ -30,7 +30,7 @@ from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.inference.fitting.posterior import drawn
 
 NOTHING = 'nothing'
 

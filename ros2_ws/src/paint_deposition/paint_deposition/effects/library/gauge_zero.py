@@ -24,7 +24,7 @@ class GaugeZero(Effect):
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'
 
     offset_um: float = parameter(
-        0.0, low=-20.0, high=20.0, typical=1.2, unit='um',
+        0.0, low=-20.0, high=20.0, typical=0.8, unit='um',
         description='b, reading on bare metal; positive reads high',
     )  # fmt: skip
 

@@ -5,7 +5,7 @@ of each single pass.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
-from paint_deposition.inference.readings.rows_and_columns import FEWEST_ON_A_LINE, passes_are_level
+from paint_deposition.inference.readings.placement import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import across_axis
 from paint_deposition.part.points import SurfacePoints
@@ -55,18 +55,18 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     A model's line runs through the readings of a group, and along the middle of a strip.
 
     Args:
-        study: the readings.
         models: whose lines are wanted; single passes are those of the last.
     """
     found = []
     for index, experiment in enumerate(study.campaign.experiments):
         rows = np.flatnonzero(study.campaign.experiment_of == index)
-        lines = [_Line.of(experiment, label, members) for label, members in _grouped(experiment)]
+        lines = [_line(experiment, label, members) for label, members in _grouped(experiment)]
         lines = lines or list(_strips(experiment))
         drawn = [line for line in lines if len(line.members) >= FEWEST_ON_A_LINE]
         films = _films_along(experiment, drawn, models)
         for line in lines:
-            at, lines_um, passes_um = films.get(line.label, _nothing(len(models)))
+            nothing = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
+            at, lines_um, passes_um = films.get(line.label, nothing)
             found.append(
                 Profile(experiment.name, line.label, line.axis, rows[line.members],
                         line.position_m, at, lines_um, passes_um)
@@ -76,36 +76,33 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
 
 @dataclass(frozen=True)
 class _Line:
+    """Readings in order along an axis, and places (n, 3) along which the model's line runs."""
+
     label: str
     axis: str
     members: np.ndarray
     position_m: np.ndarray
     places_m: np.ndarray
 
-    @staticmethod
-    def of(
-        experiment: Experiment, label: str, members: np.ndarray, upright: bool | None = None
-    ) -> '_Line':
-        height_m, across_m = _axes(experiment, members)
-        if upright is None:
-            upright = np.ptp(height_m) >= np.ptp(across_m)
-        position = height_m if upright else across_m
-        axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
-        order = np.argsort(position, kind='stable')
-        places = experiment.points.positions_m[members[order]]
-        return _Line(label, axis, members[order], position[order], places)
 
-    @staticmethod
-    def along_strip(
-        experiment: Experiment, label: str, members: np.ndarray, upright: bool
-    ) -> '_Line':
-        """A line whose places lie along the middle of the strip."""
-        line = _Line.of(experiment, label, members, upright)
-        surface = experiment.surface
-        across = across_axis(surface.outward, surface.down)
-        aside = across if upright else -surface.down
-        away = line.places_m @ aside
-        return replace(line, places_m=line.places_m - np.outer(away - np.median(away), aside))
+def _line(
+    experiment: Experiment, label: str, members: np.ndarray, upright: bool | None = None
+) -> _Line:
+    """Of a group, along its longer side; of a strip, upright or not, along its middle."""
+    surface = experiment.surface
+    height_m, across_m = _axes(experiment, members)
+    is_strip = upright is not None
+    if upright is None:
+        upright = bool(np.ptp(height_m) >= np.ptp(across_m))
+    position = height_m if upright else across_m
+    axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
+    order = np.argsort(position, kind='stable')
+    places = experiment.points.positions_m[members[order]]
+    if is_strip:
+        aside = across_axis(surface.outward, surface.down) if upright else -surface.down
+        away = places @ aside
+        places = places - np.outer(away - np.median(away), aside)
+    return _Line(label, axis, members[order], position[order], places)
 
 
 def _axes(experiment: Experiment, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -141,7 +138,7 @@ def _strips(experiment: Experiment) -> Iterator[_Line]:
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
         what = 'across' if upright else 'height'
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
-        yield _Line.along_strip(experiment, label, members[part], upright)
+        yield _line(experiment, label, members[part], upright)
 
 
 def _films_along(
@@ -197,7 +194,3 @@ def _single_passes_um(
         integrator.reset()
         integrator.add(path.with_flow_scaled(inside))
         yield integrator.raw_um
-
-
-def _nothing(models: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    return np.empty(0), np.empty((models, 0)), np.empty((0, 0))

@@ -25,7 +25,6 @@ def spreading(
     row of a vertex without any is empty.
 
     Args:
-        surface: the part.
         positions_m, normals: (P, 3) points on its surface.
         radius_m: default: ``radius_of_readings_m``.
     """
@@ -53,7 +52,6 @@ def spread_over_surface(
     """Residual at each vertex (V,) [um], NaN where no reading is near.
 
     Args:
-        surface: the part.
         positions_m, normals: (P, 3) readings on its surface.
         residual_um: (P,) measured minus predicted.
     """

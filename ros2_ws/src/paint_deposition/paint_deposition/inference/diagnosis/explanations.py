@@ -166,12 +166,17 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
                     * field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 )
             else:
-                relative = change if effect.free_law == 'addition' else change / film
+                relative = change if effect.free_law == 'addition' else _share(change, film)
                 size = scale * float(np.quantile(np.abs(relative), LARGEST))
                 has = study.has(type(effect))[:, np.newaxis]
                 columns = has * basis.random(size, LAW_LENGTH).change_um
             found.append(columns / study.sigma_um[:, np.newaxis])
     return np.hstack(found)
+
+
+def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:
+    """(P,) change over the film, 0 where there is none."""
+    return np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)
 
 
 def _covariates(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:

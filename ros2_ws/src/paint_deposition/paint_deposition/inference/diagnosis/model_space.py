@@ -27,7 +27,7 @@ from paint_deposition.inference.diagnosis.joint_evidence import (
 # a pattern that is no two Gaussians. No measured pattern is exactly one.
 PRIOR_EFFECT, PRIOR = 0.02, {UNKNOWN: 0.08, FOOTPRINT: 0.06}
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
-SIZES = np.array([0.35, 0.7, 1.4, 2.8, 5.6])
+SIZES = np.array([0.5, 1.0, 2.0])
 # How many sets are searched in full: pairs, pairs from which triples grow, and triples.
 PAIRS, GROWN, TRIPLES = 60, 12, 20
 SWEEPS = 2
@@ -60,6 +60,7 @@ class Model:
     chosen: tuple[int, ...] = ()
     sizes: tuple[float, ...] = ()
     log_weight: float = 0.0
+    at: int = 0
 
 
 class ModelSpace:

@@ -1,4 +1,4 @@
-"""What to measure and what to spray next, to tell apart the explanations that compete.
+"""What to measure and what to spray next, to separate the explanations that compete.
 
 Their separation, see ``separation``, is computed for the readings at hand and for these together
 with those of a further experiment. The experiment after which most probably one explanation is
@@ -16,10 +16,15 @@ from paint_deposition.inference.diagnosis.proposals import Place, Spray, chance_
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
 from paint_deposition.inference.diagnosis.separation import Imitation, Predicted, imitate
 from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
-from paint_deposition.inference.diagnosis.standing import KEY, Stand, spots, suits
+from paint_deposition.inference.diagnosis.stationary_spray import (
+    KEY,
+    StationarySpray,
+    spots,
+    suits,
+)
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans, Readings
@@ -62,15 +67,14 @@ class _Tried:
 
 
 @on_one_thread
-def propose_for(
-    diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
-) -> tuple[list[Place], list[Spray]]:
-    """Places and sprays that would settle a diagnosis between the explanations that compete.
+def with_proposals(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> Diagnosis:
+    """A diagnosis with places and sprays that would settle between the competing explanations.
 
     Without two of them nothing is proposed.
     """
     rivals = rivals_of(diagnosis, library)
-    return ([], []) if rivals is None else propose(rivals)
+    proposals = ((), ()) if rivals is None else propose(rivals)
+    return replace(diagnosis, library=library, proposals=proposals)
 
 
 def propose(rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
@@ -92,14 +96,10 @@ def compared(free: np.ndarray, predicted: Sequence[Predicted]) -> list[_Pair]:
     return sorted(found, key=lambda pair: pair.imitation.separation)
 
 
-def _now(rivals: Rivals) -> _Pair:
-    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
-    return compared(free, rivals.here)[0]
-
-
 def _sprays(rivals: Rivals) -> list[Spray]:
-    now = _now(rivals).imitation.separation
-    parts = _telling(rivals)
+    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
+    now = compared(free, rivals.here)[0].imitation.separation
+    parts = _parts_that_show_most(rivals)
     made = _best([_tried(rivals, part, change, now) for part in parts for change in MENU])
     if made:
         best = made[0].experiment
@@ -124,7 +124,7 @@ def _best(tried: Sequence[_Tried | None]) -> list[_Tried]:
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
 
-def _telling(rivals: Rivals) -> list[Experiment]:
+def _parts_that_show_most(rivals: Rivals) -> list[Experiment]:
     """The experiments on which what competes shows most."""
     campaign = rivals.study.campaign
     shown = sum(predicted.change**2 for predicted in rivals.here)
@@ -138,10 +138,7 @@ def _tried(
     """How well the readings would separate with this spray, None where it cannot be done.
 
     Args:
-        rivals: what competes.
-        experiment: the part that is painted anew.
         change: what is done otherwise.
-        now: separation without the spray.
         spot: measured point before which the gun stands still; None: it runs the passes.
     """
     study = rivals.study
@@ -150,7 +147,9 @@ def _tried(
         return None
     stand = None
     if spot is not None:
-        stand = Stand.before(new, spot, rivals.fit.model, _most_um(study))
+        # The thickest film that may be sprayed on a spot: that wanted, else that measured.
+        most_um = study.campaign.target_um or float(study.measured_um.max())
+        stand = StationarySpray.before(new, spot, rivals.fit.model, most_um)
         if stand is None:
             return None
         new = stand.sprayed(new)
@@ -165,9 +164,9 @@ def _tried(
     if len(together) != len(study) + len(film_um):
         return None
     sigma_um = together.sigma_um[len(study) :]
-    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.free_there(forward, sigma_um)])
+    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.nuisance_at(forward, sigma_um)])
     free = np.hstack([free, together.nuisance])
-    there = rivals.there(Campaign((new,)), forward, sigma_um)
+    there = rivals.predictions_at(Campaign((new,)), forward, sigma_um)
     predicted = [here.with_more(more) for here, more in zip(rivals.here, there, strict=True)]
     apart = compared(free, predicted)
     spray = Spray(
@@ -181,16 +180,12 @@ def _tried(
     return _Tried(experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
 
 
-def _most_um(study: Study) -> float:
-    """The thickest film that may be sprayed on a spot: that wanted, else that measured."""
-    wanted = study.campaign.target_um
-    return float(study.measured_um.max()) if wanted is None else wanted
-
-
-def _in_words(study: Study, experiment: Experiment, change: Change, stand: Stand | None) -> str:
+def _in_words(
+    study: Study, experiment: Experiment, change: Change, stand: StationarySpray | None
+) -> str:
     what = f'the same passes {change.words}'
     if stand is not None:
-        # Its words tell the distance already.
+        # Its words give the distance already.
         otherwise = '' if change.kind == 'standoff' else change.words
         what = f'{stand.words}; {otherwise}'.removesuffix('; ')
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
@@ -210,8 +205,7 @@ def _with_readings(
     experiment: Experiment, positions_m: np.ndarray, film_um: np.ndarray, noise_um: float
 ) -> Experiment:
     """The experiment with predicted films (P,) [um] as its readings."""
-    noise = np.full(len(film_um), noise_um)
-    readings = Readings.of(positions_m, film_um, sigma_um=noise)
+    readings = Readings.of(positions_m, film_um, sigma_um=np.full(len(film_um), noise_um))
     return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
                    used=np.ones(len(readings), dtype=bool))  # fmt: skip
 
@@ -227,9 +221,9 @@ def _places(rivals: Rivals, seed: int) -> list[Place]:
     film_um, sigma_um = together.measured_um, together.sigma_um
     if len(taken) != len(film_um):
         return []
-    free = rivals.free_there(together.forward, sigma_um)
+    free = rivals.nuisance_at(together.forward, sigma_um)
     free = np.hstack([free, together.nuisance])
-    predicted = rivals.there(together.campaign, together.forward, sigma_um)
+    predicted = rivals.predictions_at(together.campaign, together.forward, sigma_um)
     usable = ~taken & (film_um > PAINTED * np.mean(study.measured_um))
     places: list[Place] = []
     pair = compared(free[taken], [p.select(taken) for p in predicted])[0]

@@ -9,7 +9,7 @@ from scipy.special import chdtri
 
 from paint_deposition.inference.fitting.least_squares import Fit
 
-# Of jobs that differ as assumed this share lies nearer than what is told as usual, and this share
+# Of jobs that differ as assumed this share lies nearer than what is called usual, and this share
 # nearer than what is warned of.
 USUAL, ALARMING = 0.95, 0.999
 
@@ -29,7 +29,7 @@ class PatternShift:
 
     @staticmethod
     def of(fit: Fit) -> PatternShift | None:
-        """Of a fit; None where no readings told of the pattern before."""
+        """Of a fit; None where no readings stand behind what is known."""
         known, pattern = fit.parameters.known, fit.parameters.pattern
         if known is None or not known.readings:
             return None

@@ -23,7 +23,7 @@ from paint_deposition.inference.diagnosis.model_space import PRIOR, SURE, Group,
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 

@@ -8,7 +8,7 @@ from scipy.special import ndtr
 
 from paint_deposition.inference.diagnosis.explanations import LAW_ERROR
 from paint_deposition.inference.diagnosis.model_space import CREDIBLE
-from paint_deposition.inference.diagnosis.standing import Stand
+from paint_deposition.inference.diagnosis.stationary_spray import StationarySpray
 
 # A film so many times as thick as any that was measured may sag.
 MAY_SAG = 1.3
@@ -53,7 +53,7 @@ class Spray:
 
     Attributes:
         what: in words; names the part where there are several.
-        separates: the explanations that it is to tell apart, effect ids or 'unknown'.
+        separates: the explanations that it is to separate, effect ids or 'unknown'.
         separation: standard deviations between the two that are least apart with it.
         now: the same without it.
         readings: number of points to be measured on the new part.
@@ -73,7 +73,7 @@ class Spray:
     chance: float = float('nan')
     peak_um: float = float('nan')
     peak_now_um: float = float('nan')
-    stand: Stand | None = None
+    stand: StationarySpray | None = None
 
     @property
     def film_words(self) -> str:

@@ -12,8 +12,8 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged
 from paint_deposition.inference.diagnosis.testability import power_along
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
-from paint_deposition.inference.fitting.one_thread import on_one_thread
-from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
+from paint_deposition.inference.fitting.least_squares import on_one_thread
+from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.gauge_places import (
     FOOT_M,
@@ -154,11 +154,8 @@ def choose(
     """Choose points for the gauge.
 
     Args:
-        part: what was painted how.
         count: of points. repeats: of these to be read twice, for the noise of the gauge.
         foot_m: of the gauge, from its middle to its rim; the distance kept from edges [m].
-        seed: of the places tried and of the noise simulated.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the part has no room for so many points.
@@ -231,7 +228,6 @@ def power_of(
     Args:
         part: what was painted how. vertices: (P,) where it is read.
         freedom: degrees of freedom of the noise estimate.
-        seed: of the noise simulated.
     """
     space = part.space(part.study(vertices), freedom)
     null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]

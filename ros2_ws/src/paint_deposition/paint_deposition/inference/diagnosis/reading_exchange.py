@@ -4,8 +4,8 @@ Readings are linear in the pattern's parameters and in the amplitudes of the eff
 effect changes at the chosen places beyond what the pattern can imitate is its noncentrality (D_s-
 optimality), and what another effect beside the pattern cannot imitate of it is their separation
 (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). A design is worth the probability that
-an effect is detected and told from its nearest rival, averaged over the effects and over the sizes
-in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
+an effect is detected and separated from its nearest rival, averaged over the effects and over the
+sizes in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
 added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 1972).
 """
 
@@ -88,7 +88,7 @@ class Design:
 
     @property
     def worth(self) -> float:
-        """Probability that an effect is detected, and told from its nearest rival; their mean."""
+        """Mean probability that an effect is detected, and separated from its nearest rival."""
         weights, tests = self.marks.weights, len(set(self.marks.effects))
         detected = weights @ power(self.noncentralities, tests)
         return float(0.5 * (detected + weights @ power(self.nearest()[2], tests)))
@@ -100,8 +100,8 @@ class Design:
         variance = 1.0 + np.einsum('ck,kl,cl->c', marks.free, self.covariance, marks.free)
         rival, amount, apart = self.nearest()
         detected = left**2 @ (marks.weights * slope(self.noncentralities, tests))
-        told = (left - amount * left[:, rival]) ** 2 @ (marks.weights * slope(apart, tests))
-        return 0.5 * (detected + told) / variance
+        separated = (left - amount * left[:, rival]) ** 2 @ (marks.weights * slope(apart, tests))
+        return 0.5 * (detected + separated) / variance
 
     def shares(self, chosen: np.ndarray) -> np.ndarray:
         """(n, m) share of each column's noncentrality that would be lost without each place."""

@@ -29,7 +29,7 @@ from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.residuals import root_mean_square
@@ -48,13 +48,9 @@ def refit(
     """Fit the model without and with an effect, and compare the evidence of the two.
 
     Args:
-        campaign: the readings.
         start: the model so far; its effects are refitted too.
         added: the effect or learned law, or None to fit what is there.
-        library: effects to test for beside it, by id.
-        seed: of starts and simulated deviations.
-        progress: called with a line for each step of the work.
-        known: what an earlier job told of the start's parameters: the prior.
+        known: what is known of the start's parameters: the prior.
 
     Raises:
         ModelError: the model has the effect already, or its law cannot be learned here.

@@ -59,7 +59,6 @@ class Rivals:
     """All explanations that compete, linear around one fit.
 
     Attributes:
-        study: the readings at hand.
         fit: where to linearise; what competes may be part of its model.
         found: the explanations. here: what each predicts for the readings at hand.
         scales: mean and standard deviation of each covariate at the readings at hand.
@@ -76,7 +75,6 @@ class Rivals:
         """Fit each explanation to the readings beside everything else that the model has.
 
         Args:
-            study: the readings.
             fit: where to linearise.
             names: for each the effect, or the covariate of a shapeless cause.
         """
@@ -118,12 +116,12 @@ class Rivals:
         kept = np.array([True] * pattern + others)
         return jacobian[:, kept] @ parameters.prior.factor[np.ix_(kept, kept)]
 
-    def free_there(self, forward: Forward, sigma_um: np.ndarray) -> np.ndarray:
+    def nuisance_at(self, forward: Forward, sigma_um: np.ndarray) -> np.ndarray:
         """The same directions for other readings."""
         fit = self.fit
         return self.free(derivatives(forward, fit.parameters, fit.vector, sigma_um))
 
-    def there(
+    def predictions_at(
         self, campaign: Campaign, forward: Forward, sigma_um: np.ndarray
     ) -> tuple[Predicted, ...]:
         """What each explanation, as found, predicts for other readings."""

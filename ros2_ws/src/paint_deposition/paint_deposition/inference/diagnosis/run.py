@@ -14,7 +14,13 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import Explanation, explanations, law_errors
+from paint_deposition.inference.diagnosis.explanations import (
+    FOOTPRINT,
+    Explanation,
+    explanations,
+    law_errors,
+)
+from paint_deposition.inference.diagnosis.mixture import Mixture
 from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability, testability
@@ -26,11 +32,12 @@ from paint_deposition.inference.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
-from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.fitting.remainder import Remainder
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -82,7 +89,7 @@ class Run:
         self.start = start
         self.known, self.remarks = usable(known, campaign)
         effects = (*start.effects, *neutral)
-        self.study, self.fit = sifted(campaign, start, effects, STARTS, seed, self.known)
+        self.study, self.fit = clean_and_fit(campaign, start, effects, STARTS, seed, self.known)
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
@@ -107,8 +114,9 @@ class Run:
         kept = frozenset(effect.id for effect in self.candidates_in(fit))
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
         null = NullModel.around(fit, free)
-        found = explanations(self.study, fit, self.candidates)
-        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+        found = [e for e in explanations(self.study, fit, self.candidates) if e.cause != FOOTPRINT]
+        remainder = Remainder.of(self.study, fit)
+        space = Mixture(null, remainder, found, self.study.noise.degrees_of_freedom)
         if self.testable is None:
             self.testable = testability(space, self.seed)
         return space

@@ -26,17 +26,17 @@ class Change:
     Attributes:
         key: one word.
         words: complete 'the same passes ...'.
-        cost: 1 for an entry in the programme; more where someone must lay hands on part or cell.
         made: gives the experiment painted that way, or None where the part does not allow it.
         kind: changes of one kind exclude each other.
+        cost: 1 for an entry in the programme; more where someone must lay hands on part or cell.
         both: the two changes that this one consists of, if it does.
     """
 
     key: str
     words: str
-    cost: float
     made: Callable[[Experiment], Experiment | None]
     kind: str
+    cost: float = 1.0
     both: tuple['Change', ...] = ()
 
     @property
@@ -53,7 +53,7 @@ def together(first: Change, second: Change) -> Change:
         return None if changed is None else second.made(changed)
 
     words = f'{first.words} and {second.words}'
-    return Change('', words, first.cost + second.cost, made, '', (first, second))
+    return Change('', words, made, '', first.cost + second.cost, (first, second))
 
 
 def pairs(changes: Sequence[Change]) -> Iterator[Change]:
@@ -75,10 +75,10 @@ def _of_the_nearest_opening(path: SprayPath) -> SprayPath:
     return path.with_(brush=np.where(before, path.brush[opened[following]], path.brush))
 
 
-def _rolled(angle_deg: float) -> Callable[[SprayPath], SprayPath]:
+def _rolled(angle_deg: float) -> Callable[[Experiment], Experiment]:
     cos, sin = np.cos(np.radians(angle_deg)), np.sin(np.radians(angle_deg))
     turn = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
-    return lambda path: path.with_(rotation=path.rotation @ turn)
+    return _on_path(lambda path: path.with_(rotation=path.rotation @ turn))
 
 
 def _other_way(path: SprayPath) -> SprayPath:
@@ -124,8 +124,8 @@ def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:
     return moved
 
 
-def _flow(factor: float) -> Callable[[SprayPath], SprayPath]:
-    return lambda path: path.with_flow_scaled(factor)
+def _flow(factor: float) -> Callable[[Experiment], Experiment]:
+    return _on_path(lambda path: path.with_flow_scaled(factor))
 
 
 def _speed(factor: float) -> Callable[[SprayPath], SprayPath]:
@@ -188,61 +188,40 @@ def _passes_turned(experiment: Experiment) -> Experiment | None:
 
 def _upside_down(experiment: Experiment) -> Experiment:
     surface = replace(experiment.surface, down=-experiment.surface.down)
-    return replace(
-        Experiment.of(experiment.name, surface, experiment.path, experiment.readings),
+    return Experiment.of(
+        experiment.name, surface, experiment.path, experiment.readings,
         switched_off=experiment.switched_off,
-    )
+    )  # fmt: skip
 
 
 def _without(setting: str) -> Callable[[Experiment], Experiment]:
     return lambda experiment: replace(experiment, switched_off=experiment.switched_off | {setting})
 
 
-AS_BEFORE = Change('', '', 0.0, lambda experiment: experiment, '')
+AS_BEFORE = Change('', '', lambda experiment: experiment, '', 0.0)
 MENU = (
+    Change('roll_180', 'with the gun rolled 180 deg about its axis', _rolled(180.0), 'roll'),
+    Change('roll_90', 'with the gun rolled 90 deg about its axis', _rolled(90.0), 'roll'),
+    Change('reverse_order', 'in reverse order', _on_path(_other_order), 'order'),
+    Change('other_way', 'each run the other way', _on_path(_other_way), 'way'),
+    Change('further', '60 mm further off', _moved_off(STANDOFF_STEP_M), 'standoff'),
+    Change('closer', '60 mm closer', _moved_off(-STANDOFF_STEP_M), 'standoff'),
+    Change('half_flow', 'at half the flow', _flow(0.5), 'film'),
+    Change('double_flow', 'at twice the flow', _flow(2.0), 'film'),
+    Change('half_speed', 'at half the speed', _on_path(_speed(0.5)), 'film'),
+    Change('double_speed', 'at twice the speed', _on_path(_speed(2.0)), 'film'),
     Change(
-        'roll_180',
-        'with the gun rolled 180 deg about its axis',
-        1.0,
-        _on_path(_rolled(180.0)),
-        'roll',
+        'longer_open', 'with the gun opened 0.3 s earlier and closed 0.3 s later',
+        _on_path(_open_longer), 'trigger',
     ),
+    Change('turned', 'turned by 90 deg together with the gun', _passes_turned, 'passes', 2.0),
     Change(
-        'roll_90',
-        'with the gun rolled 90 deg about its axis',
-        1.0,
-        _on_path(_rolled(90.0)),
-        'roll',
+        'upside_down', 'with the part hung upside down and the passes turned with it',
+        _upside_down, 'part', 2.0,
     ),
-    Change('reverse_order', 'in reverse order', 1.0, _on_path(_other_order), 'order'),
-    Change('other_way', 'each run the other way', 1.0, _on_path(_other_way), 'way'),
-    Change('further', '60 mm further off', 1.0, _moved_off(STANDOFF_STEP_M), 'standoff'),
-    Change('closer', '60 mm closer', 1.0, _moved_off(-STANDOFF_STEP_M), 'standoff'),
-    Change('half_flow', 'at half the flow', 1.0, _on_path(_flow(0.5)), 'film'),
-    Change('double_flow', 'at twice the flow', 1.0, _on_path(_flow(2.0)), 'film'),
-    Change('half_speed', 'at half the speed', 1.0, _on_path(_speed(0.5)), 'film'),
-    Change('double_speed', 'at twice the speed', 1.0, _on_path(_speed(2.0)), 'film'),
+    Change('voltage_off', 'with the high voltage off', _without('voltage'), 'voltage', 2.0),
     Change(
-        'longer_open',
-        'with the gun opened 0.3 s earlier and closed 0.3 s later',
-        1.0,
-        _on_path(_open_longer),
-        'trigger',
-    ),
-    Change('turned', 'turned by 90 deg together with the gun', 2.0, _passes_turned, 'passes'),
-    Change(
-        'upside_down',
-        'with the part hung upside down and the passes turned with it',
-        2.0,
-        _upside_down,
-        'part',
-    ),
-    Change('voltage_off', 'with the high voltage off', 2.0, _without('voltage'), 'voltage'),
-    Change(
-        'draught_off',
-        'with the booth air off, if safety allows',
+        'draught_off', 'with the booth air off, if safety allows', _without('draught'), 'draught',
         3.0,
-        _without('draught'),
-        'draught',
     ),
-)
+)  # fmt: skip

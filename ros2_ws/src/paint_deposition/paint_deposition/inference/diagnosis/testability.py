@@ -24,12 +24,7 @@ Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 
 def testability(space: ModelSpace, seed: int) -> Testability:
-    """Ids of effects that do not show, and detectable amplitudes of the others by parameter.
-
-    Args:
-        space: around the model without them.
-        seed: of simulated deviations.
-    """
+    """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
     shapes: dict[str, list[Sensitivity]] = {}
     for explanation in space.explanations:
         if explanation.sensitivity is not None:
@@ -84,7 +79,6 @@ def power_along(
     """(R,) probability that the test finds a deviation of each of R lengths.
 
     Args:
-        space: its test is simulated.
         direction: (P,) unit vector of whitened deviations. ratios: (R,) the lengths.
         null: simulated evidence if no cause acted. draws: (P, D) deviations behind its first D.
     """

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.inference.comparison.regions import misfit_regions
+from paint_deposition.inference.comparison.comparison import misfit_regions
 from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit

@@ -1,4 +1,4 @@
-"""A painted part before it is measured: what readings at any place would tell of the effects."""
+"""A painted part before it is measured: what readings at any place would say of effects."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
@@ -33,11 +33,10 @@ class UnmeasuredPart:
     """A part as it was, or will be, painted.
 
     Attributes:
-        surface: the part, turned to the gun.
         path: sub-steps of the gun's motion.
         model: as far as it is known.
         library: effects that may be missing, by id.
-        known: what earlier readings told of the model, or None.
+        known: what is known of the model from earlier readings, or None.
     """
 
     surface: Surface
@@ -100,7 +99,6 @@ class UnmeasuredPart:
         """What the diagnosis would search.
 
         Args:
-            study: of the readings.
             freedom: degrees of freedom of the noise estimate.
         """
         fit = self.fit(study)

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -14,15 +14,13 @@ from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.cross_validation import hold_out
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
+from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.residuals import root_mean_square
-
-if TYPE_CHECKING:
-    from paint_deposition.inference.diagnosis.proposals import Place, Spray
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -88,7 +86,8 @@ class Step:
     Attributes:
         added: effect id, '' for the model that the run started from.
         fit: of the model to the readings.
-        rmse_um, holdout_rmse_um: on the fitted points and on points left out [um].
+        rmse_um, holdout_rmse_um: on the fitted points and on points left out [um], both beside
+            the estimated levels of the parts, see ``Study.residuals``.
     """
 
     added: str
@@ -125,8 +124,10 @@ class Diagnosis:
         unknown: where the unexplained shows, or None.
         not_testable: ids that these readings cannot see at typical size.
         detectable: smallest amplitude of each testable effect that would have been seen.
-        library: the effects that further experiments may be proposed for, by id.
+        library: the effects that were looked for, by id.
         remarks: on what was known before, a sentence each.
+        proposals: places to measure and sprays that would settle the diagnosis, best first; see
+            ``next_experiment.with_proposals``.
     """
 
     study: Study
@@ -141,6 +142,7 @@ class Diagnosis:
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
     library: Mapping[str, type[Effect]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
 
     def __repr__(self) -> str:
         before, after = self.history[0].rmse_um, self.history[-1].rmse_um
@@ -193,16 +195,10 @@ class Diagnosis:
         """How the gun ran over each part, by experiment."""
         return self.comparisons[-1].geometry
 
-    @cached_property
-    def proposals(self) -> tuple[list[Place], list[Spray]]:
-        """Places to measure and sprays that would settle the diagnosis, best first."""
-        from paint_deposition.inference.diagnosis.next_experiment import propose_for
-
-        return propose_for(self, self.library)
-
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
+        predicted = before.fit.predicted_um, after.fit.predicted_um
         places, sprays = self.proposals
         return {
             'verdict': self.verdict,
@@ -216,7 +212,16 @@ class Diagnosis:
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
                 'noise_floor': self.noise_floor_um,
+                'left_out': 'points',
             },
+            'experiments': [
+                {'name': one.name, 'rmse_before_um': old.rmse_um, 'rmse_after_um': new.rmse_um}
+                for one, old, new in zip(
+                    self.study.campaign.experiments,
+                    *map(self.study.residuals_by_experiment, predicted),
+                    strict=True,
+                )
+            ],
             'unknown': None if self.unknown is None else asdict(self.unknown),
             'not_testable': list(self.not_testable),
             'detectable': self.detectable,
@@ -228,7 +233,7 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
-            'left_out': [slip.to_dict() for slip in self.study.slips],
+            'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),
         }

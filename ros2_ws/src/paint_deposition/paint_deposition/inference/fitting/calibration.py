@@ -15,31 +15,33 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.paint_used import impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.fitting.brush_figures import brush_figures
-from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
-from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
+from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
     Correlation,
     Estimate,
     correlations,
     estimates,
 )
-from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.one_thread import on_one_thread
-from paint_deposition.inference.fitting.panel_reach import shifts, short_reaches
+from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
+from paint_deposition.inference.fitting.panel_fit import (
+    CollapseFit,
+    fit_collapse,
+    shifts,
+    short_reaches,
+)
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import posterior_of
-from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.geometry import geometry_by_experiment
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.plausibility import (
     check_enough,
     check_panel,
     check_readings,
     check_units_beside,
+    geometry_by_experiment,
 )
 from paint_deposition.inference.readings.residuals import Residuals
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
@@ -80,7 +82,6 @@ class Calibration:
         study: the campaign, ready for inference. fit: the fit of all parameters.
         parameters: of the pattern and of varied effects, with uncertainties.
         correlations: of pairs, strongest first.
-        residuals: of each experiment's points.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
         warnings: what the reader must know, a sentence each.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
@@ -135,7 +136,7 @@ class Calibration:
             'chi_square_per_degree_of_freedom': self.chi_square_per_freedom,
             'converged': self.fit.converged,
             'noise': study.noise_figures,
-            'left_out': [slip.to_dict() for slip in study.slips],
+            'left_out': [outlier.to_dict() for outlier in study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'warnings': list(self.warnings),
         }
@@ -171,11 +172,8 @@ def calibrate(
     """Fit the pattern, and the amplitudes of the start's effects, to all readings.
 
     Args:
-        campaign: painted parts with readings.
         start: fixes projection and effects and is a first guess of the pattern; default: a 50 mm
             bell, whose pattern is then guessed from the first panel.
-        seed: of the further starts.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
@@ -186,8 +184,8 @@ def calibrate(
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
-    progress('looking for slips among the readings')
-    study, _ = sifted(campaign, model, model.effects, seed=seed)
+    progress('looking for outliers among the readings')
+    study, _ = clean_and_fit(campaign, model, model.effects, seed=seed)
     progress('fitting the collapse of the panels')
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
@@ -288,7 +286,7 @@ def _warnings(
         if not value.determined
     ]
     warnings += [
-        f'{pair.first} and {pair.second} can hardly be told apart (correlation '
+        f'{pair.first} and {pair.second} can hardly be separated (correlation '
         f'{pair.value:+.2f}): trust their combination, not each'
         for pair in pairs
         if pair.too_close

@@ -79,17 +79,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
-        found.append(
-            Estimate(
-                name,
-                float(values[k]),
-                float(sigma[k]),
-                float(low[k]),
-                float(high[k]),
-                not reason,
-                reason,
-            )
-        )
+        value, sd, start, end = (float(of[k]) for of in (values, sigma, low, high))
+        found.append(Estimate(name, value, sd, start, end, not reason, reason))
     return tuple(found)
 
 

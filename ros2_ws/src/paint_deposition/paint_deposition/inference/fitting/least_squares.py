@@ -7,10 +7,11 @@ import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 from scipy.optimize import OptimizeResult, least_squares, lsq_linear
 from scipy.special import ndtri
+from scipy.stats import qmc
+from threadpoolctl import threadpool_limits
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.forward import Forward, Terms
-from paint_deposition.inference.fitting.halton import halton
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN
 from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERMS
@@ -28,6 +29,10 @@ MOST_STEPS = 60
 EVENNESS = 0.05
 # A weaker ring, as a share of all paint, has no asymmetry to speak of.
 LEAST_RING = 0.01
+
+# For functions: BLAS has one thread while they run. Threads that share matrices as small as those
+# of a fit mostly wait for each other, on a busy machine ten times as long as the work takes.
+on_one_thread = threadpool_limits.wrap(limits=1, user_api='blas')
 
 
 @dataclass(frozen=True)
@@ -107,7 +112,6 @@ def fit_readings(
     """Find the most probable values (maximum a posteriori).
 
     Args:
-        forward: predicts the points.
         measured_um, sigma_um: (P,) point means and their standard deviations [um].
         parameters: what is varied; its start model is the first start.
         starts: how many starts; others are the best of many shapes of the pattern around the
@@ -157,7 +161,7 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
         if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
     ]  # fmt: skip
     width = problem.prior.width
-    spread = ndtri(halton(TRIED_A_START * count, len(shape), seed))
+    spread = ndtri(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
     tried = []
     for away in spread:
         vector = first.copy()

@@ -8,14 +8,46 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import block_diag
+from scipy.linalg import block_diag, solve_triangular
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN, PatternVector
-from paint_deposition.inference.fitting.prior import Prior
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
+
+
+@dataclass(frozen=True)
+class Prior:
+    """A normal distribution, its covariance given by a square root.
+
+    Attributes:
+        centre: (k,) mean.
+        factor: (k, k) lower Cholesky factor of the covariance.
+    """
+
+    centre: np.ndarray
+    factor: np.ndarray
+
+    @cached_property
+    def width(self) -> np.ndarray:
+        """(k,) standard deviations."""
+        return np.linalg.norm(self.factor, axis=1)
+
+    @cached_property
+    def whitening(self) -> np.ndarray:
+        """(k, k) inverse of the factor."""
+        return solve_triangular(self.factor, np.eye(len(self.factor)), lower=True)
+
+    @property
+    def precision(self) -> np.ndarray:
+        """(k, k) inverse covariance."""
+        return self.whitening.T @ self.whitening
+
+    def whiten(self, vector: np.ndarray) -> np.ndarray:
+        """(k,) deviations of a vector from the centre, independent and in standard deviations."""
+        return self.whitening @ (vector - self.centre)
+
 
 # The range that is physical for a shape parameter is this many standard deviations of its prior.
 SHAPE_DEVIATIONS = 4.0
@@ -83,7 +115,7 @@ class FreeParameters:
     Attributes:
         start: the model that fixes everything else, effects included.
         varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
-        known: what an earlier job told of them, or None.
+        known: what is known of them from an earlier job, or None.
     """
 
     start: DepositionModel

@@ -76,7 +76,7 @@ class PatternVector:
         return int(self.entries(row)[1]) + 1
 
     def in_common(self, deviations: np.ndarray) -> np.ndarray:
-        """(k, k) covariance with these standard deviations (k,) if all brushes change alike.
+        """(k, k) covariance with these standard deviations (k,) if all brushes change together.
 
         A ratio to the first brush changes by itself.
         """
@@ -113,12 +113,7 @@ class PatternVector:
         return found
 
     def out_of(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all.
-
-        Args:
-            whole: with these brushes and others.
-            vector: (n,) its entries.
-        """
+        """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all."""
         rows = [whole.brushes.index(number) for number in self.brushes]
         slope = np.zeros((len(self), len(whole)))
         for row, there in enumerate(rows):
@@ -127,7 +122,7 @@ class PatternVector:
                 slope[self._ratio(row), whole._ratio(there)] = 1.0
         entries = slope @ vector
         if rows[0]:
-            # Asymmetries that were told beside that of a brush which is left out.
+            # Asymmetries that were relative to that of a brush which is left out.
             left_out = whole._ratio(rows[0])
             ratios = [self._ratio(row) for row in range(1, self.count)]
             entries[ratios] -= vector[left_out]

@@ -20,7 +20,7 @@ OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
-# An amount beyond this many of its standard deviations is worth telling.
+# An amount beyond this many of its standard deviations is worth a mention.
 NOTABLE = 2.0
 
 
@@ -31,7 +31,6 @@ class RandomEffects:
     Attributes:
         kind: 'part level', or 'gauge zero'.
         unit: of their amounts.
-        names: of the n parts or gauge sessions.
         mixing: (n, n) amounts in the unit for amplitudes of unit variance.
         columns: (P, n) directions over the noise, for amplitudes of unit variance.
     """
@@ -98,7 +97,7 @@ def random_effects(
         'gauge zero', 'µm', sessions, SESSION_UM * _contrasts(len(sessions)),
         SESSION_UM * shares @ _contrasts(len(sessions)) / sigma_um[:, np.newaxis],
     )  # fmt: skip
-    return tuple(effects for effects in (level, zero) if len(effects.names) > 1)
+    return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
 def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
@@ -106,7 +105,6 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
 
     Args:
         fit: whose first nuisance directions are those of the random effects.
-        effects: of the study.
     """
     mean, covariance = fit.amplitudes
     found, first = [], 0

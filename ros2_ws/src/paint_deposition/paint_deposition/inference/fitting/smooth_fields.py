@@ -34,7 +34,6 @@ def root_of_field(
 
     Args:
         places: (N, D) where its values are.
-        length: of correlation.
         negligible: directions below this share of the largest variance are left out.
         correlation: at a distance over the length.
     """
@@ -70,7 +69,6 @@ def fields_over_parts(
 
     Args:
         owner: (P,) part of each point. positions_m: (P, 3) [m].
-        lengths_m: of correlation, one for each field [m].
         negligible: as in ``root_of_field``.
     """
     apart = np.column_stack([positions_m, FAR_M * owner])

@@ -11,9 +11,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.facet_error import facet_errors_um
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, fit_readings
+from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import RandomEffects, random_effects
-from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate, Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
@@ -24,9 +24,9 @@ from paint_deposition.inference.readings.residuals import Residuals, root_mean_s
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-# What facets cost the film is left out below this share of the noise, and told of from this. The
+# What facets cost the film is left out below this share of the noise, and reported from this. The
 # estimate is off by this share of itself, see ``film.facet_error``.
-LEAST_FACETS, WORTH_TELLING, FACETS_OFF = 0.1, 1.0, 0.5
+LEAST_FACETS, WORTH_REPORTING, FACETS_OFF = 0.1, 1.0, 0.5
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Study:
         sigma_um: (P,) their standard deviations, with the film's texture [um].
         noise: of single readings.
         texture: of the film.
-        slips: single readings that were left out, see ``sifted``.
+        outliers: single readings that were left out, see ``clean_and_fit``.
         facet_um: (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
     """
 
@@ -71,7 +71,7 @@ class Study:
     sigma_um: np.ndarray
     noise: GaugeNoise
     texture: Texture = Texture()
-    slips: tuple[Slip, ...] = ()
+    outliers: tuple[Outlier, ...] = ()
     facet_um: np.ndarray | None = None
     _rays: dict = field(default_factory=dict, repr=False)
 
@@ -98,7 +98,7 @@ class Study:
         return replace(self, texture=texture, sigma_um=sigma_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
-        """The same with what facets cost under a model, if it is worth telling from the noise.
+        """The same with what facets cost under a model, if it shows beside the noise.
 
         How much of it is true is fitted for each part: it is one of the nuisance directions. What
         it does not follow is noise of its own.
@@ -114,12 +114,12 @@ class Study:
         sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
         return replace(self, sigma_um=sigma_um, facet_um=facet_um)
 
-    def without(self, slips: dict[int, Slip]) -> 'Study':
+    def without(self, outliers: dict[int, Outlier]) -> 'Study':
         """The same without some points, by their row."""
-        if not slips:
+        if not outliers:
             return self
-        kept = ~np.isin(np.arange(len(self)), list(slips))
-        return replace(self.of_points(kept), slips=tuple(slips.values()))
+        kept = ~np.isin(np.arange(len(self)), list(outliers))
+        return replace(self.of_points(kept), outliers=tuple(outliers.values()))
 
     def of_points(self, kept: np.ndarray) -> 'Study':
         """The same with some of the points only, (P,) bool.
@@ -133,7 +133,7 @@ class Study:
         facet_um = None if self.facet_um is None else self.facet_um[kept]
         return Study(
             campaign, self.forward.at(campaign), campaign.means.mean_um,
-            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.slips,
+            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.outliers,
             facet_um,
         )  # fmt: skip
 
@@ -158,21 +158,17 @@ class Study:
         )
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
-        """The P points beside predictions (P,) for them [um]."""
-        return Residuals(self.measured_um, self._levelled(predicted_um), self.sigma_um)
+        """The P points beside predictions (P,) for them [um].
 
-    def _levelled(self, predicted_um: np.ndarray) -> np.ndarray:
-        """With the measured level on parts painted with something switched off.
-
-        How much paint arrives then is not the model's to predict.
+        This is the one residual that all results quote: what the nuisance directions explain,
+        such as the levels in which parts differ, is estimated and counts as predicted.
         """
-        levelled = predicted_um.copy()
-        for number, experiment in enumerate(self.campaign.experiments):
-            rows = self.campaign.experiment_of == number
-            if experiment.switched_off and predicted_um[rows].any():
-                weight = predicted_um[rows] / self.sigma_um[rows] ** 2
-                levelled[rows] *= (weight @ self.measured_um[rows]) / (weight @ predicted_um[rows])
-        return levelled
+        nuisance = self.nuisance
+        misfit = (self.measured_um - predicted_um) / self.sigma_um
+        precision = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
+        amounts = np.linalg.solve(precision, nuisance.T @ misfit)
+        levelled_um = predicted_um + self.sigma_um * (nuisance @ amounts)
+        return Residuals(self.measured_um, levelled_um, self.sigma_um)
 
     def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
         """The same for each experiment on its own."""
@@ -196,7 +192,7 @@ class Study:
     @property
     def left_out(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
-        return (*self.campaign.notes, *map(str, self.slips))
+        return (*self.campaign.notes, *map(str, self.outliers))
 
     @property
     def noise_figures(self) -> dict[str, Any]:
@@ -243,7 +239,7 @@ class Study:
         for name, direction in self._facets.items():
             off_um = np.abs(direction * self.sigma_um)
             worst = int(off_um.argmax())
-            if off_um[worst] > WORTH_TELLING * self.gauge_um[worst]:
+            if off_um[worst] > WORTH_REPORTING * self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
                     f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '

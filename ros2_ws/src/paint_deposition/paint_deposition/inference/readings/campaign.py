@@ -7,17 +7,17 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.readings.off_surface import lie_on_a_spot, off_surface_hint
-from paint_deposition.inference.readings.outliers import left_out_lines
+from paint_deposition.inference.readings.gauge_noise import left_out_lines
+from paint_deposition.inference.readings.placement import (
+    columns_or_rows,
+    refuse_off_surface,
+    refuse_other_side,
+)
 from paint_deposition.inference.readings.readings import PointMeans, Readings
-from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-# Readings further from the surface, or facing more away from it, do not belong to the part.
-MAX_DISTANCE_M = 0.02
-MAX_ANGLE_RAD = np.radians(60.0)
 # Half the width of the stencil from which the film's slope at a reading is taken [m].
 STENCIL_M = 0.006
 
@@ -74,9 +74,9 @@ class Experiment:
         normals = None if readings.normals is None else readings.normals[means.first]
         positions = readings.positions_m[means.first]
         place = surface.locate(positions, normals)
-        _refuse_far(surface, readings, means, place.distance_m)
+        refuse_off_surface(surface, readings, means, place.distance_m)
         if normals is not None:
-            _refuse_other_side(readings, means, place.angle_rad)
+            refuse_other_side(readings, means, place.angle_rad)
         points = surface.at(positions, normals, stencil_m=STENCIL_M)
         if not readings.group.astype(bool).any():
             lines = columns_or_rows(surface, path, place.positions_m)
@@ -152,7 +152,7 @@ class Campaign:
         model_file: the start model's file, or None.
         name: that of its file, '' for none; errors compare within one campaign only.
         head: what the report says of part and batch, by key.
-        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not told.
+        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not known.
 
     Raises:
         ReadingsError: two experiments have one name.
@@ -207,8 +207,8 @@ class Campaign:
     def settings(self) -> dict[str, float]:
         """Mean over the experiments of each setting of the process that is known."""
         names = dict.fromkeys(name for e in self.experiments for name in e.settings)
-        told = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
-        return {name: float(np.mean(values)) for name, values in told.items()}
+        known = {n: [e.settings[n] for e in self.experiments if n in e.settings] for n in names}
+        return {name: float(np.mean(values)) for name, values in known.items()}
 
     def without(self, left_out: np.ndarray) -> 'Campaign':
         """The same campaign without some of its readings (N,).
@@ -232,33 +232,4 @@ class Campaign:
             f'{experiment.name}: {line}'
             for experiment in self.experiments
             for line in left_out_lines(experiment.taken, experiment.used)
-        )
-
-
-def _refuse_far(
-    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
-) -> None:
-    far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
-    if not len(far):
-        if lie_on_a_spot(surface, readings.positions_m):
-            hint = off_surface_hint(surface, readings.positions_m)
-            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
-        return
-    worst = far[np.argmax(distance_m[far])]
-    where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
-    raise ReadingsError(
-        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
-        f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
-        f'm (limit {MAX_DISTANCE_M:g}); {off_surface_hint(surface, readings.positions_m)}'
-    )
-
-
-def _refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
-    away = np.flatnonzero(angle_rad > MAX_ANGLE_RAD)
-    if len(away):
-        worst = away[np.argmax(angle_rad[away])]
-        raise ReadingsError(
-            f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
-            f"surface, point '{readings.point[means.first[worst]]}' by "
-            f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
         )

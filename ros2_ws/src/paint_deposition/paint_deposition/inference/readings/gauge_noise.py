@@ -1,17 +1,133 @@
-"""The gauge's noise: from repeats where there are any, else stated or assumed."""
+"""The gauge's noise: from repeats where there are any, else stated or assumed.
+
+Gross outliers among repeats are left out: one of them in twenty repeats can triple the mean
+square, and a noise that is overestimated by so much hides every effect.
+"""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.ndimage import median
+from scipy.special import ndtri, stdtrit
 
-from paint_deposition.inference.readings.outliers import (
-    ASSUMED_FREEDOM,
-    ENOUGH_REPEATS,
-    gross_outliers,
-    usual_noise_um,
-)
 from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.inference.readings.residuals import root_mean_square
+
+# A usual magnetic or eddy-current gauge, for readings that say nothing of their noise.
+ASSUMED_FLOOR_UM = 0.7
+ASSUMED_SHARE = 0.01
+# Fewer degrees of freedom from repeats than this are not trusted alone.
+ENOUGH_REPEATS = 6
+# An assumed noise counts like an estimate with these degrees of freedom: it may be off by a third.
+ASSUMED_FREEDOM = 5.0
+# Repeats that are off by more standard deviations are gross outliers. Where the standard deviation
+# is estimated from few repeats, the limit is the quantile of Student's t that sound readings
+# exceed with this probability.
+GROSS_SIGMAS = 5.0
+GROSS_CHANCE = 1e-4
+# The scale is at least this share of the usual noise: a display in whole um shows many repeats
+# without any scatter.
+LEAST_SCALE = 0.5
+MOST_ROUNDS = 20
+
+
+def usual_noise_um(thickness_um: np.ndarray) -> np.ndarray:
+    """(N,) standard deviation of a usual gauge at these films [um]."""
+    return np.hypot(ASSUMED_FLOOR_UM, ASSUMED_SHARE * thickness_um)
+
+
+def gross_outliers(readings: Readings) -> np.ndarray:
+    """(N,) whether a reading contradicts the others at its point.
+
+    Of three or more readings at a point, those far from their median are outliers. Where no
+    majority is left, as with two that disagree, nothing says which one is wrong, and all of them
+    are outliers. The scale is pooled over all points; readings with a stated noise have a scale
+    of their own.
+    """
+    thickness, stated = readings.thickness_um, readings.sigma_um
+    owner, gross = PointMeans.of(readings).owner, np.zeros(len(thickness), dtype=bool)
+    for pool in (np.isnan(stated), np.isfinite(stated)):
+        if pool.any():
+            _, compact = np.unique(owner[pool], return_inverse=True)
+            gross[pool] = _Repeats(thickness[pool], stated[pool], compact).gross()
+    return gross
+
+
+def left_out_lines(taken: Readings, used: np.ndarray) -> list[str]:
+    """A line for each point at which some of several readings were left out.
+
+    Args:
+        used: (N,) whether they are used.
+    """
+    lines = []
+    for label in dict.fromkeys(taken.point[~used]):
+        here = taken.point == label
+        if np.count_nonzero(here) == 1:
+            continue
+        out, kept = taken.thickness_um[here & ~used], taken.thickness_um[here & used]
+        beside = f' beside {_listed(kept)}' if len(kept) else ' contradict each other'
+        lines.append(
+            f"point '{label}': {_listed(out)} µm{beside}; left out of the fit, measure "
+            f'{"it" if len(kept) else "there"} again'
+        )
+    return lines
+
+
+def _listed(thickness_um: np.ndarray) -> str:
+    return ', '.join(f'{value:.4g}' for value in thickness_um)
+
+
+class _Repeats:
+    """Readings of one gauge at K points.
+
+    Attributes:
+        owner: (N,) point of each reading. count: (K,) readings at each point.
+        scaled: (N,) readings over the usual noise at their point.
+        distance: (N,) from the point's median, or from the other of two, over its usual error.
+    """
+
+    def __init__(self, thickness_um: np.ndarray, stated_um: np.ndarray, owner: np.ndarray):
+        self.owner, self.count = owner, np.bincount(owner)
+        middle = median(thickness_um, owner, np.arange(len(self.count)))[owner]
+        usual = np.fmax(usual_noise_um(middle), stated_um)
+        number = self.count[owner]
+        self.scaled = (thickness_um - middle) / usual
+        reference = np.where(number == 2, 2.0, 1.0)
+        error = np.sqrt(number / np.maximum(number - 1, 1))
+        self.distance = reference * np.abs(self.scaled) / error
+
+    def gross(self) -> np.ndarray:
+        """(N,) outliers, from a robust scale and iterated until the set no longer changes."""
+        if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
+            return self._beyond(1.0, ASSUMED_FREEDOM)
+        gross = self._beyond(self._robust_scale(), np.inf)
+        for _ in range(MOST_ROUNDS):
+            before, gross = gross, self._beyond(*self._pooled(~gross))
+            if np.array_equal(before, gross):
+                break
+        return gross
+
+    def _robust_scale(self) -> float:
+        """Median of the distances, consistent for normal noise."""
+        order = np.lexsort((self.distance, self.owner))
+        # At each point one distance is redundant: half of a pair, or the median of three itself.
+        own = np.diff(self.owner[order], prepend=-1) == 0
+        return float(np.median(self.distance[order][own]) / ndtri(0.75))
+
+    def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
+        """Pooled scale of the kept readings within points, and its degrees of freedom."""
+        count = np.bincount(self.owner, kept)
+        mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
+        freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)
+        squares = float(np.sum(kept * (self.scaled - mean[self.owner]) ** 2))
+        return np.sqrt(squares / freedom), freedom
+
+    def _beyond(self, scale: float, freedom: float) -> np.ndarray:
+        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_CHANCE)))
+        far = self.distance > sigmas * max(scale, LEAST_SCALE)
+        outliers = np.bincount(self.owner, far)
+        undecided = 2.0 * outliers >= self.count
+        return far | ((outliers > 0.0) & undecided)[self.owner]
 
 
 @dataclass(frozen=True)

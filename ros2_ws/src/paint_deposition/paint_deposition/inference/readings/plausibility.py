@@ -1,9 +1,13 @@
-"""Plausibility of readings: units, signs and coverage, checked before anything is fitted."""
+"""Plausibility of readings and of the paint below them, checked before anything is fitted."""
 
 import numpy as np
 from scipy.special import chdtrc
 
-from paint_deposition.errors import ReadingsError
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ModelError, ReadingsError
+from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
+from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.readings import Readings
 
@@ -55,7 +59,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     """Refuse readings that no film gives.
 
     Args:
-        readings: as taken.
         sigma_um: (N,) standard deviation of a reading [um].
 
     Raises:
@@ -110,7 +113,6 @@ def check_units_beside(
     """Refuse points that agree with a robust fit if they are taken for another unit.
 
     Args:
-        readings: as taken.
         measured_um, expected_um: (P,) point means, and the film expected there [um].
 
     Raises:
@@ -150,3 +152,40 @@ def _other_unit(
         f'where {np.median(others_um):.3g} µm is expected; they look like {unit}, multiply '
         f'them by {factor:g}'
     )
+
+
+def geometry_by_experiment(campaign: Campaign, model: DepositionModel) -> dict[str, SprayGeometry]:
+    """How the gun ran over each part, by the name of its experiment."""
+    return {
+        one.name: spray_geometry(one.surface, one.path, model, one.frame_id)
+        for one in campaign.experiments
+    }
+
+
+def require_paint(campaign: Campaign, model: DepositionModel) -> None:
+    """Refuse an experiment in which no paint lands at any measured point.
+
+    Args:
+        model: its pattern and projection count, its effects do not.
+
+    Raises:
+        ReadingsError: one line with the likely cause.
+        ModelError: a brush that painted it is not in the model.
+    """
+    plain = model.model_copy(update={'effects': ()})
+    for one in campaign.experiments:
+        try:
+            plain.require_brushes(one.brushes)
+        except ModelError as error:
+            raise ModelError(f"experiment '{one.name}': {error}") from None
+        painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
+        painted.add(one.path)
+        if painted.raw_um.max() >= NO_PAINT_UM:
+            continue
+        cause = 'the gun never sprays'
+        if np.any(one.path.flow > 0.0):
+            found = spray_geometry(one.surface, one.path, plain, one.frame_id)
+            cause = found.warnings[0] if found.warnings else found.sentence
+        raise ReadingsError(
+            f"experiment '{one.name}': no paint lands where it was measured: {cause}"
+        )

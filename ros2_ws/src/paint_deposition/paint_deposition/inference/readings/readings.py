@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Mapping, Sized
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -83,21 +83,16 @@ class Readings:
 
     def select(self, rows: np.ndarray | slice) -> 'Readings':
         """The chosen rows, by mask or indices."""
-        return Readings(
-            self.positions_m[rows],
-            self.thickness_um[rows],
-            self.point[rows],
-            self.group[rows],
-            self.sigma_um[rows],
-            None if self.normals is None else self.normals[rows],
-            self.source,
-            self.session[rows],
-            self.understood,
-        )
+        names = ('positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session')
+        columns = {name: getattr(self, name) for name in names}
+        some: dict[str, Any] = {
+            name: None if c is None else c[rows] for name, c in columns.items()
+        }
+        return replace(self, **some)
 
     @property
     def fingerprint(self) -> str:
-        """Twelve hexadecimal digits that tell these readings from any others."""
+        """Twelve hexadecimal digits that identify these readings."""
         table = np.column_stack([self.positions_m, self.thickness_um])
         return hashlib.sha256(np.ascontiguousarray(table).tobytes()).hexdigest()[:12]
 

@@ -95,7 +95,7 @@ def learned(data: ReportData, diagnosis: Diagnosis, what: str) -> str:
 def left_out(data: ReportData) -> str:
     """Slips among the readings, with what was probably meant."""
     slips = []
-    for slip in data.study.slips:
+    for slip in data.study.outliers:
         where, guess_um = slip.point.replace(': ', ' '), slip.guess_um
         meant = '' if guess_um is None else f' (was it {micrometres(guess_um)}?)'
         slips.append(

@@ -1,4 +1,4 @@
-"""The readings of a campaign that inference rests on: without slips, with the film's texture.
+"""The readings of a campaign that inference rests on: without outliers, with the film's texture.
 
 Comparison, diagnosis and calibration all take their readings from here.
 """
@@ -7,11 +7,14 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
+from paint_deposition.inference.fitting.outliers import (
+    FEWEST,
+    FittedPoints,
+    Outlier,
+    find_outliers,
+)
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.slips import FEWEST, Slip, slips
-from paint_deposition.inference.fitting.smooth_misfit import Misfit
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study, Texture
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -21,7 +24,7 @@ STARTS = 3
 
 
 @on_one_thread
-def sifted(
+def clean_and_fit(
     campaign: Campaign,
     start: DepositionModel,
     effects: tuple[Effect, ...] = (),
@@ -29,14 +32,11 @@ def sifted(
     seed: int = 0,
     known: Posterior | None = None,
 ) -> tuple[Study, Fit]:
-    """A campaign prepared for inference without its slips, and the pattern fitted to it.
+    """A campaign prepared for inference without its outliers, and the pattern fitted to it.
 
     Args:
-        campaign: the readings and how the parts were painted.
         start: first guess of the pattern; its effects are refitted, too.
         effects: those whose amplitudes may be varied later.
-        starts, seed: of the fit.
-        known: of the parameters from another job.
 
     Raises:
         ReadingsError: readings in another unit, with the remedy.
@@ -46,7 +46,7 @@ def sifted(
     if len(study) < FEWEST or not fit.predicted_um.any():
         return study, fit
     misfit = _misfit(study, fit)
-    found = _slips(study, fit, misfit)
+    found = _outliers(study, fit, misfit)
     if found:
         study = study.without(found)
         fit = _fitted(study, start, starts, seed, known)
@@ -69,11 +69,11 @@ def _fitted(
     return study.fit(parameters, starts, seed, study.nuisance)
 
 
-def _slips(study: Study, fit: Fit, misfit: Misfit) -> dict[int, Slip]:
+def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier]:
     readings, means = study.campaign.readings, study.campaign.means
-    found = slips(misfit, means.repeats == 1)
+    found = find_outliers(misfit, means.repeats == 1)
     return {
-        row: Slip(
+        row: Outlier(
             str(readings.point[means.first[row]]),
             float(study.measured_um[row]),
             float(fit.predicted_um[row] + residual_um),
@@ -83,7 +83,7 @@ def _slips(study: Study, fit: Fit, misfit: Misfit) -> dict[int, Slip]:
     }
 
 
-def _texture(study: Study, misfit: Misfit) -> Texture:
+def _texture(study: Study, misfit: FittedPoints) -> Texture:
     """Estimated where the gauge's noise is known.
 
     Only a texture finer than usual is believed: a coarser one looks like anything that is missing
@@ -95,9 +95,9 @@ def _texture(study: Study, misfit: Misfit) -> Texture:
     return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
 
 
-def _misfit(study: Study, fit: Fit) -> Misfit:
+def _misfit(study: Study, fit: Fit) -> FittedPoints:
     free = np.hstack([fit.jacobian @ fit.parameters.prior.factor, study.nuisance])
-    return Misfit(
+    return FittedPoints(
         fit.residual * study.sigma_um,
         fit.predicted_um,
         study.gauge_um,

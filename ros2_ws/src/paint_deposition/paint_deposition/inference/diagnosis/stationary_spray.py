@@ -16,14 +16,14 @@ from paint_deposition.motion.trajectory import Trajectory
 KEY = 'standing'
 # A shorter opening of the gun is mostly its trigger's; a longer one no spot needs [s].
 SHORTEST_S, LONGEST_S, STEP_S = 0.5, 20.0, 0.1
-# The gun stands closed for so long before and behind, and tells its pose so often [s].
+# The gun stands closed for so long before and behind, and its pose is recorded so often [s].
 CLOSED_S, CYCLE_S = 0.6, 0.02
 # Effects of the order of passes, and fog of a whole job, say nothing of a single spot.
 OF_WHOLE_JOBS = ('order', 'level')
 
 
 @dataclass(frozen=True)
-class Stand:
+class StationarySpray:
     """A gun that sprays on one spot, square to the part.
 
     Attributes:
@@ -47,13 +47,11 @@ class Stand:
     @staticmethod
     def before(
         experiment: Experiment, row: int, model: DepositionModel, most_um: float
-    ) -> 'Stand | None':
+    ) -> 'StationarySpray | None':
         """Before a measured point, with roll, standoff and flow of the passes over the part.
 
         Args:
-            experiment: the part, and how it was painted.
-            row: of the point.
-            model: its pattern and projection tell the film on a flat spot, which is the least
+            model: its pattern and projection give the film on a flat spot, which is the least
                 favourable one: elsewhere the paint lands on more surface.
             most_um: film that must not be exceeded [um].
 
@@ -79,7 +77,7 @@ class Stand:
         dwell = STEP_S * math.floor(most_um / rate / STEP_S + 1e-9)
         if not SHORTEST_S <= dwell <= LONGEST_S:
             return None
-        return Stand(
+        return StationarySpray(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
             flow, float(experiment.means.mean_um[row]), rate * dwell, brush,
         )  # fmt: skip
@@ -133,7 +131,7 @@ def spots(experiment: Experiment, count: int) -> list[int]:
 
 
 def suits(model: DepositionModel, families: set[str]) -> bool:
-    """Whether a spot tells anything of what competes, by its families, beside a model."""
+    """Whether a spot separates competing effects, by their families, beside a model."""
     return families.isdisjoint(OF_WHOLE_JOBS) and not any(
         effect.family in OF_WHOLE_JOBS for effect in model.effects
     )

@@ -1,6 +1,9 @@
-"""How readings scatter about anything smooth, whatever the model lacks.
+"""Outliers among single readings, and how readings scatter about anything smooth.
 
-Nothing is assumed of what is missing but that neighbours share it: neighbours on the part, or
+A typing error, a display misread, a reading on bare metal contradicts all that its neighbours and
+the model say. A point that was read several times agrees with itself or is judged by its repeats.
+
+Nothing is assumed of what the model lacks but that neighbours share it: neighbours on the part, or
 readings alike in one covariate. The misfit of the pattern, of every size of such a field, and of
 every texture of the film together form a mixture of normal models (a Gaussian process with its
 hyperparameters integrated over a grid). Each predicts every reading from all the others in
@@ -8,13 +11,14 @@ closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
-from scipy.special import logsumexp
+from scipy.special import expit, logsumexp
 
 from paint_deposition.inference.fitting.smooth_fields import field_over_values, fields_over_parts
 from paint_deposition.inference.readings.covariates import Covariate
@@ -33,7 +37,7 @@ NEGLIGIBLE = 1e-3
 
 
 @dataclass(frozen=True)
-class Misfit:
+class FittedPoints:
     """Readings beside a fitted model.
 
     Attributes:
@@ -58,17 +62,15 @@ class Misfit:
         """What all models say of the readings."""
         return Scatter.of(self)
 
-    def select(self, rows: np.ndarray) -> 'Misfit':
+    def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
-        return Misfit(
-            self.residual_um[rows],
-            self.predicted_um[rows],
-            self.gauge_um[rows],
-            self.free_um[rows],
-            self.experiment_of[rows],
-            self.positions_m[rows],
-            tuple(Covariate(c.name, c.values[rows]) for c in self.covariates),
-        )
+        some: dict[str, Any] = {
+            one.name: getattr(self, one.name)[rows]
+            for one in fields(self)
+            if one.name != 'covariates'
+        }
+        covariates = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
+        return FittedPoints(**some, covariates=covariates)
 
 
 @dataclass(frozen=True)
@@ -90,7 +92,7 @@ class Scatter:
     residual_um: np.ndarray
 
     @staticmethod
-    def of(misfit: Misfit) -> 'Scatter':
+    def of(misfit: FittedPoints) -> 'Scatter':
         """Compute all models."""
         fields = list(_fields(misfit))
         log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
@@ -153,7 +155,7 @@ def _left_out(
     return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
 
 
-def _fields(misfit: Misfit) -> Iterator[tuple[np.ndarray, float]]:
+def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
     """Directions (P, n) of what may be missing [um], and the logarithm of its prior share.
 
     Nothing; a field over the part; over one covariate; over all of them at once.
@@ -172,3 +174,93 @@ def _fields(misfit: Misfit) -> Iterator[tuple[np.ndarray, float]]:
     for root in roots:
         for share in SHARES:
             yield share * film * root, np.log(0.5 / len(roots) / len(SHARES))
+
+
+# Prior probability of an outlier, and the posterior one from which a reading counts as one.
+RARE, SURE = 0.01, 0.9
+# They are rare: where a greater share of the points would be some, the model is at fault.
+MOST = 0.05
+# Fewer points say too little of each other.
+FEWEST = 20
+# What was probably meant is proposed if it is expected to within this many standard deviations.
+NEAR = 3.0
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A reading that was left out, and what the others say.
+
+    Attributes:
+        point: its label, which names the part.
+        thickness_um: as it was given.
+        expected_um, sigma_um: what the model and the other readings predict there.
+    """
+
+    point: str
+    thickness_um: float
+    expected_um: float
+    sigma_um: float
+
+    @property
+    def guess_um(self) -> float | None:
+        """What was probably read: a decimal point or two digits are in the wrong place."""
+        meant = [value for value in _miswritten(self.thickness_um) if self._fits(value)]
+        return min(meant, key=lambda value: abs(value - self.expected_um), default=None)
+
+    def __str__(self) -> str:
+        meant = '' if self.guess_um is None else f' ({self.guess_um:.4g}?)'
+        return (
+            f"point '{self.point}': {self.thickness_um:.4g} µm where model and neighbours say "
+            f'{self.expected_um:.4g} ± {self.sigma_um:.2g} µm{meant}; left out of the fit, '
+            'measure there again'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """As results name it."""
+        names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um')
+        return {name: getattr(self, name) for name in names}
+
+    def _fits(self, value: float) -> bool:
+        return abs(value - self.expected_um) < NEAR * self.sigma_um
+
+
+def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[float, float]]:
+    """Slips by their row, with the residual that the others predict and its error [um].
+
+    The most certain one is taken out first, since outliers hide each other and widen what is
+    expected of sound readings.
+
+    Args:
+        single: (P,) whether a point was read only once.
+    """
+    count = len(single)
+    kept = np.arange(count)
+    found: dict[int, tuple[float, float]] = {}
+    if count < FEWEST:
+        return {}
+    film, left = np.mean(misfit.predicted_um), misfit
+    while True:
+        scatter = left.scatter
+        # Nothing is known of an outlier but that it is a number of the size of the film.
+        wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
+        log_odds = np.log(RARE / (1.0 - RARE)) + wild - scatter.log_density
+        log_odds[~single[kept]] = -np.inf
+        worst = int(np.argmax(log_odds))
+        if expit(log_odds[worst]) < SURE:
+            return found
+        if len(found) + 1 > max(MOST * count, 1.0):
+            return {}
+        found[int(kept[worst])] = scatter.predicted(worst)
+        kept = np.delete(kept, worst)
+        left = misfit.select(kept)
+
+
+def _miswritten(value: float) -> list[float]:
+    """Numbers that become this one by a shifted decimal point or two digits exchanged."""
+    text = f'{value:.6g}'
+    exchanged = [
+        text[:k] + text[k + 1] + text[k] + text[k + 2 :]
+        for k in range(len(text) - 1)
+        if text[k : k + 2].isdigit()
+    ]
+    return [value / 10.0, value * 10.0, value / 100.0, value * 100.0, *map(float, exchanged)]

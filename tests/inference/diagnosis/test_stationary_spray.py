@@ -12,7 +12,7 @@ from paint_deposition.inference.diagnosis.next_experiment import propose
 from paint_deposition.inference.diagnosis.proposals import Spray, chance_of_settling
 from paint_deposition.inference.diagnosis.rivals import Rivals
 from paint_deposition.inference.diagnosis.sprays import MENU
-from paint_deposition.inference.diagnosis.standing import Stand, spots, suits
+from paint_deposition.inference.diagnosis.stationary_spray import StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
@@ -28,8 +28,8 @@ def panel(sample):
     return sample.experiments[0]
 
 
-def stand(panel, **more) -> Stand:
-    return Stand.before(panel, spots(panel, 1)[0], MODEL, MOST_UM, **more)
+def stand(panel, **more) -> StationarySpray:
+    return StationarySpray.before(panel, spots(panel, 1)[0], MODEL, MOST_UM, **more)
 
 
 def film_um(panel, one, model=MODEL):
@@ -54,11 +54,13 @@ def test_the_film_stays_within_the_one_given_and_comes_near_it(panel):
     assert 0.7 * MOST_UM < film.max() <= one.peak_um <= MOST_UM
     half = film_um(panel, replace(one, dwell_s=0.5 * one.dwell_s))
     assert half == pytest.approx(0.5 * film, rel=1e-9)
-    closer = Stand.before(BY_KEY['closer'].made(panel), spots(panel, 1)[0], MODEL, MOST_UM)
+    closer = StationarySpray.before(
+        BY_KEY['closer'].made(panel), spots(panel, 1)[0], MODEL, MOST_UM
+    )
     assert closer.dwell_s < one.dwell_s
     assert 0.7 * MOST_UM < film_um(panel, closer).max() <= MOST_UM
     # Half a second is needed: the trigger is not quick enough for less film.
-    assert Stand.before(panel, spots(panel, 1)[0], MODEL, 0.1) is None
+    assert StationarySpray.before(panel, spots(panel, 1)[0], MODEL, 0.1) is None
 
 
 @pytest.mark.parametrize('name', ['corner_slowdown', 'gun_wake', 'pose_lag'])

@@ -1,0 +1,157 @@
+"""Where readings lie on a part: in rows and columns, or off its surface, and why then."""
+
+import numpy as np
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.surface import Surface
+
+# Readings further from the surface, or facing more away from it, do not belong to the part.
+MAX_DISTANCE_M = 0.02
+MAX_ANGLE_RAD = np.radians(60.0)
+# Ways in which a file may have been meant, by the factor on its positions.
+OTHER_UNITS = {
+    0.001: 'they fit in millimetres: the file says metres, or its unit is wrong',
+    1000.0: 'they fit in metres: the file says millimetres, or its unit is wrong',
+    0.0254: 'they fit in inches',
+}
+NEAR_M = 0.02
+# Readings span at least this share of the part's longest side, or a spot of it was measured.
+LEAST_SPAN = 0.1
+# Readings that span less than this share are metres taken for millimetres, if they fit so.
+SPOT = 0.01
+# Boxes whose sides agree this well are the same part at another place.
+ALIKE = 0.25
+
+
+def refuse_off_surface(
+    surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
+) -> None:
+    """Refuse points (P,) that are this far from the surface [m]."""
+    far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
+    if not len(far):
+        if _lie_on_a_spot(surface, readings.positions_m):
+            hint = _hint(surface, readings.positions_m)
+            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
+        return
+    worst = far[np.argmax(distance_m[far])]
+    where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
+    raise ReadingsError(
+        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
+        f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
+        f'm (limit {MAX_DISTANCE_M:g}); {_hint(surface, readings.positions_m)}'
+    )
+
+
+def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
+    """Refuse points whose normals (P,) are turned this far from the surface's [rad]."""
+    away = np.flatnonzero(angle_rad > MAX_ANGLE_RAD)
+    if len(away):
+        worst = away[np.argmax(angle_rad[away])]
+        raise ReadingsError(
+            f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
+            f"surface, point '{readings.point[means.first[worst]]}' by "
+            f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
+        )
+
+
+def _lie_on_a_spot(surface: Surface, positions_m: np.ndarray) -> bool:
+    """Whether readings (N, 3) [m] huddle on a spot of the part and fit a thousand times larger."""
+    longest = np.ptp(surface.vertices_m, axis=0).max()
+    huddled = len(positions_m) > 1 and np.ptp(positions_m, axis=0).max() < SPOT * longest
+    return bool(huddled) and _fits(surface, 1000.0 * positions_m)
+
+
+def _hint(surface: Surface, positions_m: np.ndarray) -> str:
+    """Both bounding boxes and the likely cause, in one line."""
+    vertices = surface.vertices_m
+    boxes = f'the readings span {_box_words(positions_m)} m and the part {_box_words(vertices)} m'
+    for factor, words in OTHER_UNITS.items():
+        if _fits(surface, factor * positions_m):
+            return f'{boxes}; {words}'
+    distance = surface.locate(positions_m).distance_m
+    if np.median(distance) < NEAR_M:
+        return f'{boxes}; most points lie on the part: check these'
+    extents = np.ptp(positions_m, axis=0), np.ptp(vertices, axis=0)
+    fits = bool((np.sort(extents[0]) <= (1.0 + ALIKE) * np.sort(extents[1]) + NEAR_M).all())
+    if fits:
+        return f'{boxes}; they look like positions in another frame: give them in the mesh frame'
+    return f'{boxes}; give positions in the mesh frame, in metres, or name their unit with unit:'
+
+
+def _fits(surface: Surface, positions_m: np.ndarray) -> bool:
+    """Whether most positions lie on the part and span a good share of it."""
+    span = np.ptp(positions_m, axis=0).max()
+    if span < LEAST_SPAN * np.ptp(surface.vertices_m, axis=0).max():
+        return False
+    return bool(np.median(surface.locate(positions_m).distance_m) < NEAR_M)
+
+
+def _box_words(points_m: np.ndarray) -> str:
+    low, high = points_m.min(axis=0).round(6) + 0.0, points_m.max(axis=0).round(6) + 0.0
+    return ' x '.join(f'{a:.3g} to {b:.3g}' for a, b in zip(low, high, strict=True))
+
+
+FEWEST_ON_A_LINE = 3
+# Lines lie this much further apart than the readings of one line stray from it.
+CLEAR_RATIO = 3.0
+# Readings on one line are not known to be straighter than this [m].
+STRAIGHT_M = 1e-3
+# So many of the points at least belong to a line, or there are none.
+SHARE_ON_LINES = 0.8
+# A single line is this much longer than wide.
+SINGLE_RATIO = 10.0
+
+
+def columns_or_rows(surface: Surface, path: SprayPath, positions_m: np.ndarray) -> np.ndarray:
+    """(P,) labels 'column 1', ... from the left or 'row 1', ... from the top; '' for none.
+
+    Where points lie in both, the lines that cross the passes are taken.
+
+    Args:
+        surface: the part, seen by the gun, which fixes left and right.
+        positions_m: (P, 3) of the points [m].
+    """
+    right = positions_m @ across_axis(surface.outward, surface.down)
+    below = positions_m @ downhill_axis(surface.outward, surface.down)
+    ways = [('column', right, below), ('row', below, right)]
+    if not passes_are_level(path, surface.down):
+        ways.reverse()
+    for name, aside, along in ways:
+        lines = _lines(aside, along)
+        if lines is not None:
+            return np.array([f'{name} {line + 1}' if line >= 0 else '' for line in lines])
+    return np.full(len(positions_m), '')
+
+
+def passes_are_level(path: SprayPath, down: np.ndarray) -> bool:
+    """Whether the gun sprays more level than up and down."""
+    motion = path.velocity_m_per_s[path.flow > 0.0]
+    rising = float(np.abs(motion @ down).sum())
+    return 2.0 * rising <= float(np.linalg.norm(motion, axis=1).sum())
+
+
+def _lines(aside_m: np.ndarray, along_m: np.ndarray) -> np.ndarray | None:
+    """(P,) number of the line of each point, -1 for none; None where there are no lines."""
+    if len(aside_m) < FEWEST_ON_A_LINE:
+        return None
+    if np.ptp(aside_m) <= np.ptp(along_m) / SINGLE_RATIO:
+        return np.zeros(len(aside_m), dtype=int)
+    order = np.argsort(aside_m, kind='stable')
+    gaps = np.diff(aside_m[order])
+    largest = np.maximum(np.sort(gaps)[::-1], STRAIGHT_M)
+    ratios = largest[:-1] / largest[1:]
+    ratios = ratios[: len(aside_m) // FEWEST_ON_A_LINE]
+    if not len(ratios) or ratios.max() < CLEAR_RATIO:
+        return None
+    least = largest[int(np.argmax(ratios))]
+    cluster = np.empty(len(aside_m), dtype=int)
+    cluster[order] = np.concatenate([[0], np.cumsum(gaps >= least)])
+    counts = np.bincount(cluster)
+    kept = counts >= FEWEST_ON_A_LINE
+    widths = [np.ptp(aside_m[cluster == k]) for k in np.flatnonzero(kept)]
+    if counts[kept].sum() < SHARE_ON_LINES * len(aside_m) or max(widths) > least:
+        return None
+    return np.where(kept, np.cumsum(kept) - 1, -1)[cluster]
