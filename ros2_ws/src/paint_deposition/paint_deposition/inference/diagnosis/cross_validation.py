@@ -68,7 +68,7 @@ def nested_rmse_um(
         found = part.accepted
         columns = [size * space.explanations[k].law for _, k, size in found]
         given = np.hstack([stage.plain.columns, *columns])
-        null = NullModel.of(given[~out], stage.plain.raw[~out])
+        null = NullModel.of(np.hstack([given, space.of_parts])[~out], stage.plain.raw[~out])
         options = [k for k, e in enumerate(space.explanations) if e.learns not in without]
         laws = choose_laws(null, [part.explanations[k] for k in options], space.freedom)
         learned = [size * space.explanations[options[k]].columns for k, size in laws]

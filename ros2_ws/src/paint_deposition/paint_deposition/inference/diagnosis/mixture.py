@@ -40,6 +40,10 @@ class Mixture:
         return self.spaces[int(np.argmax(self.log_weights))]
 
     @property
+    def of_parts(self) -> np.ndarray:
+        return self.remainder.of_parts(self.sizes[int(np.argmax(self.log_weights))])
+
+    @property
     def null(self): return self.central.null
     @property
     def explanations(self): return self.spaces[0].explanations

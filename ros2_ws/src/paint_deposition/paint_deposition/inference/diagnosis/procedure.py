@@ -16,6 +16,7 @@ import numpy as np
 
 from paint_deposition.inference.diagnosis.cross_validation import Stage, nested_rmse_um
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.learning import choose_laws
 from paint_deposition.inference.diagnosis.model_space import PRIOR, SURE, Group, Model, ModelSpace
 from paint_deposition.inference.diagnosis.run import Run
@@ -228,7 +229,8 @@ def _learn(run: Run, space: ModelSpace, stages: Sequence[Stage], errors_um: np.n
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
         options = [e for e in space.explanations if e.learns not in without]
-        chosen = [(options[k], size) for k, size in choose_laws(run.plain, options, space.freedom)]
+        beside = NullModel.of(np.hstack([run.plain.columns, space.of_parts]), run.plain.raw)
+        chosen = [(options[k], size) for k, size in choose_laws(beside, options, space.freedom)]
         chosen = chosen[:enough]
         if not chosen:
             return
