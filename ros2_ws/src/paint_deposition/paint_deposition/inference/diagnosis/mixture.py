@@ -14,9 +14,15 @@ import numpy as np
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.model_space import (
-    CREDIBLE, DRAWS, LEAST_BESIDE, PRIOR, SIZES, SURE, Group, Model, ModelSpace,
+    DRAWS,
+    LEAST_BESIDE,
+    PRIOR,
+    SIZES,
+    SURE,
+    Model,
+    ModelSpace,
 )
-from paint_deposition.inference.fitting.remainder import Remainder, Sizes
+from paint_deposition.inference.fitting.remainder import Remainder
 
 # So many sizes are kept at most, and none whose share of the posterior is smaller.
 MOST, LEAST_SHARE = 4, 0.02
@@ -28,11 +34,21 @@ class Mixture:
     def __init__(self, null: NullModel, remainder: Remainder, explanations: Sequence[Explanation],
                  freedom: float) -> None:
         self.plain, self.remainder, self.freedom = null, remainder, freedom
-        chosen = _probable(null, remainder, explanations, freedom)
+        chosen, log_null = _probable(null, remainder, explanations, freedom)
         self.sizes = [s for s, _, _ in chosen]
         self.spaces = [ModelSpace(n, explanations, freedom) for _, n, _ in chosen]
         weights = np.array([w for _, _, w in chosen])
         self.log_weights = weights - np.logaddexp.reduce(weights)
+        self.log_null = log_null
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the null model at all sizes, with or without an unknown cause."""
+        log_unknown = np.logaddexp.reduce([
+            w + m.log_weight for space, w in zip(self.spaces, self.log_weights, strict=True)
+            for m in space._alone if m.causes == ('unknown',)
+        ])
+        return float(self.log_null + np.logaddexp(0.0, log_unknown))
 
     # -- the central one, for what needs no average
     @property
@@ -160,4 +176,5 @@ def _probable(null, remainder, explanations, freedom):
     tried.sort(key=lambda t: -t[3])
     total = np.logaddexp.reduce([t[3] for t in tried])
     kept = [t for t in tried[:MOST] if t[3] - total > np.log(LEAST_SHARE)] or tried[:1]
-    return [(s, n, w) for s, n, w, _ in kept]
+    log_null = float(np.logaddexp.reduce([t[2] for t in tried]))
+    return [(s, n, w) for s, n, w, _ in kept], log_null
