@@ -18,6 +18,7 @@ class GaugeZero(Effect):
 
     id = 'gauge_zero'
     family = 'level'
+    exact = True
     covariates = over(film_um=0)
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')

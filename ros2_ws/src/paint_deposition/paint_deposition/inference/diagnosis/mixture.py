@@ -31,19 +31,24 @@ LAW_ODDS = np.log(0.02)
 
 
 class Mixture:
-    def __init__(
-        self,
-        null: NullModel,
-        remainder: Remainder,
-        explanations: Sequence[Explanation],
-        freedom: float,
-    ) -> None:
+    def __init__(self, null: NullModel, remainder: Remainder, explanations: Sequence[Explanation],
+                 freedom: float) -> None:
         self.plain, self.remainder, self.freedom = null, remainder, freedom
-        chosen = _probable(null, remainder, explanations, freedom)
+        chosen, log_null = _probable(null, remainder, explanations, freedom)
         self.sizes = [s for s, _, _ in chosen]
         self.spaces = [ModelSpace(n, explanations, freedom) for _, n, _ in chosen]
         weights = np.array([w for _, _, w in chosen])
         self.log_weights = weights - np.logaddexp.reduce(weights)
+        self.log_null = log_null
+
+    @property
+    def log_evidence(self) -> float:
+        """Log evidence of the null model at all sizes, with or without an unknown cause."""
+        log_unknown = np.logaddexp.reduce([
+            w + m.log_weight for space, w in zip(self.spaces, self.log_weights, strict=True)
+            for m in space._alone if m.causes == ('unknown',)
+        ])
+        return float(self.log_null + np.logaddexp(0.0, log_unknown))
 
     # -- the central one, for what needs no average
     @property
@@ -51,37 +56,28 @@ class Mixture:
         return self.spaces[int(np.argmax(self.log_weights))]
 
     @property
-    def null(self):
-        return self.central.null
+    def of_parts(self) -> np.ndarray:
+        return self.remainder.of_parts(self.sizes[int(np.argmax(self.log_weights))])
 
     @property
-    def explanations(self):
-        return self.spaces[0].explanations
-
+    def null(self): return self.central.null
     @property
-    def causes(self):
-        return self.spaces[0].causes
-
+    def explanations(self): return self.spaces[0].explanations
     @property
-    def principal(self):
-        return self.central.principal
+    def causes(self): return self.spaces[0].causes
+    @property
+    def principal(self): return self.central.principal
 
     @cached_property
     def models(self) -> tuple[Model, ...]:
         found: dict[tuple[str, ...], list[Model]] = {}
         for k, (space, log_weight) in enumerate(zip(self.spaces, self.log_weights, strict=True)):
             for model in space.models:
-                found.setdefault(model.causes, []).append(
-                    replace(model, log_weight=model.log_weight + float(log_weight), at=k)
-                )
+                found.setdefault(model.causes, []).append(replace(model, log_weight=model.log_weight + float(log_weight), at=k))
         joined = []
         for models in found.values():
             best = max(models, key=lambda m: m.log_weight)
-            joined.append(
-                replace(
-                    best, log_weight=float(np.logaddexp.reduce([m.log_weight for m in models]))
-                )
-            )
+            joined.append(replace(best, log_weight=float(np.logaddexp.reduce([m.log_weight for m in models]))))
         return tuple(sorted(joined, key=lambda m: -m.log_weight))
 
     probabilities = cached_property(ModelSpace.probabilities.func)
@@ -90,8 +86,7 @@ class Mixture:
     group = ModelSpace.group
     is_shapeless = ModelSpace.is_shapeless
 
-    def against_nothing(self, cause):
-        return self.central.against_nothing(cause)
+    def against_nothing(self, cause): return self.central.against_nothing(cause)
 
     def best_law(self, cause):
         return max((s.best_law(cause) for s in self.spaces), key=lambda f: f[2])
@@ -106,32 +101,16 @@ class Mixture:
             return []
         own = self.spaces[best.at].principal
         amounts = self.amplitudes(best)
-        moved = {
-            c: own[k].length(part) ** 2
-            for c, k, part in zip(best.causes, best.chosen, amounts, strict=True)
-        }
+        moved = {c: own[k].length(part) ** 2 for c, k, part in zip(best.causes, best.chosen, amounts, strict=True)}
         least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
-        return [
-            (c, k, s)
-            for c, k, s in zip(best.causes, best.chosen, best.sizes, strict=True)
-            if c not in PRIOR and moved[c] >= least and self.group(c)[1] > SURE
-        ]
+        return [(c, k, s) for c, k, s in zip(best.causes, best.chosen, best.sizes, strict=True)
+                if c not in PRIOR and moved[c] >= least and self.group(c)[1] > SURE]
 
     def select(self, rows):
         new = object.__new__(Mixture)
-        new.plain, new.remainder, new.freedom, new.sizes = (
-            self.plain,
-            self.remainder,
-            self.freedom,
-            self.sizes,
-        )
+        new.plain, new.remainder, new.freedom, new.sizes = self.plain, self.remainder, self.freedom, self.sizes
         new.spaces = [s.select(rows) for s in self.spaces]
-        w = np.array(
-            [
-                _null_log_evidence(s.null, self.freedom) + z.log_prior
-                for s, z in zip(new.spaces, self.sizes)
-            ]
-        )
+        w = np.array([_null_log_evidence(s.null, self.freedom) + z.log_prior for s, z in zip(new.spaces, self.sizes)])
         new.log_weights = w - np.logaddexp.reduce(w)
         return new
 
@@ -155,18 +134,12 @@ class Mixture:
         for space, size in zip(self.spaces, self.sizes):
             dev = space.null.whiten(raw)
             null = _null_log(space.null, np.sum(dev**2, axis=0), self.freedom) + size.log_prior
-            nulls.append(null)
-            terms.append(null + space.evidence(dev))
+            nulls.append(null); terms.append(null + space.evidence(dev))
         return np.logaddexp.reduce(terms) - np.logaddexp.reduce(nulls)
 
-    def null_evidence(self, seed):
-        return self.central.null_evidence(seed)
-
-    def null_draws(self, seed):
-        return self.central.null_draws(seed)
-
-    def evidence(self, *a, **k):
-        return self.central.evidence(*a, **k)
+    def null_evidence(self, seed): return self.central.null_evidence(seed)
+    def null_draws(self, seed): return self.central.null_draws(seed)
+    def evidence(self, *a, **k): return self.central.evidence(*a, **k)
 
 
 def _null_log(null, square, freedom):
@@ -198,11 +171,10 @@ def _probable(null, remainder, explanations, freedom):
                 gain = -0.5 * (freedom + len(given.raw)) * np.log1p(-explained / (freedom + total))
             else:
                 gain = 0.5 * explained
-            best.append(
-                weight + LAW_ODDS + np.max(gain - 0.5 * np.log(precision), initial=-np.inf)
-            )
+            best.append(weight + LAW_ODDS + np.max(gain - 0.5 * np.log(precision), initial=-np.inf))
         tried.append((sizes, given, weight, float(np.logaddexp.reduce(best))))
     tried.sort(key=lambda t: -t[3])
     total = np.logaddexp.reduce([t[3] for t in tried])
     kept = [t for t in tried[:MOST] if t[3] - total > np.log(LEAST_SHARE)] or tried[:1]
-    return [(s, n, w) for s, n, w, _ in kept]
+    log_null = float(np.logaddexp.reduce([t[2] for t in tried]))
+    return [(s, n, w) for s, n, w, _ in kept], log_null

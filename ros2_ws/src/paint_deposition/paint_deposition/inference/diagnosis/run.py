@@ -110,21 +110,32 @@ class Run:
         Args:
             fit: of the model; default the newest.
         """
-        fit = fit or self.fit
-        kept = frozenset(effect.id for effect in self.candidates_in(fit))
-        free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
-        null = NullModel.around(fit, free)
-        found = [e for e in explanations(self.study, fit, self.candidates) if e.cause != FOOTPRINT]
-        remainder = Remainder.of(self.study, fit)
-        space = Mixture(null, remainder, found, self.study.noise.degrees_of_freedom)
+        space = self._mixture(fit or self.fit, self.candidates)
         if self.testable is None:
             self.testable = testability(space, self.seed)
         return space
 
+    def _mixture(self, fit: Fit, candidates: Mapping[str, list[Effect]]) -> Mixture:
+        kept = frozenset(effect.id for effect in self.candidates_in(fit))
+        free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
+        null = NullModel.around(fit, free)
+        found = explanations(self.study, fit, candidates)
+        found = [e for e in found if e.cause != FOOTPRINT]
+        remainder = Remainder.of(self.study, fit)
+        return Mixture(null, remainder, found, self.study.noise.degrees_of_freedom)
+
+    def log_evidence(self, fit: Fit) -> float:
+        """Log evidence of a refitted model, with or without something unknown beside it."""
+        return self._mixture(fit, {}).log_evidence
+
     @property
     def plain(self) -> NullModel:
         """The newest model as it is, with nothing missing."""
-        return NullModel.around(self.fit, self.study.nuisance)
+        return self.plain_of(self.fit)
+
+    def plain_of(self, fit: Fit) -> NullModel:
+        """The model of a fit as it is, with nothing missing."""
+        return NullModel.around(fit, self.study.nuisance)
 
     @property
     def taken(self) -> list[Effect]:

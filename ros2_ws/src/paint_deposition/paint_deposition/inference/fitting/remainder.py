@@ -143,9 +143,13 @@ class Remainder:
 
     def columns(self, sizes: Sizes) -> np.ndarray:
         """(P, n) directions of these sizes."""
+        footprint = self.footprint[FOOTPRINTS.index(sizes.footprint)]
+        return np.hstack([footprint, self.of_parts(sizes)])
+
+    def of_parts(self, sizes: Sizes) -> np.ndarray:
+        """(P, n) the same without the footprint, which all parts share."""
         k = sizes.length
         return np.hstack([
-            self.footprint[FOOTPRINTS.index(sizes.footprint)],
             self.shapes,
             sizes.setting * self.settings[k],
             sizes.part * self.parts[k],
