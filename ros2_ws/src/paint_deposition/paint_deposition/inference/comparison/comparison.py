@@ -11,8 +11,6 @@ from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.comparison.comparison import misfit_regions
-from paint_deposition.inference.comparison.regions import Region
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.residuals import Residuals

@@ -7,7 +7,7 @@ import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.mixture import Mixture
 from paint_deposition.inference.fitting.study import Study
 
 # An effect is added without a fold, too, where its group is more probable than not.
@@ -33,11 +33,11 @@ class Stage:
         accepted: effects that were added after it; none at the last stage.
     """
 
-    space: ModelSpace
+    space: Mixture
     plain: NullModel
     accepted: frozenset[str] = frozenset()
 
-    def goes_on(self, part: ModelSpace) -> bool:
+    def goes_on(self, part: Mixture) -> bool:
         """Whether the same effects would be added with the space of a part of the readings."""
         return all(part.inclusion(*part.group(name)[0], name) > HALF for name in self.accepted)
 

@@ -1,10 +1,10 @@
 """Which physical effects are missing from the model, if any: the procedure.
 
 1. Fit the pattern; stop if the fit cannot be right.
-2. Compute the evidence of all sets of up to three causes around the fit, and test whether anything
-   is missing at all.
-3. If so, refit with every effect of the best set that is probable enough, and look beside it, its
-   law being allowed to be off, until nothing more is found. Test each effect by leaving it out.
+2. Compute the evidence of all sets of up to three causes around the fit, beside a remainder of
+   nature of every size, and test whether anything is missing at all.
+3. If so, refit with the sets that this proposes, and take the one whose refitted model has the
+   highest evidence; look beside it until nothing more is found. Test each by leaving it out.
 4. Learn what the accepted laws leave unexplained as laws of any form, if readings left out are
    predicted better.
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
@@ -19,9 +19,10 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.cross_validation import Stage, nested_rmse_um
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN
 from paint_deposition.inference.diagnosis.learning import choose_laws
-from paint_deposition.inference.diagnosis.model_space import Group, ModelSpace
+from paint_deposition.inference.diagnosis.mixture import Mixture
+from paint_deposition.inference.diagnosis.model_space import Group
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
@@ -62,6 +63,7 @@ def diagnose(
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     progress('computing the evidence of what may be missing')
     search = Search(run)
+    run.remainder = search.nothing.space.figures
     p_value = search.nothing.space.p_value(seed)
     if p_value >= ALPHA:
         reason = 'The readings agree with the model to within the noise of the gauge.'
@@ -75,6 +77,7 @@ def diagnose(
     ]
     run.fit = best.fit
     space = best.space
+    run.remainder = space.figures
     stages.append(Stage(space, run.plain))
     errors_um = nested_rmse_um(stages, run.study)
     _accept(run, groups, float(errors_um[0]))
@@ -101,7 +104,7 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
         run.accepted.append(run.described(members, probability, before))
 
 
-def _learn(run: Run, space: ModelSpace, stages: Sequence[Stage], errors_um: np.ndarray) -> None:
+def _learn(run: Run, space: Mixture, stages: Sequence[Stage], errors_um: np.ndarray) -> None:
     """Add as many laws of any form as improve the prediction of points left out.
 
     A law that the model cannot be fitted with is not tried again.
@@ -128,22 +131,16 @@ def _learn(run: Run, space: ModelSpace, stages: Sequence[Stage], errors_um: np.n
     run.accepted += [run.described((law,), 1.0, before) for law in laws]
 
 
-def _conclude(run: Run, space: ModelSpace, p_value: float) -> Diagnosis:
+def _conclude(run: Run, space: Mixture, p_value: float) -> Diagnosis:
     """The verdict on what was found."""
     named = [c for c in run.accepted if not c.best.startswith('learned:')]
     others = _others(run, space)
     if named:
         names = ', and '.join(_in_words(c) for c in named)
         return run.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
-    outside = space.inclusion(UNKNOWN, FOOTPRINT)
-    if outside > 0.5 or not others:
-        footprint = space.inclusion(FOOTPRINT) > space.inclusion(UNKNOWN)
-        unknown = locate_unexplained(run.study, run.history[0].fit, footprint, run.seed)
-        reason = (
-            'The pattern itself differs from the two Gaussians of eq. (1).'
-            if footprint
-            else f'Something outside the library shows against {unknown.covariate}.'
-        )
+    if space.inclusion(UNKNOWN) > 0.5 or not others:
+        unknown = locate_unexplained(run.study, run.history[0].fit, False, run.seed)
+        reason = f'Something outside the library shows against {unknown.covariate}.'
         return run.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
         f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
@@ -151,7 +148,7 @@ def _conclude(run: Run, space: ModelSpace, p_value: float) -> Diagnosis:
     return run.diagnosis(p_value, 'undecided', reason, others)
 
 
-def _others(run: Run, space: ModelSpace) -> tuple[EffectClass, ...]:
+def _others(run: Run, space: Mixture) -> tuple[EffectClass, ...]:
     """Groups of effects that may act, but are not accepted."""
     known = {member for found in run.accepted for member in found.members}
     best = space.models[0]

@@ -5,8 +5,8 @@ effect changes at the chosen places beyond what the pattern can imitate is its n
 optimality), and what another effect beside the pattern cannot imitate of it is their separation
 (T-optimality: Atkinson and Fedorov, Biometrika 62, 1975). A design is worth the probability that
 an effect is detected and separated from its nearest rival, averaged over the effects and over the
-sizes in which they occur: a sum of the squares would go on improving what is seen anyway. Places are
-added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 1972).
+sizes in which they occur: a sum of the squares would go on improving what is seen anyway. Places
+are added one by one and then exchanged (Fedorov, Theory of Optimal Experiments, 1972).
 """
 
 from dataclasses import dataclass

@@ -20,8 +20,8 @@ from paint_deposition.inference.diagnosis.explanations import (
     explanations,
     law_errors,
 )
-from paint_deposition.inference.diagnosis.mixture import Mixture
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.mixture import Mixture, RemainderFigures
+from paint_deposition.inference.diagnosis.remainder import Remainder
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.diagnosis.verdict import (
@@ -37,7 +37,6 @@ from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
-from paint_deposition.inference.fitting.remainder import Remainder
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -93,6 +92,7 @@ class Run:
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
+        self.remainder: RemainderFigures | None = None
         self.trouble = trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
@@ -104,7 +104,7 @@ class Run:
         """Ids of the candidates that the newest model has."""
         return frozenset(effect.id for effect in self.taken)
 
-    def linearise(self, fit: Fit | None = None) -> ModelSpace:
+    def linearise(self, fit: Fit | None = None) -> Mixture:
         """The space of what may be missing beside a model, whose effects' laws may be off.
 
         Args:
@@ -112,7 +112,7 @@ class Run:
         """
         space = self._mixture(fit or self.fit, self.candidates)
         if self.testable is None:
-            self.testable = testability(space, self.seed)
+            self.testable = testability(space.central, self.seed)
         return space
 
     def _mixture(self, fit: Fit, candidates: Mapping[str, list[Effect]]) -> Mixture:
@@ -260,6 +260,7 @@ class Run:
             not_testable,
             detectable,
             remarks=self.remarks,
+            remainder=self.remainder,
         )
 
 
