@@ -134,9 +134,9 @@ class ReportData:
         return lines[-len(self.models) :]
 
     @property
-    def proposals(self) -> tuple[list[Place], list[Spray]]:
+    def proposals(self) -> tuple[Sequence[Place], Sequence[Spray]]:
         """What to measure and what to spray next."""
-        return self.diagnosis.proposals if self.diagnosis else ([], [])
+        return self.diagnosis.proposals if self.diagnosis else ((), ())
 
     @property
     def history(self) -> list[dict[str, Any]]:

@@ -159,7 +159,12 @@ output(
         figures('probability', members=Words, best=str, holdout_rmse_um=dict[str, Number],
                 parameters=dict[str, figures('value low high')])
     ],
-    rmse_um=figures('before after holdout_before holdout_after noise_floor'),
+    rmse_um=figures(
+        'before after holdout_before holdout_after noise_floor',
+        left_out=Literal['experiments', 'points'],
+    ),
+    experiments=list[figures('rmse_before_um rmse_after_um', name=str)],
+    remainder=dict | None, footprint=dict | None,
     detectable=dict[str, dict[str, Number]], regions=list[Region], noise=Noise,
     next=figures(measure=list[dict], spray=list[figures(what=str, separates=Words)]),
     pattern_shift=dict | None, left_out=list[dict], notes=Words,

@@ -25,8 +25,8 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Sizes that are considered, and the prior of each: its median, and the factor that is one standard
 # deviation. The footprint's is a share of its peak. Those of settings and of single parts are
-# shares of the part's thickest film, and fall with the root of the film: sprays of flat fans differ
-# by 0.5 to 5 % of the peak, a third as much where the film is a twentieth.
+# shares of the part's thickest film, and fall with the root of the film: sprays of flat fans
+# differ by 0.5 to 5 % of the peak, a third as much where the film is a twentieth.
 FOOTPRINTS, USUAL_FOOTPRINT = (0.01, 0.03, 0.1, 0.3), (0.08, 2.5)
 SETTINGS, USUAL_SETTING = (0.004, 0.012, 0.035, 0.1), (0.012, 2.0)
 PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)

@@ -216,9 +216,7 @@ class Diagnosis:
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
                 'noise_floor': self.noise_floor_um,
-                'left_out': 'experiments'
-                if len(self.study.campaign.experiments) > 1
-                else 'points',
+                'left_out': 'experiments' if self.study.has_several_parts else 'points',
             },
             'experiments': [
                 {'name': one.name, 'rmse_before_um': old.rmse_um, 'rmse_after_um': new.rmse_um}

@@ -269,13 +269,18 @@ class Study:
             for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
         ]
 
+    @property
+    def has_several_parts(self) -> bool:
+        """Whether whole parts can be left out."""
+        return len(self.campaign.experiments) > 1
+
     def folds(self, seed: int = 0) -> np.ndarray:
         """(P,) number of the fold in which each point is left out.
 
         Whole parts where there are several, else patches of the one part.
         """
         parts = self.campaign.experiment_of
-        if len(self.campaign.experiments) > 1:
+        if self.has_several_parts:
             return parts % FOLDS
         places = self.campaign.positions_m
         _, patch = kmeans2(places / places.std(), FOLDS, minit='++', rng=seed)
