@@ -31,4 +31,4 @@ def test_every_place_has_a_benchmark_that_fills_it():
     assert names
     for name in names:
         assert (ROOT / f'benchmarks/{name}.py').is_file(), name
-        assert f'benchmarks/page.py {name} ' in makefile, name
+        assert f'benchmarks.page {name} ' in makefile, name

@@ -13,6 +13,7 @@ from paint_deposition.errors import ModelError, PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq3_collapse import SampledCollapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -148,7 +149,9 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
     assert 'keeps its orientation' in kept.setup.assumption
     assert 'turns' in turned.setup.assumption
     note = next(line for line in kept.notes if 'turned by 180 deg' in line)
-    mirrored = ParallelPasses(kept.collapse, kept.collapse.mirrored()).sigma_n(kept.index_m)
+    profile = kept.collapse
+    other_way = SampledCollapse(-profile.x_m[::-1], profile.film_um[::-1], profile.finest_m)
+    mirrored = ParallelPasses(profile, other_way).sigma_n(kept.index_m)
     assert float(note.split()[-1]) == pytest.approx(mirrored, abs=1e-4)
 
 
