@@ -7,11 +7,8 @@ import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
-from paint_deposition.inference.diagnosis.mixture import Mixture
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.fitting.study import Study
-
-# An effect is added without a fold, too, where its group is more probable than not.
-HALF = 0.5
 
 
 def hold_out(null: NullModel, folds: np.ndarray) -> np.ndarray:
@@ -31,15 +28,20 @@ class Stage:
         space: what may be missing at a fit, whose effects' laws may be off.
         plain: the model of that fit, its laws taken as they are.
         accepted: effects that were added after it; none at the last stage.
+        shapeless: whether they took the place of a shapeless cause that the space called for.
     """
 
-    space: Mixture
+    space: ModelSpace
     plain: NullModel
     accepted: frozenset[str] = frozenset()
+    shapeless: bool = False
 
-    def goes_on(self, part: Mixture) -> bool:
+    def goes_on(self, part: ModelSpace) -> bool:
         """Whether the same effects would be added with the space of a part of the readings."""
-        return all(part.inclusion(*part.group(name)[0], name) > HALF for name in self.accepted)
+        found = frozenset(cause for cause, _, _ in part.accepted)
+        if self.shapeless:
+            return not found and part.is_shapeless
+        return bool(found) and found == self.accepted
 
 
 def nested_rmse_um(
@@ -66,7 +68,7 @@ def nested_rmse_um(
         found = part.accepted
         columns = [size * space.explanations[k].law for _, k, size in found]
         given = np.hstack([stage.plain.columns, *columns])
-        null = NullModel.of(np.hstack([given, space.of_parts])[~out], stage.plain.raw[~out])
+        null = NullModel.of(given[~out], stage.plain.raw[~out])
         options = [k for k, e in enumerate(space.explanations) if e.learns not in without]
         laws = choose_laws(null, [part.explanations[k] for k in options], space.freedom)
         learned = [size * space.explanations[options[k]].columns for k, size in laws]

@@ -72,18 +72,6 @@ class NullModel:
         directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
         return NullModel.of(np.hstack([directions, nuisance]), raw)
 
-    def log_evidence(self, deviations: np.ndarray, freedom: float) -> np.ndarray:
-        """(D,) log likelihood of whitened deviations (P, D), the noise's scale integrated out.
-
-        Args:
-            deviations: of the readings, or simulated. freedom: of the noise estimate.
-        """
-        half_log_det = np.log(np.diag(self.lower)).sum()
-        squares = np.sum(deviations**2, axis=0)
-        if not np.isfinite(freedom):
-            return -0.5 * squares - half_log_det
-        return -0.5 * (freedom + len(self.raw)) * np.log1p(squares / freedom) - half_log_det
-
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
         return solve_triangular(self.lower, columns, lower=True)

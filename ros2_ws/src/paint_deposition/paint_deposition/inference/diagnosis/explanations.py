@@ -149,7 +149,7 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
     covariates = _covariates(study, fit.model)
     film = study.forward.predict_um(fit.model)
     found = [np.empty((len(study), 0))]
-    for effect in (e for e in fit.model.effects if e.id in kept and not e.exact):
+    for effect in (e for e in fit.model.effects if e.id in kept):
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})
         change = film - study.forward.predict_um(without)
@@ -209,7 +209,7 @@ def _of_effect(
 ) -> Iterator[Explanation]:
     """By the law in each shape, its error included, and by free laws."""
     effect = type(shapes[0])
-    own = [name for name in effect.covariates if name in roots and not effect.exact]
+    own = [name for name in effect.covariates if name in roots]
     # A law of any form acts on all parts; an effect may be switched off on some.
     wanted = effect.free_law and study.has(effect).all()
     free = _free_laws(study, fit.model, effect) if wanted else []

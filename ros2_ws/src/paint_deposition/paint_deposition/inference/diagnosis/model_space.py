@@ -27,7 +27,7 @@ from paint_deposition.inference.diagnosis.joint_evidence import (
 # a pattern that is no two Gaussians. No measured pattern is exactly one.
 PRIOR_EFFECT, PRIOR = 0.02, {UNKNOWN: 0.08, FOOTPRINT: 0.06}
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
-SIZES = np.array([0.5, 1.0, 2.0])
+SIZES = np.array([0.35, 0.7, 1.4, 2.8, 5.6])
 # How many sets are searched in full: pairs, pairs from which triples grow, and triples.
 PAIRS, GROWN, TRIPLES = 60, 12, 20
 SWEEPS = 2
@@ -41,6 +41,9 @@ Group = tuple[tuple[str, ...], float]
 # The error of a law is at most this large beside the law; a smaller one, in standard deviations
 # of the noise, may be noise.
 LARGEST_ERROR, NOTICED = 0.6, 3.0
+# An effect beside a stronger shapeless cause acts only if it moves the readings by this share of
+# what the other does (squared): no shapeless cause is known more exactly.
+LEAST_BESIDE = 0.04
 
 
 @dataclass(frozen=True)
@@ -51,23 +54,59 @@ class Model:
         causes: names, sorted.
         chosen: numbers of their explanations. sizes: of their amplitudes.
         log_weight: logarithm of its posterior weight, that of no cause being 0.
-        at: number of the space, of several, in which its explanations are the best.
     """
 
     causes: tuple[str, ...]
     chosen: tuple[int, ...] = ()
     sizes: tuple[float, ...] = ()
     log_weight: float = 0.0
-    at: int = 0
 
 
-class Sets:
-    """Sets of causes with their posterior weights, and what follows from these."""
+class ModelSpace:
+    """All models around a null model.
 
-    @property
+    Args:
+        null: the null hypothesis.
+        explanations: of all causes.
+        freedom: degrees of freedom of the noise estimate.
+    """
+
+    def __init__(
+        self, null: NullModel, explanations: Sequence[Explanation], freedom: float
+    ) -> None:
+        self.null, self.freedom = null, freedom
+        self._simulated: dict[int, np.ndarray] = {}
+        # By how much a cause's averaged log evidence, with its odds, exceeds that of its best.
+        self._averaging: dict[str, float] = {}
+        self.explanations = sorted(explanations, key=lambda e: e.cause)
+        self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
+        names = [e.cause for e in self.explanations]
+        self._first = np.array([names.index(c) for c in self.causes])
+        self._last = np.append(self._first[1:], len(names))
+        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
+        self._directions = Directions.of(self.principal, null.deviation, freedom)
+        shares = np.log([e.share / len(SIZES) for e in self.explanations])
+        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
+        physical = np.array([self._physical_sizes(k) for k in range(len(names))])
+        self._log_share_alone = np.where(physical, self._log_share, NEVER)
+        odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
+        self._log_odds = np.log(odds / (1.0 - odds))
+
+    @cached_property
     def models(self) -> tuple[Model, ...]:
         """The models that matter, most probable first."""
-        raise NotImplementedError
+        alone = {model.causes[0]: model for model in self._alone}
+        pairs = [_joined(*pair) for pair in combinations(self._alone, 2)]
+        pairs = [self._refined(m) for m in self._most_probable(pairs, PAIRS)]
+        grown = {
+            tuple(sorted((*pair.causes, cause))): _joined(pair, single)
+            for pair in self._most_probable(pairs, GROWN)
+            for cause, single in alone.items()
+            if cause not in pair.causes
+        }
+        triples = [self._refined(m) for m in self._most_probable(grown.values(), TRIPLES)]
+        found = [Model((), (), (), 0.0), *self._alone, *pairs, *triples]
+        return tuple(sorted(found, key=lambda m: -m.log_weight))
 
     @cached_property
     def probabilities(self) -> np.ndarray:
@@ -82,8 +121,8 @@ class Sets:
 
     def against_nothing(self, cause: str) -> float:
         """Posterior probability of one cause against none, if both were as probable before."""
-        weights = {model.causes: model.log_weight for model in self.models}
-        return float(expit(weights[(cause,)] - weights[()] - log_odds(cause)))
+        number = self.causes.index(cause)
+        return float(expit(self._alone[number].log_weight - self._log_odds[number]))
 
     def alternatives(self, cause: str) -> dict[str, float]:
         """What could stand in the place of one cause beside the others of its best model.
@@ -117,70 +156,10 @@ class Sets:
         effects = tuple(name for name in members if name not in PRIOR)
         return effects, self.inclusion(*effects) if effects else 0.0
 
-    @cached_property
-    def accepted(self) -> list[tuple[str, int, float]]:
-        """Effects of the most probable model that act with some certainty.
-
-        Each with the number of its explanation and the size of its amplitudes.
-        """
-        best = self.models[0]
-        return [
-            (cause, k, size)
-            for cause, k, size in zip(best.causes, best.chosen, best.sizes, strict=True)
-            if cause not in PRIOR and self.group(cause)[1] > SURE
-        ]
-
-
-def log_odds(cause: str) -> float:
-    """Prior log odds that a cause acts."""
-    prior = PRIOR.get(cause, PRIOR_EFFECT)
-    return float(np.log(prior / (1.0 - prior)))
-
-
-class ModelSpace(Sets):
-    """All models around a null model.
-
-    Args:
-        null: the null hypothesis.
-        explanations: of all causes.
-        freedom: degrees of freedom of the noise estimate.
-    """
-
-    def __init__(
-        self, null: NullModel, explanations: Sequence[Explanation], freedom: float
-    ) -> None:
-        self.null, self.freedom = null, freedom
-        self._simulated: dict[int, np.ndarray] = {}
-        # By how much a cause's averaged log evidence, with its odds, exceeds that of its best.
-        self._averaging: dict[str, float] = {}
-        self.explanations = sorted(explanations, key=lambda e: e.cause)
-        self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
-        names = [e.cause for e in self.explanations]
-        self._first = np.array([names.index(c) for c in self.causes])
-        self._last = np.append(self._first[1:], len(names))
-        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
-        self._directions = Directions.of(self.principal, null.deviation, freedom)
-        shares = np.log([e.share / len(SIZES) for e in self.explanations])
-        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
-        physical = np.array([self._physical_sizes(k) for k in range(len(names))])
-        self._log_share_alone = np.where(physical, self._log_share, NEVER)
-        self._log_odds = np.array([log_odds(cause) for cause in self.causes])
-
-    @cached_property
-    def models(self) -> tuple[Model, ...]:
-        """The models that matter, most probable first."""
-        alone = {model.causes[0]: model for model in self.alone}
-        pairs = [_joined(*pair) for pair in combinations(self.alone, 2)]
-        pairs = [self._refined(m) for m in self._most_probable(pairs, PAIRS)]
-        grown = {
-            tuple(sorted((*pair.causes, cause))): _joined(pair, single)
-            for pair in self._most_probable(pairs, GROWN)
-            for cause, single in alone.items()
-            if cause not in pair.causes
-        }
-        triples = [self._refined(m) for m in self._most_probable(grown.values(), TRIPLES)]
-        found = [Model((), (), (), 0.0), *self.alone, *pairs, *triples]
-        return tuple(sorted(found, key=lambda m: -m.log_weight))
+    @property
+    def is_shapeless(self) -> bool:
+        """Whether the most probable model has a cause from outside the library."""
+        return bool(PRIOR.keys() & set(self.models[0].causes))
 
     def best_law(self, cause: str) -> tuple[int, float, float]:
         """The explanation of an effect by its law, its size and log evidence, if it acts alone."""
@@ -207,6 +186,27 @@ class ModelSpace(Sets):
         error = own.length(amounts, slice(of_law, None))
         return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
 
+    @cached_property
+    def accepted(self) -> list[tuple[str, int, float]]:
+        """Causes of the most probable model that act with some certainty.
+
+        Each with the number of its explanation and the size of its amplitudes.
+        """
+        best = self.models[0]
+        if not best.causes:
+            return []
+        amounts, own = self.amplitudes(best), self.principal
+        moved = {
+            cause: own[k].length(part) ** 2
+            for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
+        }
+        least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
+        return [
+            (cause, k, size)
+            for cause, k, size in zip(best.causes, best.chosen, best.sizes, strict=True)
+            if cause not in PRIOR and moved[cause] >= least and self.group(cause)[1] > SURE
+        ]
+
     def select(self, rows: np.ndarray) -> 'ModelSpace':
         """The space that some of the readings (P,) bool give, explanations in the same order."""
         few = [explanation.select(rows) for explanation in self.explanations]
@@ -217,6 +217,15 @@ class ModelSpace(Sets):
         along = self._directions.amplitudes(model.chosen, model.sizes)
         own = (self.principal[k].axes for k in model.chosen)
         return [axes @ part for axes, part in zip(own, along, strict=True)]
+
+    def p_value(self, seed: int) -> float:
+        """Probability of at least this much evidence for any cause if none acted.
+
+        By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes, which is
+        computed for every draw as for the readings: nothing is chosen on the readings.
+        """
+        found = self.evidence(self.null.deviation[:, np.newaxis])[0]
+        return float((1 + np.count_nonzero(self.null_evidence(seed) >= found)) / (1 + DRAWS))
 
     def null_evidence(self, seed: int) -> np.ndarray:
         """(DRAWS,) simulated evidence if no cause acted."""
@@ -264,7 +273,7 @@ class ModelSpace(Sets):
         return log_evidence_of_each(self._directions, chosen, sizes).reshape(shape)
 
     @cached_property
-    def alone(self) -> list[Model]:
+    def _alone(self) -> list[Model]:
         """One cause each: its evidence averaged, and its best explanation."""
         found = []
         for number, cause in enumerate(self.causes):
@@ -317,7 +326,7 @@ class ModelSpace(Sets):
         else:
             return replace(model, log_weight=NEVER)
         weight = self._log_evidence(chosen, sizes)
-        alone = {m.causes[0]: m for m in self.alone}
+        alone = {m.causes[0]: m for m in self._alone}
         for cause, k in zip(model.causes, chosen, strict=True):
             best = self.explanations[alone[cause].chosen[0]]
             weight += self._averaging[cause]

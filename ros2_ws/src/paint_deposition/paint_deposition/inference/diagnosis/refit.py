@@ -65,7 +65,6 @@ def refit(
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     space = run.linearise()
-    run.remainder = space.figures
     p_value = space.p_value(seed)
     missing = p_value < ALPHA
     if added is None:

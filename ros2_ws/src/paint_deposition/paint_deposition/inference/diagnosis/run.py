@@ -14,14 +14,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import (
-    FOOTPRINT,
-    Explanation,
-    explanations,
-    law_errors,
-)
-from paint_deposition.inference.diagnosis.mixture import Mixture, RemainderFigures
-from paint_deposition.inference.diagnosis.remainder import Remainder
+from paint_deposition.inference.diagnosis.explanations import Explanation, explanations, law_errors
+from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.diagnosis.verdict import (
@@ -92,7 +86,6 @@ class Run:
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
-        self.remainder: RemainderFigures | None = None
         self.trouble = trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
@@ -104,38 +97,26 @@ class Run:
         """Ids of the candidates that the newest model has."""
         return frozenset(effect.id for effect in self.taken)
 
-    def linearise(self, fit: Fit | None = None) -> Mixture:
+    def linearise(self, fit: Fit | None = None) -> ModelSpace:
         """The space of what may be missing beside a model, whose effects' laws may be off.
 
         Args:
             fit: of the model; default the newest.
         """
-        space = self._mixture(fit or self.fit, self.candidates)
-        if self.testable is None:
-            self.testable = testability(space.central, self.seed)
-        return space
-
-    def _mixture(self, fit: Fit, candidates: Mapping[str, list[Effect]]) -> Mixture:
+        fit = fit or self.fit
         kept = frozenset(effect.id for effect in self.candidates_in(fit))
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
         null = NullModel.around(fit, free)
-        found = explanations(self.study, fit, candidates)
-        found = [e for e in found if e.cause != FOOTPRINT]
-        remainder = Remainder.of(self.study, fit)
-        return Mixture(null, remainder, found, self.study.noise.degrees_of_freedom)
-
-    def log_evidence(self, fit: Fit) -> float:
-        """Log evidence of a refitted model, with or without something unknown beside it."""
-        return self._mixture(fit, {}).log_evidence
+        found = explanations(self.study, fit, self.candidates)
+        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+        if self.testable is None:
+            self.testable = testability(space, self.seed)
+        return space
 
     @property
     def plain(self) -> NullModel:
         """The newest model as it is, with nothing missing."""
-        return self.plain_of(self.fit)
-
-    def plain_of(self, fit: Fit) -> NullModel:
-        """The model of a fit as it is, with nothing missing."""
-        return NullModel.around(fit, self.study.nuisance)
+        return NullModel.around(self.fit, self.study.nuisance)
 
     @property
     def taken(self) -> list[Effect]:
@@ -260,7 +241,6 @@ class Run:
             not_testable,
             detectable,
             remarks=self.remarks,
-            remainder=self.remainder,
         )
 
 

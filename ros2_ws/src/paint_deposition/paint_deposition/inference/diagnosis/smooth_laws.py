@@ -28,7 +28,7 @@ FAINT, OUTERMOST = 0.02, 0.01
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
 # Steps between the knots of a map [m], and of the radius of a footprint.
-MAP_STEP_M, RADII = 0.06, 20
+MAP_STEP_M, RADII = 0.06, 10
 # The pattern ends at this many of its widths beyond the ring.
 WIDTHS = 3.0
 # Distance of knots that have nothing in common.

@@ -13,7 +13,6 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.cross_validation import hold_out
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.mixture import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -127,7 +126,6 @@ class Diagnosis:
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that were looked for, by id.
         remarks: on what was known before, a sentence each.
-        remainder: what nature leaves over; None where the fit is broken.
         proposals: places to measure and sprays that would settle the diagnosis, best first; see
             ``next_experiment.with_proposals``.
     """
@@ -144,7 +142,6 @@ class Diagnosis:
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
     library: Mapping[str, type[Effect]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
-    remainder: RemainderFigures | None = None
     proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
 
     def __repr__(self) -> str:
@@ -155,8 +152,7 @@ class Diagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""
-        left_over = (str(self.remainder),) if self.remainder else ()
-        return (*self.warnings, *self.study.notes, *left_over)
+        return (*self.warnings, *self.study.notes)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -216,7 +212,7 @@ class Diagnosis:
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
                 'noise_floor': self.noise_floor_um,
-                'left_out': 'experiments' if self.study.has_several_parts else 'points',
+                'left_out': 'points',
             },
             'experiments': [
                 {'name': one.name, 'rmse_before_um': old.rmse_um, 'rmse_after_um': new.rmse_um}
@@ -237,9 +233,6 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
-            'remainder': self.remainder and asdict(self.remainder),
-            'footprint': self.remainder
-            and {'deviation_of_peak': self.remainder.footprint_of_peak},
             'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),
