@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -56,6 +56,9 @@ lint: build  ## check style, types and the order of the rooms
 
 bench-next: build  ## count how often the first proposed spray settles a diagnosis
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page next_spray $(ARGS)
+
+bench-nature: build  ## diagnose real sprays whose missing physics is known
+	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.nature $(ARGS)
 
 bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page loop $(ARGS)

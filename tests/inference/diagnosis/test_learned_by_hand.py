@@ -2,9 +2,8 @@
 
 import numpy as np
 import pytest
-from paint_deposition.effects.catalogue import LEARNED
 
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError

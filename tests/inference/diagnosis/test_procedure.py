@@ -219,7 +219,7 @@ def test_the_file_says_what_others_rely_on(found, nothing_found):
     assert set(one['parameters']['shielding']) == {'value', 'low', 'high'}
     assert set(one['holdout_rmse_um']) == {'before', 'after'}
     assert set(content['rmse_um']) == {
-        'before', 'after', 'holdout_before', 'holdout_after', 'noise_floor',
+        'before', 'after', 'holdout_before', 'holdout_after', 'noise_floor', 'left_out',
     }  # fmt: skip
     assert content['unknown'] is None
     assert set(content['not_testable']) <= set(EFFECTS)
