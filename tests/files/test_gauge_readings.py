@@ -121,3 +121,13 @@ def test_predictions_keep_the_readings_own_columns(table, tmp_path):
         '0,0,1,20,"thin, I think",20.5000',
         '0,0,2,21,,21.2500',
     ]
+
+
+def test_a_film_without_a_column_of_its_own_is_refused_in_a_line(tmp_path):
+    """Columns of film without a heading that names it have no name to quote."""
+    path = tmp_path / 'door.txt'
+    path.write_text(
+        'point\tffrom_lef,,t\thei[mm]dft rom_left\thei[mm dtm]fils2\nP1\t10\t20\t1.2\n'
+    )
+    with pytest.raises(ReadingsError, match='the readings have no coordinates'):
+        read_readings(path)

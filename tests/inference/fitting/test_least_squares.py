@@ -186,3 +186,14 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
     for _ in range(2):
         for model, expected in zip(models, alone, strict=True):
             assert np.array_equal(forward.predict_um(model), expected)
+
+
+def test_a_model_without_an_effect_of_the_study_does_not_have_it():
+    """Effects of one model that are compiled for all of them are absent in the others."""
+    points_m = np.column_stack([np.linspace(-0.3, 0.3, 9), np.zeros(9), np.linspace(0.5, 1.5, 9)])
+    campaign = Campaign((painted_by(DepositionModel(), passes([0.7, 1.3]), points_m),))
+    effect = EFFECTS['incidence_attraction'].typical()
+    with_it, without = Forward(campaign, (effect,)), Forward(campaign)
+    np.testing.assert_array_equal(
+        with_it.predict_um(DepositionModel()), without.predict_um(DepositionModel())
+    )

@@ -123,8 +123,9 @@ class ReadingTable:
         )
 
     def heading(self, quantity: str) -> str:
-        """What stands over the column."""
-        return self.columns.headings[self.columns.at[quantity]].text
+        """What stands over the column; the quantity's own name where there is none."""
+        column = self.columns.at.get(quantity)
+        return quantity if column is None else self.columns.headings[column].text
 
     def numbers(self, quantity: str, may_be_empty: bool = False) -> np.ndarray:
         """A column (N,) of numbers without a unit."""
