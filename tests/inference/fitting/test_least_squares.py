@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inference.fitting.panels import PANEL, painted_by, passes
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.overspray_fog import OversprayFog
@@ -188,12 +188,19 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
             assert np.array_equal(forward.predict_um(model), expected)
 
 
-def test_a_model_without_an_effect_of_the_study_does_not_have_it():
-    """Effects of one model that are compiled for all of them are absent in the others."""
+@pytest.mark.parametrize(
+    'law',
+    [
+        EFFECTS['incidence_attraction'].typical(),
+        LEARNED['incidence_deg'](low=0.0, high=60.0, learned=(0.1, 0.4)),
+    ],
+    ids=lambda law: law.id,
+)
+def test_a_model_without_a_law_of_the_study_does_not_have_it(law):
+    """Laws of one model are compiled for all, and absent in a model that has others."""
     points_m = np.column_stack([np.linspace(-0.3, 0.3, 9), np.zeros(9), np.linspace(0.5, 1.5, 9)])
     campaign = Campaign((painted_by(DepositionModel(), passes([0.7, 1.3]), points_m),))
-    effect = EFFECTS['incidence_attraction'].typical()
-    with_it, without = Forward(campaign, (effect,)), Forward(campaign)
+    other = DepositionModel(effects=(EFFECTS['pattern_spread'].typical(),))
     np.testing.assert_array_equal(
-        with_it.predict_um(DepositionModel()), without.predict_um(DepositionModel())
+        Forward(campaign, (law,)).predict_um(other), Forward(campaign).predict_um(other)
     )
