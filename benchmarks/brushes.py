@@ -25,8 +25,8 @@ from tests.virtual_paint_shop.files import write  # noqa: E402
 from tests.virtual_paint_shop.shop import generate  # noqa: E402
 
 from paint_deposition.api.inference import calibrate, diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
 from paint_deposition.files.campaign_file import read_campaign  # noqa: E402
+from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
 
 HIDDEN = (

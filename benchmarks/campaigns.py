@@ -13,19 +13,19 @@ from tests.virtual_paint_shop.cases import Case, paint
 from tests.virtual_paint_shop.files import write
 from tests.virtual_paint_shop.gauge import Session, measure
 
-from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.model.projection import Projection
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.model.projection import Projection
 
 
 @dataclass(frozen=True)

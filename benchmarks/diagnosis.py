@@ -32,10 +32,10 @@ from benchmarks.unseen import oracle_unseen_error, unseen_error  # noqa: E402
 from tests.virtual_paint_shop.cases import KINDS, PARCELS, Case, draw_case  # noqa: E402
 from tests.virtual_paint_shop.truths import library  # noqa: E402
 
-from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
 from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
 from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
+from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
+from paint_deposition.inference.diagnosis.verdict import Diagnosis  # noqa: E402
 
 FILMS = ROOT / 'runs' / 'bench-diagnosis'
 # Shares of the kinds of campaigns.

@@ -27,11 +27,11 @@ sys.path.insert(0, str(ROOT))
 # One for all of linear algebra: its matrices are small.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
-from paint_deposition.inference.diagnosis.run import Run  # noqa: E402
 from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
 from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
 from paint_deposition.files.campaign_file import read_campaign  # noqa: E402
+from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
+from paint_deposition.inference.diagnosis.run import Run  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
 

@@ -38,16 +38,21 @@ from tests.virtual_paint_shop.line import (  # noqa: E402
 )
 from tests.virtual_paint_shop.shop import Campaign as Job  # noqa: E402
 
-from paint_deposition.batch.cluster.finished import Finished  # noqa: E402
+from paint_deposition.batch.cases import ResultCache  # noqa: E402
+from paint_deposition.batch.line.changes import (  # noqa: E402
+    changes_of,
+    series_of,
+)
+from paint_deposition.batch.line.pooling import (  # noqa: E402
+    Measured,
+    measured_parts,
+    pooled,
+)
+from paint_deposition.batch.line.runs import line_cases  # noqa: E402
 from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
 from paint_deposition.files.gauge_readings import read_readings  # noqa: E402
 from paint_deposition.files.meshes import read_mesh  # noqa: E402
 from paint_deposition.files.motion_files import read_recording  # noqa: E402
-from paint_deposition.batch.line.causes import pooled  # noqa: E402
-from paint_deposition.batch.line.change_points import changes_of  # noqa: E402
-from paint_deposition.batch.line.job import line_cases  # noqa: E402
-from paint_deposition.batch.line.measured import Measured, measured_parts  # noqa: E402
-from paint_deposition.batch.line.series import series_of  # noqa: E402
 from paint_deposition.model.pattern import PlanarPattern  # noqa: E402
 from paint_deposition.model.projection import Projection  # noqa: E402
 from paint_deposition.motion.path_builder import spray_path  # noqa: E402
@@ -189,7 +194,7 @@ def main(count: int, length: int, redraws: int, seed: int) -> None:
         print(f'shared: {cause["members"]}, {cause["one_part"]:.1f} standard deviations in one '
               f'part, {cause["all_parts"]:.1f} in all')  # fmt: skip
     cases, *_ = line_cases(folder)
-    table = Finished(output / 'finished').table(case.digest for case in cases)
+    table = ResultCache(output / 'finished').table(case.digest for case in cases)
     parts = repeated(measured_parts(table.to_pydict()), length)
     step_at = 3 * length // 5
     hidden = replace(hidden, step_at=step_at)

@@ -31,7 +31,9 @@ from tests.virtual_paint_shop.gauge import GaugeNoise, measure  # noqa: E402
 from tests.virtual_paint_shop.jobs import record  # noqa: E402
 from tests.virtual_paint_shop.truths import choose as choose_truths  # noqa: E402
 
-from paint_deposition.api.geometry import look_at  # noqa: E402
+from paint_deposition.api.simulation import look_at  # noqa: E402
+from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
+from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
 from paint_deposition.inference.diagnosis.procedure import diagnose  # noqa: E402
 from paint_deposition.inference.diagnosis.reading_choice import (  # noqa: E402
     ChosenReadings,
@@ -40,15 +42,13 @@ from paint_deposition.inference.diagnosis.reading_choice import (  # noqa: E402
     usable_places,
 )
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart  # noqa: E402
-from paint_deposition.effects.catalogue import EFFECTS  # noqa: E402
-from paint_deposition.effects.deposition_model import DepositionModel  # noqa: E402
+from paint_deposition.inference.readings.campaign import Campaign, Experiment  # noqa: E402
+from paint_deposition.inference.readings.readings import Readings  # noqa: E402
 from paint_deposition.model.pattern import PlanarPattern  # noqa: E402
 from paint_deposition.model.projection import Projection  # noqa: E402
 from paint_deposition.motion.trajectory import Trajectory  # noqa: E402
 from paint_deposition.part.gauge_places import grid_places  # noqa: E402
 from paint_deposition.part.surface import Surface  # noqa: E402
-from paint_deposition.inference.readings.campaign import Campaign, Experiment  # noqa: E402
-from paint_deposition.inference.readings.readings import Readings  # noqa: E402
 
 WAYS = ('chosen', 'grid', 'random')
 # Effects that a door shows, of every family that tells of places.

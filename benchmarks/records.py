@@ -9,7 +9,7 @@ from pathlib import Path
 from distributed import as_completed
 from tqdm import tqdm
 
-from paint_deposition.batch.cluster.workers import workers
+from paint_deposition.batch.cluster import workers
 
 
 def kept(results: Path) -> list[dict]:

@@ -8,9 +8,9 @@ from benchmarks.campaigns import Draw, PaintedCase
 from scipy.linalg import cholesky, solve_triangular
 from scipy.stats import chi2
 
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.least_squares import covariance_factor, fit_readings
 from paint_deposition.inference.fitting.parameters import FreeParameters
 

@@ -45,7 +45,7 @@ def recommendation():
 
 
 def test_every_name_is_there():
-    assert set(dir(pd)) == {'__version__', *pd.public.DEFINED_IN}
+    assert {'simulate', 'Film', 'diagnose', 'write', '__version__'} < set(dir(pd))
     for name in dir(pd):
         assert getattr(pd, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'simulat'"):
@@ -60,10 +60,6 @@ def test_the_import_loads_nothing_else():
     )
     done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True)
     assert done.stdout == f'[] {pd.__version__}\n', done.stderr
-
-
-def test_samples_are_found():
-    assert pd.sample_folder().samefile(SAMPLES)
 
 
 def test_a_film_has_arrays_and_figures(film, panel):
@@ -95,12 +91,6 @@ def test_results_show_and_tell_themselves(name, request, tmp_path):
     told = json.loads(written.read_text())
     assert told.pop('provenance')['package_version'] == pd.__version__
     assert told == figures
-
-
-def test_inputs_show_themselves_shortly(film, campaign):
-    for thing in (film.surface, film.trajectory, film.readings, campaign):
-        assert repr(thing).startswith(f'{type(thing).__name__}(')
-        assert len(repr(thing)) < 200
 
 
 def test_what_is_no_result_is_refused(tmp_path):

@@ -1,21 +1,25 @@
 """The command `paint`, in this process as a rule and as a process where that is the point.
 
-Figures that a command prints as JSON are held against the schema of their kind every time.
+Figures that a command prints as JSON are held against `report/outputs.py` every time.
 """
 
 import io
-import json
 import subprocess
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
 
-import jsonschema
+import numpy as np
 import pytest
 
-import paint_deposition
+from booth import LOOKING_ALONG_Y
 from paint_deposition.cli.main import run
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.report.outputs import OUTPUTS
+from scenes import straight_pass
 
-SCHEMAS = Path(paint_deposition.__file__).parent / 'schemas'
+TRIGGER = ('--state-topic', '/atomizer/state')
+COARSE = ('--max-edge-length-m', 0.05)
+
 # The kind of JSON that each command prints.
 KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
@@ -25,28 +29,28 @@ KINDS = {
 }  # fmt: skip
 
 
-def schema(kind: str) -> dict:
-    """The schema of a kind of JSON."""
-    return json.loads((SCHEMAS / f'{kind}.json').read_text(encoding='utf-8'))
+def kind_of(words: list[str]) -> str:
+    """The kind of JSON that these arguments print."""
+    if words[0] == 'compare' and words.count('--model') > 1:
+        return 'side_by_side'
+    if words[0] == 'plan' and 'auto' in words:
+        return 'plan_of_faces'
+    if words[0] == 'inspect':
+        for kind, marks in {
+            'gun_on_part': ('--mesh',),
+            'driven_speed': ('--programmed',),
+            'program': ('.mod', '.prg'),
+            'pose_table': ('.csv', '.txt', '.tsv'),
+        }.items():
+            if any(word.endswith(marks) for word in words):
+                return kind
+    return KINDS[words[0]]
 
 
 def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.CompletedProcess:
     """The same, its JSON valid if it printed any."""
     if '--json' in words and done.returncode == 0:
-        kind = KINDS[words[0]]
-        if kind == 'comparison' and words.count('--model') > 1:
-            kind = 'side_by_side'
-        if words[:1] == ['plan'] and 'auto' in words:
-            kind = 'plan_of_faces'
-        if kind == 'recording' and any(word.endswith(('.mod', '.prg')) for word in words):
-            kind = 'program'
-        if kind == 'recording' and any(word.endswith(('.csv', '.txt', '.tsv')) for word in words):
-            kind = 'pose_table'
-        if words[0] == 'inspect' and '--mesh' in words:
-            kind = 'gun_on_part'
-        if words[0] == 'inspect' and '--programmed' in words:
-            kind = 'driven_speed'
-        jsonschema.validate(json.loads(done.stdout), schema(kind))
+        OUTPUTS[kind_of(words)].model_validate_json(done.stdout)
     return done
 
 
@@ -81,3 +85,14 @@ def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:
     assert lines[0].startswith('paint: ')
     for word in words:
         assert word in lines[0], lines[0]
+
+
+def level_pass(**changes) -> Trajectory:
+    """One pass of 3 s over the panel, 0.25 m before it."""
+    line = (np.arange(0.0, 3.0, 0.02), (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y)
+    return straight_pass(*line, **changes)
+
+
+def film_in(folder: Path) -> np.ndarray:
+    """The film of a folder of results [um]."""
+    return np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)['thickness_um']

@@ -2,16 +2,13 @@
 
 import json
 
-import numpy as np
 import pytest
-import trimesh
 
-from booth import LOOKING_ALONG_Y
 from brushes import switched
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, level_pass, paint
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.recordings.bags import write_pose_bag
-from scenes import stamps_ns, straight_pass
+from scenes import stamps_ns
 
 MODEL = """
 brushes:
@@ -30,20 +27,10 @@ def model(tmp_path):
     return path
 
 
-@pytest.fixture
-def panel(tmp_path):
-    corners = [[-0.6, 0, -0.4], [0.6, 0, -0.4], [0.6, 0, 0.4], [-0.6, 0, 0.4]]
-    path = tmp_path / 'panel.stl'
-    trimesh.Trimesh(corners, [[0, 1, 2], [0, 2, 3]], process=False).export(path)
-    return path
-
-
 def bag(tmp_path, *changes):
     """A pass before the panel along which these (time [s], flow, brush) are set."""
-    motion = straight_pass(
-        np.arange(0.0, 3.0, 0.02), (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y,
-        **switched(stamps_ns([time_s for time_s, *_ in changes]), *(gun for _, *gun in changes)),
-    )  # fmt: skip
+    stamps = stamps_ns([time_s for time_s, *_ in changes])
+    motion = level_pass(**switched(stamps, *(gun for _, *gun in changes)))
     return write_pose_bag(tmp_path / 'run', motion)
 
 
@@ -100,26 +87,19 @@ def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('given', 'words'),
+    ('speed_rpm', 'brush', 'words'),
     [
-        ((), 'an index is for one brush and the model has 1, 2, 3: say which (brush)'),
-        (('--brush', 8), 'brush 8 is not in the model; its brushes: 1, 2, 3'),
+        (40000, (), 'an index is for one brush and the model has 1, 2, 3: say which (brush)'),
+        (40000, ('--brush', 8), 'brush 8 is not in the model; its brushes: 1, 2, 3'),
+        (55000, ('--brush', 3), 'bell_speed_rpm is 55000, outside 30000 to 50000 of the'),
+        (
+            None,
+            ('--brush', 2),
+            'brush 2 is not in the model: it has one pattern, planar, without a',
+        ),
     ],
 )
-def test_an_index_is_for_one_brush(model, tmp_path, given, words):
-    done = paint('recommend', '--model', model, '--speed', 0.3, *given, '-o', tmp_path / 'index')
-    assert_refused(done, words)
-
-
-def test_one_pattern_has_no_number(tmp_path):
-    done = paint('recommend', '--brush', 2, '--speed', 0.3, '-o', tmp_path / 'index')
-    assert_refused(done, 'brush 2 is not in the model: it has one pattern, planar, without a')
-
-
-def test_a_brush_outside_the_calibrated_range_is_refused(model, tmp_path):
-    model.write_text(MODEL.replace('bell_speed_rpm: 40000', 'bell_speed_rpm: 55000'))
-    done = paint('recommend', '--model', model, '--brush', 3, '--speed', 0.3, '-o', tmp_path / 'x')
-    assert_refused(
-        done, f'{model}: brushes, 3: bell_speed_rpm is 55000, outside 30000 to 50000 of the',
-        'calibrate a brush there',
-    )  # fmt: skip
+def test_an_index_is_for_one_brush_of_the_model(model, tmp_path, speed_rpm, brush, words):
+    model.write_text(MODEL.replace('40000', str(speed_rpm)) if speed_rpm else 'effects: []\n')
+    given = ('recommend', '--model', model, '--speed', 0.3, *brush)
+    assert_refused(paint(*given, '-o', tmp_path / 'index'), words)

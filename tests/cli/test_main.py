@@ -58,13 +58,6 @@ def test_a_command_that_is_none_is_refused_with_the_nearest():
     assert_refused(paint('xyz'), 'there are: simulate, ')
 
 
-def test_wrong_options_are_refused_in_a_line():
-    assert_refused(paint('simulate'), "Missing option '--mesh'")
-    assert_refused(paint('simulate', '--mesh-scale', 'big'), '--mesh-scale', 'big')
-    assert_refused(paint('--mesh', 'door.stl'), '--mesh')
-
-
-@pytest.mark.slow
 @pytest.mark.slow
 def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
     pipe = tmp_path / 'readings.csv'

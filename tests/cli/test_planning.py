@@ -5,6 +5,7 @@ import json
 import numpy as np
 import pytest
 import trimesh
+from paint_deposition.planning.index_request import Request
 from PIL import Image
 
 from booth import SAMPLES
@@ -15,7 +16,6 @@ from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.recommendation import recommend
 
 STUDY = SAMPLES / 'panel_study'

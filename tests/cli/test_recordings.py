@@ -4,7 +4,8 @@ import json
 
 import pytest
 
-from cli.command import assert_refused, installed_paint, paint
+from booth import SAMPLES
+from cli.command import assert_refused, paint
 from files.recorded import straight_pass
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 
@@ -28,29 +29,12 @@ def test_inspect_a_real_bag(shared_data):
     assert '95 gaps, longest interval 2.041 s' in line
 
 
-@pytest.mark.slow
-def test_inspect_as_json(tmp_path):
-    written = straight_pass(300)
-    folder = write_pose_bag(tmp_path / 'pass', written)
-    done = installed_paint('inspect', folder, '--json', '--max-pose-gap-s', '0.02')
-    figures = json.loads(done.stdout)
-    (stream,) = figures['pose_streams']
-    assert (stream['topic'], stream['poses'], stream['frame_id']) == (
-        '/atomizer/pose',
-        300,
-        'door',
-    )
-    assert stream['gaps'] == sum(written.stamps_ns[1:] - written.stamps_ns[:-1] > 20_000_000)
-    assert figures['triggers'] == ['/atomizer/state']
-
-
-def test_inspect_an_unfinished_run(cut_run):
+def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     done = paint('inspect', cut_run)
     assert_refused(done)
     assert done.stderr.endswith(f'run: paint recover {cut_run}\n')
-
-
-def test_recover_does_what_inspect_says(cut_run, tmp_path):
+    figures = json.loads(paint('recover', cut_run, '-o', tmp_path / 'whole', '--json').stdout)
+    assert figures['messages'] == sum(figures['topics'].values()) > 2_000
     done = paint('recover', cut_run)
     assert done.returncode == 0
     assert done.stderr == ''
@@ -60,21 +44,6 @@ def test_recover_does_what_inspect_says(cut_run, tmp_path):
     assert len(read_trajectory(tmp_path / 'run_recovered')) > 2_000
     again = paint('recover', cut_run)
     assert_refused(again, 'run_recovered already exists; choose another name')
-
-
-@pytest.mark.slow
-def test_recover_as_json(cut_run, tmp_path):
-    done = installed_paint('recover', cut_run / 'run_0.mcap', '-o', tmp_path / 'whole', '--json')
-    figures = json.loads(done.stdout)
-    assert figures['folder'] == str(tmp_path / 'whole')
-    assert figures['messages'] == sum(figures['topics'].values()) > 2_000
-    assert figures['damaged_chunks'] == 0
-
-
-@pytest.mark.parametrize('value', ['nan', 'inf', '0'])
-def test_a_gap_that_is_no_time_is_refused(tmp_path, value):
-    folder = write_pose_bag(tmp_path / 'run', straight_pass(100))
-    assert_refused(paint('inspect', folder, '--max-pose-gap-s', value), '--max-pose-gap-s', value)
 
 
 def test_a_gap_longer_than_clocks_count_is_none(tmp_path):
@@ -106,3 +75,36 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):
     done = paint('inspect', shared_data / 'bags' / 'evo_nav2_turtlebot.mcap')
     assert 'transforms: --tf TARGET SOURCE takes the motion from them' in done.stdout
+
+
+def test_inspect_a_real_program(shared_data):
+    module = shared_data / 'rapid/ECL_Grey_T_ROB1.mod'
+    head, _, *moves, note = paint('inspect', module).stdout.splitlines()
+    assert head.startswith('module grey_t_rob1: 10 moves at 0.1 m/s, tool defaultghtool')
+    assert moves[0].split()[:3] == ['14', 'movej', '0.6139']
+    assert len(moves) == 10
+    assert note == 'note: line 13: moveabsj skipped: joint angles need the robot'
+    content = json.loads(paint('inspect', module, '--json').stdout)
+    assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]
+
+
+def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
+    module = tmp_path / 'passes.mod'
+    module.write_text('')
+    given = ('--mesh', SAMPLES / 'door.stl', '-o', tmp_path / 'out', '--trajectory')
+    done = paint('simulate', *given, module, '--state-topic', '/atomizer/state')
+    assert_refused(done, '--state-topic is for bags', 'is a RAPID module; leave it out')
+    for command in (('inspect',), ('simulate', *given)):
+        done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
+        assert_refused(done, '--gun-signal is for RAPID modules')
+
+
+def test_runs_that_cannot_be_listed_are_named(tmp_path):
+    (tmp_path / '4711').mkdir()
+    assert_refused(paint('runs', tmp_path), f'{tmp_path} holds no run', 'change_part')
+    assert_refused(paint('runs', tmp_path / 'none'), 'none is no folder; give the output_dir')
+    (tmp_path / '4711/4711_0.mcap').write_bytes(b'')
+    (row,) = paint('runs', tmp_path).stdout.splitlines()[1:]
+    assert row.split() == ['4711', '-', '1', *'----------', 'unfinished']
+    (tmp_path / '4711/film.json').write_text('{"part": 3}')
+    assert_refused(paint('runs', tmp_path), '4711: film.json or metadata.yaml cannot be')

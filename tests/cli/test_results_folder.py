@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from cli.command import assert_refused, paint
+from cli.command import paint
 from paint_deposition.cli.results_folder import MARKER, results_in
 from paint_deposition.errors import PaintError
 
@@ -72,12 +72,6 @@ def test_a_marker_names_nothing_outside_its_folder(tmp_path):
     assert (tmp_path / 'mine.txt').exists()
 
 
-def test_a_new_folder_has_the_access_rights_of_any_other(tmp_path):
-    write(tmp_path / 'out', 'film.csv')
-    (tmp_path / 'usual').mkdir()
-    assert (tmp_path / 'out').stat().st_mode == (tmp_path / 'usual').stat().st_mode
-
-
 def test_two_commands_into_one_folder_do_not_mix(tmp_path):
     write(tmp_path / 'out', 'film.csv', 'film.png')
     done = paint(*RECOMMEND, '-o', tmp_path / 'out')
@@ -92,9 +86,3 @@ def test_the_working_directory_may_be_the_folder(tmp_path):
         assert paint(*RECOMMEND, cwd=tmp_path).returncode == 0
     assert names_in(tmp_path) == ['recommendation.json', 'uniformity.png']
     assert os.stat(tmp_path).st_ino == inode
-
-
-def test_a_tolerance_in_percent_is_refused_with_the_share(tmp_path):
-    done = paint(*RECOMMEND, '--tolerance', 5, '-o', tmp_path / 'out')
-    assert_refused(done, 'tolerance is 5, which is 500 %', '0.05 for 5 %')
-    assert not (tmp_path / 'out').exists()

@@ -1,14 +1,13 @@
 """`paint simulate` over real files, as a user runs it."""
 
 import json
-import shutil
 
 import numpy as np
 import pytest
 import trimesh
 
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, installed_paint, paint
+from cli.command import COARSE, TRIGGER, assert_refused, installed_paint, level_pass, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -19,25 +18,9 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
-from scenes import straight_pass
 
 DOOR, DOOR_BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
-TRIGGER = ('--state-topic', '/atomizer/state')
-COARSE = ('--max-edge-length-m', 0.05)
 FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
-
-
-def level_pass(**changes) -> Trajectory:
-    """One pass over the panel."""
-    times = np.arange(0.0, 3.0, 0.02)
-    return straight_pass(
-        times, (-0.5, -0.25, 0.05), (0.5, -0.25, -0.05), LOOKING_ALONG_Y, **changes
-    )
-
-
-@pytest.fixture(scope='module')
-def one_pass(tmp_path_factory):
-    return write_pose_bag(tmp_path_factory.mktemp('bags') / 'one_pass', level_pass())
 
 
 @pytest.fixture(scope='module')
@@ -139,42 +122,6 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel, one_pass,
     assert results[1][1] == results[0][1]
 
 
-def test_a_learned_law_changes_the_film_and_an_unknown_one_is_told_the_nearest(
-    panel, one_pass, tmp_path
-):
-    law = 'effects: [{id: learned, covariate: COVARIATE, high: 99.0, learned: [0.25, 0.25]}]'
-    films = []
-    for model in ('effects: []', law.replace('COVARIATE', 'time_s')):
-        (tmp_path / 'model.yaml').write_text(model)
-        out = tmp_path / f'out{len(films)}'
-        done = paint(
-            'simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE,
-            '--model', tmp_path / 'model.yaml', '-o', out,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        films.append(np.genfromtxt(out / 'film.csv', delimiter=',', names=True)['thickness_um'])
-    assert np.allclose(films[1], 1.25 * films[0], atol=2e-3)
-    (tmp_path / 'model.yaml').write_text(law.replace('COVARIATE', 'tim_s'))
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
-        '-o', tmp_path / 'refused',
-    )  # fmt: skip
-    assert_refused(done, "'tim_s'; did you mean 'time_s'?")
-
-
-def test_older_results_are_replaced_whole(panel, one_pass, tmp_path):
-    out = tmp_path / 'out'
-    out.mkdir()
-    (out / 'film.csv').write_text('older')
-    (out / 'notes.txt').write_text('mine')
-    done = paint('simulate', '--mesh', panel, '--trajectory', one_pass, *COARSE, '-o', out)
-    assert done.returncode == 0
-    assert sorted(file.name for file in out.iterdir()) == sorted([*FILES, 'notes.txt'])
-    assert (out / 'film.csv').read_text().startswith('x_m,y_m,z_m,thickness_um\n')
-    assert 'film' in done.stdout
-    assert str(out / 'film.png') in done.stdout
-
-
 def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_path):
     big = trimesh.load_mesh(panel, process=False)
     big.apply_scale(1000.0)
@@ -184,25 +131,6 @@ def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_p
     assert not (tmp_path / 'out').exists()
     scaled = paint(*arguments, '--mesh-scale', 0.001, '--json', '-o', tmp_path / 'out')
     assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
-
-
-@pytest.mark.slow
-def test_a_mesh_sprayed_from_behind_is_turned_with_a_note(panel, one_pass, tmp_path):
-    inside_out = trimesh.load_mesh(panel, process=False)
-    inside_out.invert()
-    inside_out.export(tmp_path / 'inside_out.stl')
-    films = []
-    for number, mesh in enumerate((panel, tmp_path / 'inside_out.stl')):
-        done = paint(
-            'simulate', '--mesh', mesh, '--trajectory', one_pass, *COARSE, '--json',
-            '-o', tmp_path / str(number),
-        )  # fmt: skip
-        assert done.returncode == 0
-        films.append((json.loads(done.stdout)['painted_volume_cm3'], done.stderr))
-    assert films[1][0] == pytest.approx(films[0][0], rel=1e-6)
-    assert films[0][1] == ''
-    assert 'note: ' in films[1][1]
-    assert 'turned round' in films[1][1]
 
 
 def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
@@ -231,14 +159,6 @@ def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
     assert_refused(done, '/robot/tcp', '/atomizer/pose')
     done = refused(tmp_path, *inputs, '--state-topic', '/gun')
     assert_refused(done, '/gun', '/atomizer/state')
-
-
-def test_a_misspelt_key_is_refused_with_the_nearest(panel, one_pass, tmp_path):
-    (tmp_path / 'model.yaml').write_text('planar: {K1_cm3_per_s: 1.9, sigma_1_m: 0.09}\n')
-    done = refused(
-        tmp_path, '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml'
-    )
-    assert_refused(done, 'model.yaml', 'sigma_1_m', 'sigma1_m')
 
 
 def test_poses_without_numbers_are_refused(panel, tmp_path):
@@ -272,14 +192,6 @@ def test_some_bad_poses_are_dropped_and_counted(panel, one_pass, tmp_path):
     assert films[1]['mean_um'] == films[0]['mean_um']
 
 
-def test_a_truncated_bag_is_refused_with_the_remedy(panel, tmp_path):
-    bag = shutil.copytree(DOOR_BAG, tmp_path / 'cut')
-    file = next(bag.glob('*.mcap'))
-    file.write_bytes(file.read_bytes()[:-5000])
-    done = refused(tmp_path, '--mesh', panel, '--trajectory', bag)
-    assert_refused(done, str(bag), 'paint recover')
-
-
 @pytest.mark.parametrize(
     ('option', 'value', 'words'),
     [
@@ -287,14 +199,10 @@ def test_a_truncated_bag_is_refused_with_the_remedy(panel, tmp_path):
         ('--mesh', __file__, ['.py', '.stl']),
         ('--trajectory', 'nowhere', ['no bag at nowhere']),
         ('--model', 'nowhere.yaml', ['nowhere.yaml', 'no such file']),
-        ('--at', 'nowhere.csv', ['nowhere.csv', 'no such file']),
         ('--mesh-scale', '-1', ['--mesh-scale', '-1']),
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
         ('--tolerance-um', '3', ['--target-um']),
         ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
-        ('--down', ('nan', '0', '-1'), ['--down', 'nan is not finite']),
-        ('--max-pose-gap-s', 'nan', ['--max-pose-gap-s', 'nan is not finite']),
-        ('--max-pose-gap-s', 'inf', ['--max-pose-gap-s', 'inf is not finite']),
         ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],
 )

@@ -56,7 +56,7 @@ def test_speeds_are_told_by_pass_and_drawn(run, tmp_path):
 def test_what_does_not_go_together_is_refused(run, tmp_path):
     recorded, module = run
     done = paint('inspect', recorded, '--programmed', module, '--mesh', module)
-    assert_refused(done, '--programmed goes without --mesh')
+    assert_refused(done, '--programmed cannot be combined with --mesh')
     away = (*STATES, '--part-pose', 0, 1, 0, 0, 0, 0, 1)
     done = paint('inspect', recorded, '--programmed', module, *away)
     assert done.returncode == 2

@@ -20,9 +20,9 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.brush import Brush
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from scenes import lying_plane, stamps_ns, weaving
 
 SET_POINTS = {1: (70.0, 200.0), 2: (50.0, 320.0)}

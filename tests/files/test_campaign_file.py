@@ -82,30 +82,27 @@ def test_part_batch_and_target_are_taken_over(campaign):
 
 def test_a_trigger_that_is_not_named_is_noted(campaign):
     """Without it the gun would spray on the way between passes, which changes every answer."""
-    told = []
-    read_campaign(campaign(), told.append)
-    (note,) = (line for line in told if 'state_topic' in line)
-    assert note.startswith('door: recording ')
+    said = []
+    read_campaign(campaign(), remark=lambda *line: said.append(line))
+    (note,) = (line for kind, _, line in said if kind == 'note' and 'state_topic' in line)
+    assert note.startswith('recording ')
     assert '/atomizer/state (std_msgs/msg/Bool) is not used' in note
     assert 'add `state_topic: /atomizer/state`' in note
-    told.clear()
-    read_campaign(campaign(state_topic='atomizer/state'), told.append)
-    assert told == ['reading door']
+    said.clear()
+    read_campaign(campaign(state_topic='atomizer/state'), remark=lambda *line: said.append(line))
+    assert not said
 
 
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
         ({'mesh': ...}, "experiment 1 has no 'mesh'; give the name of a mesh file"),
-        ({'mesh': 5}, 'experiment 1: mesh is 5; expected the name of a mesh file'),
         ({'mesh': 'gate.stl'}, r"experiment 'door': .*gate\.stl: no such mesh file"),
         ({'trajectory': 'nowhere'}, "experiment 'door': .*nowhere"),
         ({'measurements': 'none.csv'}, "experiment 'door': .*none.csv: no such file"),
         ({'pose_topic': '/pose'}, "experiment 'door': .*/atomizer/pose"),
         ({'measurement': 'door.csv'}, "unknown key 'measurement'; did you mean 'measurements'"),
-        ({'flux': 1}, "experiment 1: unknown key 'flux'; there are: mesh, traj"),
         ({'mesh_scale': 0}, 'mesh_scale is 0; expected a number above 0: metres per unit'),
-        ({'mesh_scale': True}, 'mesh_scale is True; expected a number above 0'),
         (
             {'mesh_scale': 1000.0},
             "experiment 'door': .*millimetres; use .* mesh_scale: 0.001 in a campaign",
@@ -118,21 +115,16 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
             {'columns': {'thick': 'DFT'}},
             "columns.thick is 'thick'; expected the heading.* x, y, z",
         ),
-        ({'columns': 'DFT'}, "columns is 'DFT'; expected the heading"),
         ({'columns': {'thickness': 'DFT'}}, r"door\.csv: no column 'DFT' for thickness"),
         ({'unit': {'thickness': 'inches'}}, "thickness is 'inches'; expected position: m, mm"),
-        ({'decimal': ';'}, "decimal is ';'; expected 'comma' or 'point'"),
         ({'points': 'none.csv'}, r'none\.csv: no such file'),
         ({'sheet': 'Messung'}, "there is no sheet 'Messung'"),
         ({'switched_off': ['light']}, r"switched_off.0 is 'light'; expected"),
         ({'top': {'models': 'm.yaml'}}, "campaign: unknown key 'models'; .* 'model'"),
-        ({'top': {'model': 3}}, 'campaign: model is 3; expected the name of a model file'),
         ({'top': {'experiments': []}}, r'experiments is \[\]; expected a list of at least one'),
         ({'top': {'experiments': {'name': 'door'}}}, 'experiments is .*; expected a list of at'),
-        ({'top': {'bach': 'A'}}, "campaign: unknown key 'bach'; did you mean 'batch'"),
         ({'top': {'target_um': 20}}, 'target_um and tolerance_um belong together'),
         ({'top': {'target_um': -1, 'tolerance_um': 1}}, 'target_um is -1; expected the film want'),
-        ({'experiments': ['door']}, "experiment 1 is 'door'; expected the keys mesh, trajectory"),
     ],
 )
 def test_a_fault_is_told_in_one_line(campaign, changes, message):
@@ -183,15 +175,6 @@ def test_readings_in_millimetres_are_refused_with_the_remedy(campaign, folder):
     )
     as_before = read_campaign(campaign()).experiments[0].readings
     assert read.experiments[0].readings.positions_m == pytest.approx(as_before.positions_m)
-
-
-def test_readings_in_another_frame_are_refused_with_both_boxes(campaign, folder):
-    def moved(row):
-        return [str(3.0 + float(v)) if k in ('x_m', 'y_m') else v for k, v in row.items()]
-
-    path = campaign(measurements=changed_readings(folder, moved))
-    with pytest.raises(PaintError, match=r'readings span 2\.\d+ to .* the part -.* another frame'):
-        read_campaign(path)
 
 
 def test_readings_a_few_mm_off_are_moved_and_it_is_said(campaign, folder):

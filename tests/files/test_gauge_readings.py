@@ -39,15 +39,6 @@ def test_every_column_arrives_where_it_belongs(table):
     assert readings.source == str(path)
 
 
-def test_a_table_from_a_spreadsheet_is_read(tmp_path):
-    """Byte order mark, Windows line ends, blanks, empty and commented lines."""
-    path = tmp_path / 'sheet.csv'
-    path.write_bytes(b'\xef\xbb\xbfx_m, y_m ,z_m,thickness_um\r\n\r\n# door 7\r\n0,0, 1 ,20\r\n')
-    readings = read_readings(path)
-    assert readings.positions_m.tolist() == [[0.0, 0.0, 1.0]]
-    assert readings.normals is None
-
-
 def test_points_without_a_label_are_points_of_their_own(table):
     readings = read_readings(table(f'{HEADER},point', '0,0,0,20,', '0,0,0.01,21,', '1,0,0,9,A'))
     assert len(set(readings.point)) == 3
@@ -65,29 +56,24 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
     [
         (
             ['x_m,y_m,thickness_um', '0,0,20'],
-            r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); the readings need x, y and z",
+            r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
         (['x_ft,y_m,z_m,thickness_um', '0,0,0,20'], 'no column with numbers is known as x'),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column with numbers is known as the thick'),
         (['x,y,z,base_um,clear_um', '0,0,0,1,2'], "may be in 'base_um', 'clear_um'; name one"),
         (['point,thickness_um', 'A,20'], 'no coordinates .* a list of measuring points'),
-        ([HEADER], 'no column with numbers is known as the thickness|no readings below'),
         ([], 'there is nothing to read in it'),
         ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),
         ([HEADER, '0,0,0,20', '', '0,0,1,20,5'], 'line 4: 5 values under 4 column names'),
         ([HEADER, '# one', '0,0,0,20 V'], "line 3: thickness_um is '20 V'; expected a number"),
         ([HEADER, '0,0,0,'], 'no readings below the header'),
-        ([HEADER, '0,,0,20'], "line 2: y_m is ''; expected a number with a point"),
-        ([HEADER, '0,0 um,0,20'], "line 2: y_m is '0 um'; expected a number with a point"),
-        ([HEADER, '0,1_0,0,20'], "line 2: y_m is '1_0'; expected a number with a point"),
+        ([HEADER, '0,,0,20'], "line 2: y_m is ''; expected a number with a decimal point"),
+        ([HEADER, '0,0 um,0,20'], "line 2: y_m is '0 um'; expected a number with a decimal point"),
         ([HEADER, '0,nan,0,20'], 'line 2: y_m is nan; expected a finite number'),
-        ([HEADER, '0,0,-inf,20'], 'line 2: z_m is -inf; expected a finite number'),
         ([HEADER, '0,0,0,-9'], 'line 2: thickness_um is -9; expected -5 to 5000 micrometres'),
-        ([HEADER, '0,0,0,2e4'], 'line 2: thickness_um is 20000; expected -5 to 5000'),
         ([f'{HEADER},x_m', '0,0,0,20,0'], "two columns are called 'x_m'"),
         ([f'{HEADER},sigma_um', '0,0,0,20,0'], 'line 2: sigma_um is 0; expected above 0'),
-        ([f'{HEADER},sigma_um', '0,0,0,20,few'], "line 2: sigma_um is 'few'"),
         ([f'{HEADER},nx,ny', '0,0,0,20,0,1'], 'has nx, ny only; give all of nx,ny,nz or none'),
         ([f'{HEADER},nx,ny,nz', '0,0,0,20,0,0,0'], 'line 2: the normal nx,ny,nz has length zero'),
         (
@@ -115,7 +101,7 @@ def test_all_faults_of_a_file_are_told_at_once(table):
 
 
 def test_a_file_that_is_no_table_is_refused(tmp_path):
-    with pytest.raises(ReadingsError, match='no such file; give gauge readings as CSV'):
+    with pytest.raises(ReadingsError, match='no such file; give a table as CSV'):
         read_readings(tmp_path / 'none.csv')
     (tmp_path / 'bytes.csv').write_bytes(b'x_m,\xff\xfe\x00')
     with pytest.raises(ReadingsError, match='cannot be read as text'):
@@ -129,7 +115,7 @@ def test_a_file_that_is_no_table_is_refused(tmp_path):
 
 def test_predictions_keep_the_readings_own_columns(table, tmp_path):
     path = table(f'{HEADER},remark,predicted_um', '0,0,1,20,"thin, I think",7', '0,0,2,21,,8')
-    write_predictions(tmp_path / 'out.csv', path, [20.5, 21.25])
+    write_predictions(tmp_path / 'out.csv', read_readings(path), [20.5, 21.25])
     assert (tmp_path / 'out.csv').read_text().splitlines() == [
         f'{HEADER},remark,predicted_um',
         '0,0,1,20,"thin, I think",20.5000',

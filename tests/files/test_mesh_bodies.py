@@ -81,14 +81,6 @@ def test_3mf_is_read_in_its_own_unit(tmp_path, unit, per_metre):
     assert '2 bodies' in surface.notes[1]
 
 
-def test_a_unit_that_is_wrong_is_scaled_on_top(tmp_path):
-    two_bodies(1000.0).export(tmp_path / 'car.glb')
-    with pytest.raises(MeshError, match='looks like millimetres; use --mesh-scale'):
-        read_mesh(tmp_path / 'car.glb')
-    surface = read_mesh(tmp_path / 'car.glb', 0.001, 0.2)
-    assert surface.area_m2 == pytest.approx(area_m2(DOOR_M, FLANGE_M))
-
-
 def test_objects_of_an_obj_and_solids_of_a_text_stl_have_names(tmp_path):
     (tmp_path / 'part.obj').write_text(
         'o left\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nf 1 2 3 4\no right\nv 2 0 0\nv 2 0 1\n'

@@ -15,8 +15,8 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints
 from paint_deposition.model.brush_law import BrushLaw
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import lying_plane, stamps_ns, weaving
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brushes import NARROW, WIDE, switched, two_brushes
-from paint_deposition.api.geometry import require_brushes
+from paint_deposition.api.simulation import require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
@@ -16,8 +16,8 @@ from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 

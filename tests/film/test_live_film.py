@@ -10,8 +10,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import START_NS, lying_plane, stamps_ns, straight_pass, weaving
 

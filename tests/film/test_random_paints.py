@@ -16,8 +16,8 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from scenes import LOOKING_DOWN, stamps_ns

@@ -1,7 +1,7 @@
 """Feeds changed files to one reader, guided by the code that they reach.
 
-A finding is any exception but a PaintError of one line, an allocation that the limit of memory
-stopped, a hang, or a crash of the process. Findings are kept as files with their tracebacks.
+A finding is any exception but a PaintError of one line, a hang, or a crash of the process.
+Findings are kept as files with their tracebacks.
 """
 
 from __future__ import annotations
@@ -84,8 +84,6 @@ class Reader:
         except PaintError as error:
             if '\n' in str(error) or not str(error).strip():
                 self._keep('not_one_line', error)
-            elif _out_of_memory(error):
-                self._keep('memory', error)
         except (Exception, SystemExit) as error:
             self._keep(type(error).__name__, error)
 
@@ -99,15 +97,6 @@ class Reader:
         if not found.exists():
             found.write_bytes(self._path.read_bytes())
             found.with_suffix('.txt').write_text(''.join(traceback.format_exception(error)))
-
-
-def _out_of_memory(error: BaseException | None) -> bool:
-    """Whether a refusal is only the last word on an allocation that failed."""
-    while error is not None:
-        if isinstance(error, MemoryError):
-            return True
-        error = error.__cause__ or error.__context__
-    return False
 
 
 def _escaped(word: str) -> str:

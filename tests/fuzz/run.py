@@ -1,9 +1,7 @@
 """Fuzzes the readers one after the other: `make fuzz`, `make fuzz ARGS='--seconds 600 rapid ply'`.
 
-Corpus, findings and counts stay in `runs/fuzz`, so that every run goes on where the last one
-ended. A count is of inputs that were made by change: the corpus, which each process reads again
-first, is none of them. Ends with 1 where something was found. Atheris, the fuzzer, is there for
-Linux on x86-64 only.
+Corpus and findings stay in `runs/fuzz`, so that every run begins where the last one ended. Ends
+with 1 where something was found. Atheris, the fuzzer, is there for Linux on x86-64 only.
 """
 
 from __future__ import annotations
@@ -11,7 +9,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import io
-import json
 import os
 import re
 import sys
@@ -46,20 +43,13 @@ def main(names: tuple[str, ...], seconds: float, inputs: int, seed: int, place: 
         known = ' '.join(readers)
         raise click.ClickException(f'no reader {" ".join(unknown)}; there are: {known}')
     place.mkdir(parents=True, exist_ok=True)
-    counts_file = place / 'counts.json'
-    counts = json.loads(counts_file.read_text()) if counts_file.exists() else {}
-    before, found = sum(counts.values()), 0
+    found = 0
     for name in names or readers:
         count = _fuzz_in_processes(name, place, seconds, inputs, seed)
-        counts[name] = counts.get(name, 0) + count
-        counts_file.write_text(json.dumps(counts, indent=2))
         findings = sorted((place / 'findings' / name).glob('*[!t]'))
-        print(f'{name}: {count} inputs, {len(findings)} findings', flush=True)
-        for path in findings:
-            print(f'  {path}', flush=True)
+        lines = [f'{name}: {count} inputs, {len(findings)} findings', *map(str, findings)]
+        print('\n  '.join(lines), flush=True)
         found += len(findings)
-    total = sum(counts.values())
-    print(f'total: {total - before} inputs, {found} findings; {total} inputs since {place} began')
     sys.exit(1 if found else 0)
 
 
@@ -73,11 +63,11 @@ def _fuzz_in_processes(name: str, place: Path, seconds: float, inputs: int, seed
         if not process:
             _fuzz_here(name, place, log, [*limits, f'-seed={seed}'])
         _, status = os.waitpid(process, 0)
-        told = log.read_text(errors='replace')
-        numbers = [int(unit or mark) for unit, mark in READ.findall(told)]
+        text = log.read_text(errors='replace')
+        numbers = [int(unit or mark) for unit, mark in READ.findall(text)]
         if not numbers:
             raise click.ClickException(f'{name} does not start; see {log}')
-        of_corpus = OF_CORPUS.search(told)
+        of_corpus = OF_CORPUS.search(text)
         read += max(numbers)
         known += int(of_corpus[1]) if of_corpus else max(numbers)
         if not status:

@@ -12,31 +12,25 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow as pa
-import pytest
 import trimesh
 from mcap.writer import CompressionType, Writer
 
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from fuzz.seeds import CAMPAIGN, MODEL, POSES, RAPID, READINGS
-from paint_deposition.api.samples import sample_folder
-from paint_deposition.files import surface_cache
 from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.files.measuring_points import MeasuringPoints
+from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.parquet import write_parquet
-from paint_deposition.files.planned_model import planned_model
-from paint_deposition.files.pose_tables.points import read_points
 from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import urdf
-from workbook import open_document, open_row, write_workbook
+from workbook import write_workbook
 
 # Fine enough for a small part, and no work worth speaking of for the largest that is taken.
 EDGE_M = 5.0
@@ -163,36 +157,6 @@ def _recovered(path: Path) -> object:
         return recover(path, Path(folder) / 'recovered')
 
 
-def _sqlite_run() -> dict[str, bytes]:
-    """Its files by name."""
-    folder = Path(tempfile.mkdtemp())
-    try:
-        run = write_bag(folder / 'run', _entries(), 'sqlite3')
-        return {file.name: file.read_bytes() for file in run.iterdir()}
-    finally:
-        shutil.rmtree(folder)
-
-
-def _in_run(part: str) -> Callable[[Path], object]:
-    """Read a rosbag2 folder of which one file is under test."""
-    files: dict[str, bytes] = {}
-
-    def read(path: Path) -> object:
-        files.update(files or _sqlite_run())
-        with tempfile.TemporaryDirectory(dir=path.parent) as place:
-            folder = Path(place)
-            for name, content in files.items():
-                (folder / name).write_bytes(path.read_bytes() if part in name else content)
-            planned_model(folder)
-            return _summary(folder)
-
-    return read
-
-
-def _of_run(part: str) -> Callable[[], list[bytes]]:
-    return lambda: [content for name, content in _sqlite_run().items() if part in name]
-
-
 def _pose_summary(path: Path) -> object:
     summarise(path, 0.25)
     return read_recording(path, pose_topic='/atomizer/pose')
@@ -223,24 +187,6 @@ def _parquet() -> bytes:
     return _written(lambda path: write_parquet(path, table), 'readings.parquet')
 
 
-def _open_book() -> bytes:
-    rows = (('x_m', 'y_m', 'z_m', 'thickness_um'), (0.1, 0.0, 0.2, 24.5), (0.2, 0.0, 0.2, 'n/a'))
-    return open_document(''.join(open_row(*row, empty=16_380) for row in rows))
-
-
-def _open_sheet() -> bytes:
-    with zipfile.ZipFile(BytesIO(_open_book())) as package:
-        return package.read('content.xml')
-
-
-def _kept_part() -> list[bytes]:
-    """A prepared part as it is kept on disk, though a small one."""
-    part = read_mesh(sample_folder() / 'panel.stl', max_edge_length_m=0.2)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(surface_cache, 'LEAST_VERTICES', 0)
-        return [_written(lambda path: surface_cache.keep(path, part), 'part.npz')]
-
-
 def _table(read: Callable[[Path], object], *seeds: bytes) -> Target:
     words = ('x_mm', 'thickness_um', 'mils', '[mm]', ';', '\t', '"', '1e308', 'nan', '-', ',,')
     return Target('.csv', read, lambda: [*seeds], words)
@@ -269,12 +215,6 @@ def targets() -> dict[str, Target]:
             ('<c r="A1">', '<v>', '</v>', 't="s"', 't="d"', 'AAAAA99999999'),
             _in_zip(_sheet()[0], 'sheet1.xml'),
         ),
-        'ods': Target(
-            '.ods', read_readings, lambda: [_open_sheet()],
-            (' table:number-columns-repeated="999999"', ' table:number-rows-repeated="1048576"',
-             'office:value="', 'office:value-type="date"', '<text:p>', '<table:table-row>'),
-            _in_zip(_open_book(), 'content.xml'),
-        ),
         'stl': Target('.stl', _mesh, _stl_seeds, ('solid', 'facet normal', 'vertex', 'endfacet')),
         'ply': Target(
             '.ply', _mesh, _ply_seeds,
@@ -286,7 +226,6 @@ def targets() -> dict[str, Target]:
             '.glb', _mesh, _box('glb'),
             ('"count":1000000000', '"byteOffset":', '"children":[0]', '"bufferView":', '"nodes":'),
         ),
-        'gltf': Target('.gltf', _mesh, lambda: [_gltf()], ('"count":1000000000', '"uri":"')),
         '3mf': Target(
             '.3mf', _mesh, lambda: [_3mf_model()],
             ('<vertex ', '<triangle ', 'v1="', '<component objectid="', 'unit="inch"'),
@@ -298,8 +237,6 @@ def targets() -> dict[str, Target]:
         ),
         'mcap': Target('.mcap', _summary, _mcap_seeds),
         'mcap_recovery': Target('.mcap', _recovered, _mcap_seeds),
-        'sqlite3': Target('.db3', _in_run('.db3'), _of_run('.db3')),
-        'metadata': Target('.yaml', _in_run('metadata'), _of_run('metadata')),
         'model': Target(
             '.yaml', read_model_file, lambda: [MODEL], ('posterior:', 'mean:', 'id: ', '&a', '*a'),
         ),
@@ -307,16 +244,4 @@ def targets() -> dict[str, Target]:
             '.yaml', read_campaign, lambda: [CAMPAIGN], ('&a', '*a', '<<:', 'tf:', 'points:'),
         ),
         'urdf': Target('.urdf', Robot.read, lambda: [urdf().encode()], ('<mimic ', 'xyz="1"')),
-        'kept_part': Target('.npz', surface_cache.find, _kept_part),
     }  # fmt: skip
-
-
-def _gltf() -> bytes:
-    """A box whose buffer is in the file itself."""
-    import base64
-
-    files = trimesh.creation.box((0.4, 0.02, 0.3)).export(file_type='gltf')
-    text = files['model.gltf'].decode()
-    for name, content in files.items():
-        text = text.replace(f'"{name}"', f'"data:;base64,{base64.b64encode(content).decode()}"')
-    return text.encode()

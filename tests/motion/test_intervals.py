@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.motion.intervals import Intervals
+from paint_deposition.motion.stream_figures import Intervals
 
 PERIOD_NS = 4_000_000
 

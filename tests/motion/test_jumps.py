@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.motion.jumps import Jumps
+from paint_deposition.motion.stream_figures import Jumps
 
 # A gun at 1 m/s and 250 Hz.
 STAMPS_NS = 4_000_000 * np.arange(100)

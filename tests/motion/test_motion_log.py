@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from paint_deposition.motion.motion_log import MotionLog, PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, TriggerChange
 
 
 def _poses(first, count) -> PoseBatch:

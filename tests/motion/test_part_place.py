@@ -7,8 +7,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.scan_registration import register
-from paint_deposition.motion.touched_points import locate
+from paint_deposition.motion.part_location import locate, register
 
 POSE = Rigid.of([2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat()])
 POINTS = {

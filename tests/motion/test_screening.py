@@ -4,8 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paint_deposition.motion.motion_log import PoseBatch
-from paint_deposition.motion.screening import FEWEST_OF_A_RESTART, PoseScreen
+from paint_deposition.motion.pose_stream import FEWEST_OF_A_RESTART, PoseBatch, PoseScreen
 
 GAP_NS = 250
 UNIT = (0.0, 0.0, 0.0, 1.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.motion.speed_now import SpeedNow
+from paint_deposition.motion.stream_figures import SpeedNow
 
 STAMPS = 1_760_000_000_000_000_000 + 4_000_000 * np.arange(500)
 

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from paint_deposition.motion.spray_pass import (
+from paint_deposition.motion.passes import (
     AWAITED,
     ENDED,
     RUNS,
     first_pass,
     follow_passes,
 )
-from paint_deposition.motion.stroke import first_stroke, follow_strokes
+from paint_deposition.motion.strokes import first_stroke, follow_strokes
 from paint_deposition.motion.trigger import first_trigger, follow_trigger
 
 STEP_M = 0.004  # Three of them make a heading step.

@@ -10,8 +10,8 @@ import paint_deposition as pd
 from paint_deposition.effects.learned.curves import CURVES, LearnedAcross
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import PlanError
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.improvement.limits import Limits

@@ -35,14 +35,3 @@ def test_a_mesh_finer_than_the_pixels_shows_its_edges_only(monkeypatch):
     assert expected < 400
     monkeypatch.setattr(part, 'PIXELS', 15)
     assert len(PartPicture.of(surface).edges_m) == expected
-
-
-def test_edges_behind_the_part_are_not_drawn_however_few_the_pixels(monkeypatch):
-    monkeypatch.setattr(part, 'PIXELS', 40)
-    vertices, faces = triangulated(lambda x, z: 0.0 * x, 0.005)
-    small = 0.5 * vertices + np.array([0.0, 0.1, 0.0])
-    both = np.concatenate([faces, faces + len(vertices)])
-    surface = Surface.from_triangles(np.concatenate([vertices, small]), both, 0.05)
-    ends = PartPicture.of(surface).edges_m
-    assert len(ends) == 4 * 80
-    assert np.allclose(np.abs(ends).max(axis=2), 0.2)

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.profiles import draw_profile, write_comparison_picture
+from paint_deposition.report.pictures.inference import draw_profile, write_comparison_picture
 from paint_deposition.report.style import ACCENT
 from small_campaign import small_campaign
 
@@ -22,7 +22,7 @@ def test_columns_and_strips_are_drawn(tmp_path):
         study = Study.of(small_campaign(tmp_path / style, experiments=('door',), style=style))
         model = DepositionModel()
         data = ReportData((compare(study, model),) * 2)
-        write_comparison_picture(tmp_path / f'{style}.png', data.charts)
+        write_comparison_picture(tmp_path / f'{style}.png', data)
         image = np.asarray(Image.open(tmp_path / f'{style}.png').convert('RGB'))
         accent = [int(ACCENT[k : k + 2], 16) for k in (1, 3, 5)]
         assert np.all(image == accent, axis=2).mean() > 2e-4
@@ -33,11 +33,10 @@ def test_columns_and_strips_are_drawn(tmp_path):
 def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
     data = ReportData((compare(study, DepositionModel()),))
-    thin = data.charts[0]
-    line = thin.models[0]
-    thick = replace(thin, models=(replace(line, film_um=2.0 * line.film_um),))
+    thin = data.profiles[0]
+    thick = replace(thin, lines_um=[2.0 * line for line in thin.lines_um])
     figure, row = plt.subplots(1, 2, sharey=True)
-    for axes, chart in zip(row, (thin, thick), strict=True):
-        draw_profile(axes, chart)
-    assert row[0].get_ylim()[1] > thick.models[0].film_um.max()
+    for axes, profile in zip(row, (thin, thick), strict=True):
+        draw_profile(axes, data, profile)
+    assert row[0].get_ylim()[1] > np.max(thick.lines_um[0])
     plt.close(figure)

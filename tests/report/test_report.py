@@ -13,23 +13,20 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from booth import SAMPLES
-from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.diagnosis.procedure import ALPHA
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import learned_law
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.files.measuring_points import MeasuringPoints
-from paint_deposition.files.tables.layout import Layout
+from paint_deposition.files.gauge_readings import MeasuringPoints
+from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.diagnosis.proposals import Place, Spray
+from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.inference.fitting.slips import Slip
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.film import point_rows
 from paint_deposition.report.page.report import write_report
+from paint_deposition.report.page.tables import point_rows
 from paint_deposition.report.words import learned_range
 from small_campaign import small_campaign
 
@@ -181,19 +178,6 @@ def test_part_batch_and_target_of_the_campaign_lead_the_page(tmp_path, diagnosis
     assert shares in page.text
 
 
-def test_what_a_campaign_calls_things_is_text_not_markup(tmp_path, diagnosis, comparisons):
-    first, *others = diagnosis.study.campaign.experiments
-    name = '</script><b>panel'
-    renamed = replace(first, name=name)
-    campaign = replace(diagnosis.study.campaign, experiments=(renamed, *others))
-    study = replace(diagnosis.study, campaign=campaign)
-    renamed = tuple(replace(comparison, study=study) for comparison in comparisons)
-    write_report(tmp_path / 'report.html', ReportData(renamed))
-    page = page_of(tmp_path / 'report.html')
-    assert page.clashes == []
-    assert name in page.text
-
-
 def other_verdicts(diagnosis):
     base = {'accepted': (), 'classes': (), 'history': diagnosis.history[:1]}
     two = tuple(
@@ -269,25 +253,6 @@ def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnos
         f'model as given, fitted anew door.yaml {errors[0]} {floor} '
         f'+ air drift door.yaml {errors[1]} {floor}'
     ) in page_of(tmp_path / 'report.html').text
-
-
-def test_a_refit_tells_what_it_added_though_the_readings_do_not_call_for_it(tmp_path):
-    campaign = small_campaign(tmp_path, truth=None, amplitude=None)
-    done = refit(campaign, DepositionModel(), AirDrift)
-    write_report(tmp_path / 'report.html', ReportData.of(done))
-    assert [effect.id for effect in done.model.effects] == ['air_drift']
-    text = page_of(tmp_path / 'report.html').text
-    assert 'Added as asked' in text
-    assert ('run the diagnosis' in text) == (done.p_value < ALPHA)
-    assert 'Air drift was added with' in text
-    assert 'no effect was added' not in text
-
-
-def test_a_comparison_alone_has_its_report(tmp_path, diagnosis, comparisons):
-    write_report(tmp_path / 'report.html', ReportData.of(comparisons[0]))
-    page = page_of(tmp_path / 'report.html')
-    assert 'Comparison' in page.text
-    assert 'Run the diagnosis' in page.text
 
 
 # A visitor: turns the part, then presses every button and unticks the passes.
@@ -393,26 +358,6 @@ def colourful_share(picture: Path) -> float:
     """Share of pixels that are clearly red or blue: the residual on the part."""
     rgb = np.asarray(Image.open(picture).convert('RGB'), dtype=int)[600:]
     return float(np.mean(np.abs(rgb[:, :, 0] - rgb[:, :, 2]) > 40))
-
-
-def test_a_users_effect_that_was_looked_for_reads_as_well_as_one_of_the_library(
-    tmp_path, diagnosis, comparisons
-):
-    wake = load_effect_file(SAMPLES / 'my_effect.py')
-    found = EffectClass(
-        ('wake_loss',), 0.98, 'wake_loss', {'loss_per_m_per_s': Interval(2e-9, 1e-9, 3e-9)}
-    )
-    other = replace(
-        diagnosis, verdict='undecided', accepted=(), classes=(found,), not_testable=(),
-        detectable={'wake_loss': {'loss_per_m_per_s': 0.05}}, history=diagnosis.history[:1],
-        library={wake.id: wake},
-    )  # fmt: skip
-    tell(tmp_path / 'report.html', other, comparisons[:1])
-    text = page_of(tmp_path / 'report.html').text
-    assert text.count(wake.__doc__) == 2
-    assert f'How it shows: {wake.signature}.' in text
-    assert 'loss 2 × 10⁻⁹ per m/s (1 × 10⁻⁹ to 3 × 10⁻⁹)' in text
-    assert 'loss 0.05 per m/s' in text
 
 
 def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):

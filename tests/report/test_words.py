@@ -1,7 +1,6 @@
 """What the report calls a user's own effect: it reads as well as one of the library."""
 
 from booth import SAMPLES
-from paint_deposition.inference.diagnosis.verdict import EffectClass
 from paint_deposition.effects.base import Effect, parameter
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.place import PartGrid
@@ -17,7 +16,6 @@ from paint_deposition.report.words import (
     number,
     parameter_words,
     step_words,
-    sureness,
 )
 
 
@@ -98,9 +96,3 @@ def test_a_learned_law_says_where_it_is_neutral():
     assert learned_range(fog).endswith('to ± 0.98 µm at 0, and least, to ± 2 µm at 1.')
     assert 'on any other part' in learned_range(LEARNED['place']())
     assert '300 mm from the axis' in learned_range(LEARNED['footprint'](reach_m=0.3))
-
-
-def test_a_law_that_was_kept_for_what_it_predicts_has_no_probability():
-    assert sureness(EffectClass(('learned:time_s',), 1.0, 'learned:time_s')) == 'kept'
-    assert sureness(EffectClass(('learned:time_s',), 0.7, 'learned:time_s')) == '70 %'
-    assert sureness(EffectClass(('edge_build',), 1.0, 'edge_build')) == '> 99 %'

@@ -4,7 +4,7 @@ import numpy as np
 from tests.surfaces import triangulated
 from trimesh import Trimesh
 
-from paint_deposition.batch.cluster.finished import content_digest
+from paint_deposition.batch.cases import content_digest
 from paint_deposition.files import surface_cache
 from paint_deposition.files.meshes import read_mesh
 

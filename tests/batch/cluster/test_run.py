@@ -9,13 +9,12 @@ import pytest
 from distributed import Client
 
 from booth import SAMPLES
-from paint_deposition.batch.cluster.finished import Finished
-from paint_deposition.batch.cluster.run import Case, run
-from paint_deposition.batch.cluster.workers import workers
-from paint_deposition.errors import ManyError
+from paint_deposition.batch.cases import Case, ResultCache
+from paint_deposition.batch.cluster import run, workers
 from paint_deposition.batch.sweep.case import computed
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.errors import ManyError
 
 DOOR = SAMPLES / 'measured_door'
 CASES = 60
@@ -27,7 +26,7 @@ def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path):
     cases = [Case('good', {'mean_um': [20.0]}), Case('bad', 3, about={'part': ['door']})]
     with workers(count=1) as client:
         for left in (2, 1):
-            finished = Finished(tmp_path)
+            finished = ResultCache(tmp_path)
             assert run(client, dict, cases, {}, finished, lambda what, share: None) == left
             good, bad = finished.table(['good', 'bad']).to_pylist()
             assert (good['mean_um'], good['error']) == (20.0, None)
@@ -63,13 +62,13 @@ def cluster(tmp_path):
 def test_what_is_finished_is_kept_when_a_cluster_is_lost(
     cluster, lost, words, tmp_path, monkeypatch
 ):
-    monkeypatch.setattr('paint_deposition.batch.cluster.run.PATIENCE_S', 2.0)
-    monkeypatch.setattr('paint_deposition.batch.cluster.run.WORKERS_S', 0.2)
+    monkeypatch.setattr('paint_deposition.batch.cluster.PATIENCE_S', 2.0)
+    monkeypatch.setattr('paint_deposition.batch.cluster.WORKERS_S', 0.2)
     factors = {'first': 0.9, 'last': 1.1, 'steps': CASES}
     told = {'mesh': 'door.stl', 'trajectory': 'door', 'grid': {'speed_factor': factors}}
     job = Job.of(SweepFile.model_validate(told), DOOR)
     processes, address = cluster
-    finished = Finished(tmp_path / 'finished')
+    finished = ResultCache(tmp_path / 'finished')
 
     def kill(what: str, share: float) -> None:
         if share > 0.0:

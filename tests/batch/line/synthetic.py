@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.batch.line.measured import Measured
-from paint_deposition.batch.line.part import amplitudes
+from paint_deposition.batch.line.pooling import Measured, amplitudes
 
 HOUR_S = 3600.0
 FIRST_S = 1.793e9

@@ -6,7 +6,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from cli.command import assert_refused, paint
-from paint_deposition.batch.line.change_points import date
+from paint_deposition.batch.line.changes import date
 from virtual_paint_shop.line import FIRST, Hidden, painted_job, write_line
 
 STEP_AT, MINUTES = 7, 90.0

@@ -1,15 +1,15 @@
 """What many parts say together and one does not; what changes, and when."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from batch.line.synthetic import FIRST_S, HOUR_S, parts
+from batch.line.synthetic import FIRST_S, HOUR_S, SIGMA_UM, parts
+from paint_deposition.batch.line.changes import Series, changes_of, series_of
+from paint_deposition.batch.line.pooling import amplitudes, pooled
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.batch.line.causes import pooled
-from paint_deposition.batch.line.change_points import changes_of
-from paint_deposition.batch.line.part import amplitudes
-from paint_deposition.batch.line.series import Series, series_of
 
 FIRST = amplitudes()[0]
 
@@ -45,11 +45,11 @@ def test_nothing_is_pooled_where_there_is_nothing():
 def test_a_misfit_that_all_parts_share_is_no_effect():
     found = pooled(parts(100, seed=2, misfit=0.03))
     assert found.causes == ()
-    assert found.pool.scales.misfit is not None
+    assert found.posterior.scales.misfit is not None
 
 
 def test_level_and_noise_are_estimated():
-    scales = pooled(parts(300, seed=3, level=0.02)).pool.scales
+    scales = pooled(parts(300, seed=3, level=0.02)).posterior.scales
     assert scales.level == pytest.approx(0.02, rel=0.15)
     assert scales.noise == pytest.approx(1.0, abs=0.06)
 
@@ -101,3 +101,19 @@ def test_one_bad_part_is_an_alarm_and_no_change():
     series = Series('level', '%', ('level',), values, np.ones(100), 33, 10_000.0)
     assert series.charts.alarms['shewhart'].tolist() == [70]
     assert changes_of([series], FIRST_S + HOUR_S * np.arange(100)) == []
+
+
+def test_the_scales_are_those_beside_the_effects_that_were_found():
+    """By two programmes in turn, whose marks are opposite: without the effect it looks like noise."""
+    made = parts(100, seed=8, drift=0.0, points=24)
+    for row, part in enumerate(made):
+        turned = part.by_effect * (-1.0) ** row
+        shown = part.residual_um + 0.6 * turned[:, 0]
+        made[row] = replace(part, by_effect=turned, residual_um=shown)
+    found = pooled(made)
+    (cause,) = found.causes
+    typical = EFFECTS[FIRST[0]].parameters()[FIRST[1]]['typical']
+    assert found.posterior.scales.noise == pytest.approx(1.0, abs=0.06)
+    assert cause.value == pytest.approx(0.6 * typical, abs=4.0 * cause.sd)
+    lone_sd = SIGMA_UM / np.sqrt(sum(np.sum(part.by_effect[:, 0] ** 2) for part in made))
+    assert cause.sd == pytest.approx(lone_sd * typical, rel=0.1)

@@ -9,7 +9,7 @@ import trimesh
 import yaml
 
 from cli.command import assert_refused, paint
-from paint_deposition.batch.line.job import line_cases
+from paint_deposition.batch.line.runs import line_cases
 from virtual_paint_shop.line import Hidden, painted_job, write_line
 
 

@@ -12,13 +12,11 @@ import yaml
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, installed_paint, paint
-from paint_deposition.batch.cluster.finished import NAME, Finished
-from paint_deposition.batch.cluster.run import run
-from paint_deposition.batch.cluster.workers import workers
-from paint_deposition.batch.sweep.case import computed
+from paint_deposition.batch.cases import FOLDER, ResultCache
+from paint_deposition.batch.cluster import run, workers
+from paint_deposition.batch.sweep.case import computed, varied_motion
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.sweep_file import SweepFile
-from paint_deposition.batch.sweep.varied_motion import varied_motion
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
@@ -53,7 +51,7 @@ def film_by_itself(k1: float, speed: float) -> pd.Film:
 @pytest.mark.slow
 def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
     job = Job.of(SweepFile.model_validate(TOLD), DOOR)
-    finished = Finished(tmp_path / NAME)
+    finished = ResultCache(tmp_path / FOLDER)
     killed = []
 
     def kill_one(what: str, share: float) -> None:
@@ -81,7 +79,7 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
-    kept = sorted((output / NAME).iterdir())
+    kept = sorted((output / FOLDER).iterdir())
     kept[2].unlink()
     again = json.loads(paint('sweep', sweep_file, '-o', output, '--workers', 1, '--json').stdout)
     assert again['computed'] == 1
@@ -154,7 +152,7 @@ def test_a_campaigns_own_model_is_varied(tmp_path):
 
 
 def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
-    monkeypatch.setattr('paint_deposition.batch.cluster.workers.CONNECT_S', 1)
+    monkeypatch.setattr('paint_deposition.batch.cluster.CONNECT_S', 1)
     address = 'tcp://127.0.0.1:9'
     done = paint('sweep', sweep_file, '-o', tmp_path / 'out', '--scheduler', address)
     assert_refused(done, address, 'dask scheduler')
@@ -188,7 +186,7 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
     motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
     alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
     file.unlink()
-    finished = Finished(tmp_path / NAME)
+    finished = ResultCache(tmp_path / FOLDER)
     with workers(count=1) as client:
         run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()

@@ -4,13 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-import scenes
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.rapid.motion import program_trajectory
-from paint_deposition.files.rapid.program import read_program
-from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.rapid.program import program_trajectory, read_program
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.programmed import Move
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -78,11 +74,6 @@ def test_the_gun_is_switched_at_its_distances(motion):
     assert sprayed_x.max() == pytest.approx(0.95, abs=0.008)
 
 
-def test_an_output_that_is_never_opened_does_not_spray(motion):
-    body = f'SetDO doGun,0;MoveL {target(0)},v500,fine,tool0;MoveL {target(9)},v500,fine,tool0;'
-    assert spray_path(motion(body))[0].spraying_time_s == 0.0
-
-
 @pytest.mark.parametrize('sweep_deg', [30.0, 180.0, 300.0])
 def test_circular_moves_are_arcs(motion, sweep_deg):
     middle, end = np.radians([0.4 * sweep_deg, sweep_deg])
@@ -119,21 +110,6 @@ def test_a_tool_that_only_turns_takes_its_time(motion):
 def test_what_is_no_motion_is_refused(motion, body, words):
     with pytest.raises(RecordingError, match=words):
         motion(body)
-
-
-def test_a_written_plan_is_flown_as_planned(tmp_path):
-    places = [(0.0, 0.0), (1.0, 0.0), (1.1, 0.0), (1.1, 0.3), (1.0, 0.3), (0.0, 0.3)]
-    spraying = [False, True, False, False, False, True]
-    moves = [
-        Move(np.array([x, y, 0.25]), scenes.LOOKING_DOWN, 0.4, on)
-        for (x, y), on in zip(places, spraying, strict=True)
-    ]
-    (tmp_path / 'passes.mod').write_text(module_text(moves))
-    path, _ = spray_path(program_trajectory(read_program(tmp_path / 'passes.mod')))
-    assert path.spraying_time_s == pytest.approx(2.0 / 0.4, abs=1e-8)
-    assert path.spray_pass.max() == 1
-    sprayed = path.position_m[path.flow > 0.0]
-    assert set(np.round(sprayed[:, 1], 9)) == {0.0, 0.3}
 
 
 def test_a_move_that_would_take_for_ever_is_refused(motion):

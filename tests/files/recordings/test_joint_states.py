@@ -63,10 +63,8 @@ def test_any_joints_agree_with_the_product_of_exponentials(arm):
     assert apart.max() < 1e-8
 
 
-@pytest.mark.parametrize('storage', ['mcap', 'sqlite3', 'ros1'])
-def test_joint_states_become_poses(arm, storage, tmp_path):
-    path = tmp_path / ('run.bag' if storage == 'ros1' else 'run')
-    bag = joint_bag(path, rows_of(), storage)
+def test_joint_states_become_poses(arm, tmp_path):
+    bag = joint_bag(tmp_path / 'run.bag', rows_of(), 'ros1')
     read = read_recording(bag, urdf=str(arm), frame_id='base_link')
     assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
     assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
@@ -104,8 +102,6 @@ def test_another_link_and_another_base(arm, tmp_path):
     ('given', 'words'),
     [
         ({}, 'name a pose topic; it has no PoseStamped topic; it has joint states (--urdf)'),
-        ({'tip_link': 'tool0'}, 'give --urdf'),
-        ({'urdf': 'none.urdf'}, 'cannot read none.urdf'),
         ({'urdf': 'ARM', 'tip_link': 'tool1'}, "has no link 'tool1'; did you mean 'tool0'?"),
         (
             {'urdf': 'ARM', 'base_link': 'tool0', 'tip_link': 'base_link'},

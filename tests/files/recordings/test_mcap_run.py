@@ -1,23 +1,17 @@
 """The layout of a run on disk, and what a killed process or a full disk leaves of it."""
 
-import contextlib
 import os
 import signal
-import struct
 import subprocess
 import sys
-import time
 
 import pytest
 import yaml
-from mcap.exceptions import McapError
 from mcap.reader import make_reader
-from mcap.records import Channel, Chunk, Header, Metadata, Statistics
+from mcap.records import Channel, Header, Metadata, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
-from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings import mcap_run
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import standard
@@ -127,47 +121,6 @@ def test_other_readers_agree(tmp_path, compression):
         assert connection.ext.offered_qos_profiles == [offered_qos(1, latched=True)]
 
 
-def test_an_unfinished_run_has_no_metadata_file(tmp_path):
-    with pytest.raises(KeyError), RunWriter(tmp_path / 'run') as writer:
-        writer.write('/unknown', TRUE_CDR, 0, 0)
-    assert not (tmp_path / 'run/metadata.yaml').exists()
-
-
-def test_a_topic_is_added_once(tmp_path):
-    with RunWriter(tmp_path / 'run') as writer:
-        writer.add_topic(gun_topic())
-        with pytest.raises(RecordingError, match='/gun is already recorded'):
-            writer.add_topic(gun_topic())
-
-
-def test_open_chunk_is_closed_by_age(tmp_path, monkeypatch):
-    """No message may wait in memory for longer than half a second and a call."""
-    monkeypatch.setattr(mcap_run, 'CHUNK_SECONDS', 0.05)
-    writer = RunWriter(tmp_path / 'run')
-    writer.add_topic(gun_topic())
-    writer.write('/gun', TRUE_CDR, 1, 1)
-    assert not chunks_of(writer)
-    deadline = time.monotonic() + 60.0
-    while not chunks_of(writer) and time.monotonic() < deadline:
-        writer.close_old_chunk()
-    assert len(chunks_of(writer)) == 1
-    writer.abandon()
-
-
-def write_many(writer: RunWriter, count: int) -> None:
-    for number in range(count):
-        writer.write('/gun', TRUE_CDR, number, number)
-
-
-def chunks_of(writer: RunWriter) -> list[Chunk]:
-    """Closed chunks in a file that is still being written."""
-    found = []
-    unfinished = contextlib.suppress(McapError, struct.error)
-    with writer.path.open('rb') as stream, unfinished:
-        found.extend(StreamReader(stream, emit_chunks=True).records)
-    return [record for record in found if isinstance(record, Chunk)]
-
-
 WRITE_UNTIL_KILLED = """
 import sys, time
 from pathlib import Path
@@ -248,17 +201,3 @@ def test_the_first_refused_write_is_the_last(tmp_path, repository):
     recovery = recover(run, tmp_path / 'recovered')
     # What the failing chunk held is lost: 64 KiB of messages of 36 bytes.
     assert 0 <= int(number) - recovery.message_count <= 64 * 1024 / 36 + 1
-
-
-def test_a_device_without_space(tmp_path):
-    run = tmp_path / 'run'
-    writer = RunWriter(run)
-    writer.add_topic(gun_topic())
-    # From here on the file is the device that is always full.
-    os.dup2(os.open('/dev/full', os.O_WRONLY), writer._raw.fileno())
-    with pytest.raises(RecordingError, match='No space left on device'):
-        write_many(writer, 100_000)
-    with pytest.raises(RecordingError, match='No space left on device'):
-        writer.finish()
-    assert not (run / 'metadata.yaml').exists()
-    assert not writer.complete

@@ -33,23 +33,6 @@ def test_own_messages_bring_all_they_use():
         assert text.count(f'{definitions.SEPARATOR}\nMSG: {used}\n') == 1
 
 
-def test_what_counts_as_a_field():
-    text = '\n'.join([
-        '# std_msgs/Header in_a_comment',
-        'uint8 CONSTANT=1',
-        'string NAME = "other/Type x"',
-        'string<=8 name',
-        'float64[] values',
-        'int32[<=3] few',
-        'Part[4] parts',
-        'other/Type[<=5] bounded',
-        'other_msgs/msg/Full full  # Unused u',
-    ])  # fmt: skip
-    assert definitions._used_types(text, 'own/msg/Whole') == {
-        'own/msg/Part', 'other/msg/Type', 'other_msgs/msg/Full',
-    }  # fmt: skip
-
-
 def test_a_type_that_is_not_installed_is_named():
     pytest.importorskip('ament_index_python')
     with pytest.raises(RecordingError, match='no_msgs/msg/Nothing is not installed'):

@@ -33,8 +33,8 @@ def io_message(messages, on: bool):
     )  # fmt: skip
 
 
-@pytest.fixture(scope='module', params=['mcap', 'sqlite3'])
-def bag(request, messages, tmp_path_factory):
+@pytest.fixture(scope='module')
+def bag(messages, tmp_path_factory):
     """The pass, and the cell's signals at every pose, logged as the pose is stamped."""
     types = messages.store.types
     entries = pose_entries(PASS)
@@ -47,7 +47,7 @@ def bag(request, messages, tmp_path_factory):
             ('/closed', stamp, types['std_msgs/msg/Int32'](0 if on else 1)),
         ]
     folder = tmp_path_factory.mktemp('cell') / 'run'
-    return write_bag(folder, entries, request.param, messages)
+    return write_bag(folder, entries, 'sqlite3', messages)
 
 
 def openings(trajectory) -> np.ndarray:
@@ -60,12 +60,10 @@ def openings(trajectory) -> np.ndarray:
     ('trigger', 'said'),
     [
         ('/io.states[3]', 'trigger /io.states[3] is 0 to 5: the gun is on where it is above 0'),
-        ('io.word', 'trigger /io.word is 0 to 1'),
         ('/io.level > 12', 'trigger /io.level is 0.4 to 23.8: the gun is on where it is above 12'),
         ('/io.valves[1].open', 'trigger /io.valves[1].open is 0 to 1'),
         ('/valve/pressure', 'trigger /valve/pressure is 0 to 3'),
         ('/closed < 1', 'the gun is on where it is below 1'),
-        ('/brush.brush', 'trigger /brush.brush is 0 to 2'),
     ],
 )
 def test_a_number_in_any_field_opens_the_gun(trigger, said, bag):
@@ -86,7 +84,6 @@ def test_values_that_are_no_number_are_left_out_and_counted(bag):
     [
         ('/io', 'is cell_msgs/msg/Io; name one of its fields: /io.states[0] /io.states[1]'),
         ('/io.state[3]', "no number or Bool at .state[3]; did you mean '/io.states[3]'?"),
-        ('/io.states[9]', 'no number or Bool at .states[9]'),
         ('/io.valves[1].label', 'no number or Bool at .valves[1].label'),
         ('/oi.word', 'has no topic /oi.word'),
         ('/io.level > 1e', "'1e' is no number"),
@@ -96,11 +93,3 @@ def test_a_field_that_is_not_there_is_refused_with_those_there_are(trigger, word
     with pytest.raises(RecordingError) as refused:
         read_recording(bag, state_topic=trigger)
     assert words in str(refused.value)
-
-
-def test_log_times_of_another_clock_are_refused(messages, tmp_path):
-    entries = pose_entries(PASS, delay_ns=3_600_000_000_000)
-    entries.append(('/io', int(PASS.stamps_ns[0]), io_message(messages, True)))
-    bag = write_bag(tmp_path / 'run', entries, 'mcap', messages)
-    with pytest.raises(RecordingError, match=r'/io\.word in .* has no stamps'):
-        read_recording(bag, state_topic='/io.word')

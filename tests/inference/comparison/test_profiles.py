@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from small_campaign import small_campaign

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.law import hat_weights
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.posterior import Posterior
 
 PARAMETERS = FreeParameters.of(DepositionModel())
 

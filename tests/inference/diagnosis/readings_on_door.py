@@ -6,9 +6,9 @@ import numpy as np
 
 from booth import door, painted, panel, path_of, serpentine
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.part.surface import Surface
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.part.surface import Surface
 
 # Two passes of few sub-steps, over the door's arch and edges and over the panel.
 PASSES_M = {'door': (0.75, 0.45), 'panel': (0.05, -0.1)}

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from inference.diagnosis.linear import PARAMETERS, fit_linear
-from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.law import hat_weights
+from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.report.style import TWO_SIDED_95
 

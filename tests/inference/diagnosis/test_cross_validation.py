@@ -15,15 +15,20 @@ from inference.diagnosis.linear import (
     null_of,
     smooth_curves,
 )
+from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis import learning
-from paint_deposition.inference.diagnosis.cross_validation import Stage, hold_out, left_out, nested_rmse_um
+from paint_deposition.inference.diagnosis.cross_validation import (
+    Stage,
+    hold_out,
+    left_out,
+    nested_rmse_um,
+)
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS
 from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import RandomLaw
-from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 READINGS = 24

@@ -8,8 +8,17 @@ from scipy.integrate import dblquad, quad
 from scipy.special import log_ndtr
 from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
-from inference.diagnosis.linear import KNOWN, PARAMETERS, deviation, fit_linear, linear_fit, null_of
+from inference.diagnosis.linear import (
+    KNOWN,
+    PARAMETERS,
+    deviation,
+    fit_linear,
+    linear_fit,
+    null_of,
+)
 from inference.diagnosis.linear import prior_covariance as covariance_of
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.diagnosis.evidence import (
     KNOWN_NOISE,
     NullModel,
@@ -19,8 +28,6 @@ from paint_deposition.inference.diagnosis.evidence import (
     simulated,
 )
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.coordinates import PATTERN
 

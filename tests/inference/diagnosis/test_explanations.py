@@ -8,7 +8,6 @@ import pytest
 from booth import MODEL
 from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, study_of
-from paint_deposition.inference.diagnosis.explanations import LAW_ERROR, law_errors
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
@@ -16,6 +15,7 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.overspray_fog import OversprayFog
+from paint_deposition.inference.diagnosis.explanations import LAW_ERROR, law_errors
 from paint_deposition.inference.fitting.study import Study
 
 EDGE = EdgeBuild(gain=0.3, length_m=0.05)

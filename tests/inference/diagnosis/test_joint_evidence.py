@@ -7,7 +7,12 @@ import pytest
 from scipy.stats import multivariate_normal, multivariate_t, norm
 
 from paint_deposition.inference.diagnosis.evidence import Principal
-from paint_deposition.inference.diagnosis.joint_evidence import NEVER, Directions, log_evidence, refine
+from paint_deposition.inference.diagnosis.joint_evidence import (
+    NEVER,
+    Directions,
+    log_evidence,
+    refine,
+)
 
 READINGS = 12
 SIZES = np.array([0.5, 1.0, 3.0])

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
@@ -11,6 +10,7 @@ from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.report.data import ReportData

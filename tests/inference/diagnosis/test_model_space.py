@@ -6,6 +6,13 @@ from scipy.special import logsumexp
 from scipy.stats import binom, kstest
 
 from inference.diagnosis.linear import bounds, linear_fit, null_of, smooth_curves
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.inference.diagnosis import model_space
 from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
 from paint_deposition.inference.diagnosis.explanations import (
@@ -15,16 +22,15 @@ from paint_deposition.inference.diagnosis.explanations import (
     UNKNOWN,
     Explanation,
 )
-from paint_deposition.inference.diagnosis.model_space import PRIOR, PRIOR_EFFECT, SIZES, SURE, ModelSpace
+from paint_deposition.inference.diagnosis.model_space import (
+    PRIOR,
+    PRIOR_EFFECT,
+    SIZES,
+    SURE,
+    ModelSpace,
+)
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE, Basis, RandomLaw
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.effects.library.edge_build import EdgeBuild
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
-from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.inference.fitting.smooth_fields import field_over_values
 
 READINGS = 60

@@ -5,23 +5,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, FOOTPRINT_SHARE, LENGTHS
-from paint_deposition.inference.diagnosis.next_experiment import EDGE_MARGIN_M, SPACING_M, propose
-from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
-from paint_deposition.inference.diagnosis.sprays import MENU, together
-from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.effects.base import PathContext
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, FOOTPRINT_SHARE, LENGTHS
+from paint_deposition.inference.diagnosis.next_experiment import EDGE_MARGIN_M, SPACING_M, propose
+from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
+from paint_deposition.inference.diagnosis.sprays import MENU, together
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.projection import Projection
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.model.projection import Projection
 
 BY_KEY = {change.key: change for change in MENU}
 

@@ -6,6 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+from paint_deposition.errors import ModelError
+from paint_deposition.files.json_files import json_text
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis import procedure
 from paint_deposition.inference.diagnosis.model_space import SURE
@@ -13,12 +19,6 @@ from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import percent
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
-from paint_deposition.errors import ModelError
-from paint_deposition.files.json_files import json_text
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from small_campaign import small_campaign
 

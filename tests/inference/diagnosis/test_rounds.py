@@ -9,10 +9,6 @@ import pytest
 from scipy.stats import binom, kstest
 
 from inference.fitting.panels import PANEL, passes, readings_at
-from paint_deposition.inference.diagnosis import run
-from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
-from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -20,9 +16,13 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis import run
+from paint_deposition.inference.diagnosis.model_space import SURE
+from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.motion.path_builder import spray_path
 
 pytestmark = pytest.mark.slow
 

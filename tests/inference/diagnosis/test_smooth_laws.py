@@ -7,6 +7,10 @@ import pytest
 
 from booth import MODEL
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.learned.curves import LearnedHeight, LearnedSpeed
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.smooth_laws import (
     Basis,
     bases_over,
@@ -15,10 +19,6 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     footprint_kinds,
     map_bases,
 )
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.catalogue import LEARNED
-from paint_deposition.effects.learned.curves import LearnedHeight, LearnedSpeed
-from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from reference import reference_film_um

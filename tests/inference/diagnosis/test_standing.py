@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.next_experiment import propose
 from paint_deposition.inference.diagnosis.proposals import Spray, chance_of_settling
 from paint_deposition.inference.diagnosis.rivals import Rivals
 from paint_deposition.inference.diagnosis.sprays import MENU
 from paint_deposition.inference.diagnosis.standing import Stand, spots, suits
-from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study

@@ -5,16 +5,16 @@ import pytest
 from scipy.stats import binom
 
 from inference.diagnosis.linear import bounds, linear_fit, null_of
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space, testability
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.model_space import ModelSpace
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.diagnosis.testability import LEVEL, POWER
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.edge_build import EdgeBuild
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 
 READINGS = 60
 RUNS = 200

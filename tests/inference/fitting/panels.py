@@ -4,11 +4,11 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import Readings
 from virtual_paint_shop.shop import Campaign as Painted
 
 # A panel stands in x-z and looks to +y; the gun looks along -y with its x axis along x.

@@ -12,9 +12,9 @@ import numpy as np
 from scipy.optimize import curve_fit, least_squares
 
 from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
+from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection, flux_um_per_s
-from paint_deposition.inference.readings.panel import Panel
 
 LANE_SPACING_FT = 224.0
 

@@ -15,18 +15,18 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import Brush
 from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.report.writers.calibration import write_calibration
+from paint_deposition.report.writers.write import write
 
 PHI_RAD = 0.1
 FIRST = PlanarPattern(
@@ -136,7 +136,7 @@ def test_panels_of_two_brushes_give_both_patterns_back(campaign, tmp_path):
     # Three parameters of eq. (3) start each brush from a panel of its own; one has no panel.
     assert [panel is None for panel in found.panels] == [False, False, True]
     start = ModelFile(TRUTH.model_copy(update={'effects': ()}))
-    write_calibration(tmp_path, found, start)
+    write(found, tmp_path, start=start)
     again = read_model_file(tmp_path / 'model.yaml')
     assert [b.number for b in again.model.brushes] == [1, 4]
     assert again.posterior is not None
@@ -154,8 +154,8 @@ def test_a_calibration_tells_transfer_efficiency_and_exponents(campaign, tmp_pat
         assert 0.0 < told['transfer_efficiency_sigma'] < 0.02
     assert set(figures['exponents']['width']) == {'flow_cm3_per_min', 'bell_speed_rpm'}
     third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
-    files = write_calibration(
-        tmp_path, found, ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
+    files = write(
+        found, tmp_path, start=ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
     )
     assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
     # A brush that was not painted with stays as it was given.

@@ -21,11 +21,11 @@ from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate, started_from
 from paint_deposition.inference.fitting.collapse_fit import fit_collapse
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.pattern import PlanarPattern
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.panel import Panel
-from paint_deposition.report.writers.calibration import write_calibration
+from paint_deposition.model.pattern import PlanarPattern
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.report.writers.write import write
 from virtual_paint_shop.shop import panel_study
 
 pytestmark = pytest.mark.slow
@@ -157,7 +157,7 @@ def test_papers_study_fit_at_577_predict_525_and_625(seed):
 
 
 def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
-    files = write_calibration(tmp_path, calibrated)
+    files = write(calibrated, tmp_path)
     written = read_model_file(files[0])
     for name, value in calibrated.model.planar:
         assert getattr(written.model.planar, name) == pytest.approx(value, rel=1e-7), name
@@ -174,7 +174,7 @@ def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
 def test_a_calibration_carries_on_what_it_started_from(calibrated, tmp_path):
     older = [{'added': 'pattern', 'rmse_um': 3.0, 'campaign': 'another.yaml'}]
     start = ModelFile(calibrated.model, 'bell 7', {}, older)
-    written = read_model_file(write_calibration(tmp_path, calibrated, start)[0])
+    written = read_model_file(write(calibrated, tmp_path, start=start)[0])
     assert written.name == 'bell 7'
     assert written.history[:1] == older
     assert [step['added'] for step in written.history] == ['pattern', 'refit']

@@ -7,8 +7,8 @@ from scipy.stats import truncnorm
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.coordinates import PATTERN
 
 COUNT = 4000

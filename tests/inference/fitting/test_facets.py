@@ -6,9 +6,9 @@ import pytest
 from booth import MODEL, painted, path_of, serpentine
 from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.part.surface import Surface
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 
 RADIUS_M, HALF_M, COARSE_M, FINE_M = 0.15, 0.1, 0.05, 0.004

@@ -17,12 +17,12 @@ from paint_deposition.inference.fitting.least_squares import derivatives, fit_re
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import Readings
 
 TRUTH = DepositionModel(
     planar=PlanarPattern(

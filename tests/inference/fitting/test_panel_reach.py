@@ -14,10 +14,10 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.calibration import Calibration, calibrate
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.panel_reach import short_reaches
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 TRUTH = PlanarPattern(
     K1_cm3_per_s=1.6, K2=0.15, K3=0.2, phi_rad=0.6, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15

@@ -12,8 +12,8 @@ from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import fingerprints, posterior_of, usable
-from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
 
 WITH_EFFECT = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
 

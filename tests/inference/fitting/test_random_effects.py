@@ -10,8 +10,8 @@ from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.model.coordinates import PATTERN
 
 
 def grid_m() -> np.ndarray:

@@ -7,12 +7,12 @@ import pytest
 
 from inference.fitting.panels import painted_by, passes
 from paint_deposition.api import inference
-from paint_deposition.inference.diagnosis import run
-from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+from paint_deposition.inference.diagnosis import run
+from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.fitting import calibration
 from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.slips import Slip, slips

@@ -5,9 +5,9 @@ import pytest
 
 from booth import panel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.motion.path import SprayPath
 
 # On the booth's panel, one metre by one about the origin in x-z.
 PLACES_M = np.array([[-0.4, 0.0, -0.3], [0.1, 0.0, 0.2], [0.3, 0.0, 0.45], [-0.2, 0.0, 0.1]])

@@ -4,8 +4,16 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS, gauge_noise
-from paint_deposition.inference.readings.readings import PointMeans, Readings, require_repeats_close
+from paint_deposition.inference.readings.gauge_noise import (
+    ASSUMED_FREEDOM,
+    ENOUGH_REPEATS,
+    gauge_noise,
+)
+from paint_deposition.inference.readings.readings import (
+    PointMeans,
+    Readings,
+    require_repeats_close,
+)
 
 
 def at_points(points: str, thickness_um, sigma_um=None) -> Readings:

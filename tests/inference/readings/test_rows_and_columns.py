@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from booth import panel, path_of, serpentine
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
+from paint_deposition.motion.path import SprayPath
 
 
 def grid(columns_m, rows_m, stray_m=0.0) -> np.ndarray:

@@ -11,7 +11,7 @@ pytest.importorskip('rclpy')
 
 from nodes.cell import Robot, offline_um, parameters, two_passes
 from paint_deposition.api.simulation import simulate
-from paint_deposition.files.gun_motions import read_gun_motions
+from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 

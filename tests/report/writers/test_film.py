@@ -8,7 +8,6 @@ import pytest
 import trimesh
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.json_files import write_json
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.film import write_film
@@ -52,26 +51,3 @@ def test_an_older_film_stays_unless_told(painted, tmp_path):
     assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(50 / 3)
     write_film(tmp_path, surface, 2 * film, stats, overwrite=True)
     assert np.genfromtxt(csv, delimiter=',', skip_header=1)[:, 3].max() == pytest.approx(100 / 3)
-
-
-def test_a_folder_that_cannot_be_is_named(painted, tmp_path):
-    surface, film, stats = painted
-    (tmp_path / 'file').write_text('')
-    with pytest.raises(PaintError, match='file'):
-        write_film(tmp_path / 'file' / 'folder', surface, film, stats)
-
-
-def test_json_fails_before_it_writes(tmp_path):
-    with pytest.raises(ValueError, match='cannot be written as JSON'):
-        write_json(tmp_path / 'x.json', {'object': object()})
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_the_table_is_as_numpy_writes_it(painted, tmp_path):
-    surface, film, stats = painted
-    film = film * np.geomspace(1e-9, 1e9, len(film))
-    csv = write_film(tmp_path, surface, film, stats)[1]
-    rows = np.column_stack([surface.vertices_m, film])
-    header = 'x_m,y_m,z_m,thickness_um'
-    np.savetxt(tmp_path / 'plain.csv', rows, '%.9g', ',', header=header, comments='')
-    assert csv.read_bytes() == (tmp_path / 'plain.csv').read_bytes()

@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.model.projection import Projection
 from paint_deposition.report.writers.fitted_model import write_fitted
 from small_campaign import small_campaign

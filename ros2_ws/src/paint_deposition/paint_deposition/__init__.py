@@ -1,25 +1,32 @@
 """Film build of rotary bell spray painting: simulation, calibration, diagnosis and planning.
 
-`import paint_deposition as pd` costs nothing: the public names, which are those of
-`paint_deposition.public`, are loaded one by one when they are first used.
+`import paint_deposition as pd` costs nothing: the public names, which `__init__.pyi` lists with
+the modules that define them, are loaded one by one when they are first used.
 """
 
+import ast
+from functools import cache
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
-
-if TYPE_CHECKING:
-    from paint_deposition.public import *  # noqa: F403
+from pathlib import Path
+from typing import Any
 
 __version__ = '0.1.0'
 
 
+@cache
+def _modules() -> dict[str, str]:
+    """Public name -> module that defines it, as the stub says."""
+    stub = ast.parse(Path(__file__).with_suffix('.pyi').read_text(encoding='utf-8'))
+    imports = [line for line in stub.body if isinstance(line, ast.ImportFrom)]
+    return {name.name: str(line.module) for line in imports for name in line.names}
+
+
 def __getattr__(name: str) -> Any:
-    if not name.startswith('_'):
-        public = import_module('paint_deposition.public')
-        if name in public.DEFINED_IN:
-            return getattr(import_module(f'{__name__}.{public.DEFINED_IN[name]}'), name)
-    raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    # Python itself asks for names such as __path__ before anything is loaded.
+    if name.startswith('_') or name not in _modules():
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    return getattr(import_module(_modules()[name]), name)
 
 
 def __dir__() -> list[str]:
-    return ['__version__', *import_module('paint_deposition.public').DEFINED_IN]
+    return ['__version__', *_modules()]

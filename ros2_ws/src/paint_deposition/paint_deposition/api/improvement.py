@@ -9,40 +9,38 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import look_at
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.fitting.draws import drawn
-from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.improvement.dwell_films import FilmAtPoints
-from paint_deposition.planning.improvement.improve import timed_for_evenness
+from paint_deposition.planning.films import FilmAtPoints, simulated, stratified_sample
 from paint_deposition.planning.improvement.improvement import (
     DEFAULT_TOLERANCE,
     Improvement,
     LaidFilm,
 )
-from paint_deposition.planning.improvement.limits import split_options
-from paint_deposition.planning.improvement.moves import moves_of
-from paint_deposition.planning.improvement.programme import Programme
-from paint_deposition.planning.pass_films import spread
-from paint_deposition.planning.plan import simulated
+from paint_deposition.planning.improvement.programme import Programme, moves_of
+from paint_deposition.planning.improvement.retiming import retime_for_evenness
+from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.surface_map import painted_side, pass_axes
 from paint_deposition.report.writers.passes import BAG, PROGRAM, Passes, write_passes
+from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]
 # The film counts where the programme lays more than this share of its greatest film.
-JUDGED_ABOVE = 0.1
+COUNTED_ABOVE = 0.1
 # A gun whose mean direction is shorter paints more sides than one.
 ONE_SIDE = 0.9
 DRAWS, CHECKS = 8, 24
 QUANTILES = (0.05, 0.95)
 
 
+@takes(ImproveRequest)
 def improve(
     surface: Surface,
     trajectory: Trajectory,
@@ -50,14 +48,14 @@ def improve(
     *,
     posterior: Posterior | None = None,
     rivals: Sequence[DepositionModel] = (),
-    judged: np.ndarray | None = None,
+    target_region: np.ndarray | None = None,
     seed: int = 0,
     progress: Progress = lambda what, share: None,
     **wanted: Any,
 ) -> Improvement:
     """Keep the path of a programme and change its speeds, flows and triggers.
 
-    Films before and after are those of the motions as files tell them: the new one is written as
+    Films before and after are those of the motions as written to files: the new one is written as
     a bag and as a RAPID module, and both are read back.
 
     Args:
@@ -66,54 +64,51 @@ def improve(
         model: what the gun sprays; default: a 50 mm bell.
         posterior: what is known of the model; the film is made even over draws from it.
         rivals: other models that explain the readings as well; each counts as much as the model.
-        judged: (V,) bool, vertices whose film counts; default: the side that the gun faces, where
-            the programme lays more than a tenth of its greatest film.
+        target_region: (V,) bool, vertices whose film counts; default: the side that the gun
+            faces, where the programme lays more than a tenth of its greatest film.
         seed: of the draws.
         progress: called with what is being done and the share of it that is done, 0 to 1.
-        wanted: the fields of ``planning.improvement.limits.Limits`` and ``Wish``.
+        wanted: the fields of ``planning.requests.ImproveRequest``.
 
     Raises:
         RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
     """
     model = model or DepositionModel()
-    limits, wish = split_options(wanted)
+    request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, given = seen.surface, Programme.of(trajectory)
     progress('the film as it is', 0.0)
     film_um, paint = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
         raise RecordingError(f'{trajectory.source}: no paint lands on the part')
-    if judged is None:
-        judged = _judged(surface, film_um, seen.path.rotation[seen.path.flow > 0.0][:, :, 2])
+    if target_region is None:
+        tool_z = seen.path.rotation[seen.path.flow > 0.0][:, :, 2]
+        target_region = _target_region(surface, film_um, tool_z)
     models = [model, *rivals]
     if posterior is not None:
         models += drawn(model, posterior, DRAWS, seed)
-    retiming = timed_for_evenness(surface, judged, given, models, limits, wish, progress)
-    moves = moves_of(retiming.programme, limits)
+    retiming = retime_for_evenness(surface, target_region, given, models, request, progress)
+    moves = moves_of(retiming.programme, request)
     progress('the film of the written files', 0.0)
     passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
     improved, program = _read_back(passes)
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, program)
-    tolerance = wish.tolerance or DEFAULT_TOLERANCE
+    tolerance = request.tolerance or DEFAULT_TOLERANCE
     band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
-    path, improved_path = seen.path, spray_path(improved)[0]
-    before = LaidFilm.of(
-        film_um, surface, judged, band, paint.emitted_cm3, path, trajectory.duration_s
-    )
-    after = LaidFilm.of(
-        new_um, surface, judged, band, new_paint.emitted_cm3, improved_path, improved.duration_s
-    )
+    before = LaidFilm.of(film_um, surface, target_region, band, paint.emitted_cm3, trajectory)
+    after = LaidFilm.of(new_um, surface, target_region, band, new_paint.emitted_cm3, improved)
+    programmes = (given, Programme.of(improved))
     return Improvement(
-        surface, judged, model, limits, wish, trajectory, improved, moves, retiming, before, after,
-        float(np.abs(program_um - new_um).max() / new_um.max()),
-        _interval(surface, judged, model, posterior, (given, Programme.of(improved)), seed),
+        surface, target_region, model, request, trajectory, improved, moves, retiming, before,
+        after, float(np.abs(program_um - new_um).max() / new_um.max()),
+        _interval(surface, target_region, model, posterior, programmes, seed),
         seen.geometry.warnings,
     )  # fmt: skip
 
 
-def _judged(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) -> np.ndarray:
-    reached = film_um > JUDGED_ABOVE * film_um.max()
+def _target_region(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) -> np.ndarray:
+    reached = film_um > COUNTED_ABOVE * film_um.max()
     towards = -tool_z.mean(axis=0)
     if np.linalg.norm(towards) < ONE_SIDE:
         return reached
@@ -133,7 +128,7 @@ def _read_back(passes: Passes) -> tuple[Trajectory, Trajectory]:
 
 def _interval(
     surface: Surface,
-    judged: np.ndarray,
+    target_region: np.ndarray,
     model: DepositionModel,
     posterior: Posterior | None,
     programmes: tuple[Programme, Programme],
@@ -142,7 +137,8 @@ def _interval(
     """Quantiles of sigma_n before and after over draws that the search has not seen."""
     if posterior is None:
         return None
-    rows = np.flatnonzero(judged)[spread(surface.vertex_areas_m2[judged])]
+    rows = np.flatnonzero(target_region)
+    rows = rows[stratified_sample(surface.vertex_areas_m2[target_region])]
     found = []
     for drawn_model in drawn(model, posterior, CHECKS, seed + 1):
         films = FilmAtPoints(surface, rows, drawn_model)

@@ -5,23 +5,23 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 
-from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.comparison.comparison import compare as compared
-from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
-from paint_deposition.inference.diagnosis.refit import refit as refitted
-from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
+from paint_deposition.inference.diagnosis.refit import refit as refitted
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.inference.fitting.panel_reach import Reach, short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.fitting.sifting import sifted
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.geometry import require_paint
 
@@ -96,7 +96,7 @@ def compare_models(
         progress: called with a line for each step.
 
     Raises:
-        PaintError: there are fewer than two, or more than can be told apart in a picture.
+        PaintError: there are fewer than two, or more than a picture can show.
     """
     if not 2 <= len(models) <= MOST_MODELS:
         raise PaintError(f'{len(models)} models to compare; give 2 to {MOST_MODELS}')
@@ -126,7 +126,7 @@ def diagnose(
     Args:
         campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
-        posterior: what another job told of the model, as its file or its calibration has it:
+        posterior: what another job found of the model, as its file or its calibration has it:
             the prior of the fit. Default: that of the campaign's model, if it is that.
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.

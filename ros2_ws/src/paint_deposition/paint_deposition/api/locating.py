@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.gauge_readings import read_points
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.pose_tables.points import read_points
 from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.scan_registration import register
-from paint_deposition.motion.touched_points import PartPlace, locate
+from paint_deposition.motion.part_location import PartPlace, locate, register
 
 # For distances the surface need not be refined.
 UNREFINED_M = 10.0
@@ -27,7 +26,7 @@ def locate_by_points(
         unit: 'm', 'mm' or 'cm' where headings tell none.
 
     Raises:
-        RecordingError: the tables cannot be read, or determine no pose.
+        PaintError: the tables cannot be read, or determine no pose.
     """
     given = read_points(Path(touched), unit), read_points(Path(points), unit)
     try:

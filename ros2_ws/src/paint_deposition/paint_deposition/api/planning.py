@@ -9,38 +9,38 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.clearance import GunEnvelope
-from paint_deposition.planning.index_request import Request
 from paint_deposition.planning.optimised_plan import optimised
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.plan import plan as planned
-from paint_deposition.planning.plan_request import PlanRequest
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.recommendation import recommend as recommended
+from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
+from paint_deposition.request import takes
 
 
+@takes(IndexRequest)
 def recommend(model: DepositionModel | None = None, **wanted: Any) -> Recommendation:
     """Recommend the index between parallel passes on a plane.
 
     Args:
         model: what the gun sprays; default: a 50 mm bell.
-        wanted: the fields of ``planning.index_request.Request``; ``speed_m_per_s`` or
+        wanted: the fields of ``planning.requests.IndexRequest``; ``speed_m_per_s`` or
             ``target_um`` at least.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    return recommended(model or DepositionModel(), Request(**wanted))
+    return recommended(model or DepositionModel(), IndexRequest(**wanted))
 
 
+@takes(PlanRequest)
 def plan(
     surface: Surface,
     model: DepositionModel | None = None,
     *,
     frame_id: str = 'part',
-    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> Plan:
@@ -50,19 +50,19 @@ def plan(
         surface: the part.
         model: what the gun sprays; default: a 50 mm bell.
         frame_id: of the planned poses.
-        optimise: choose number and place of the passes and the speeds along them for an even film
-            and little paint; else even passes at one speed.
         progress: called with what is being done and the share of it that is done, 0 to 1.
-        wanted: the fields of ``planning.plan_request.PlanRequest``; ``speed_m_per_s`` or
+        wanted: the fields of ``planning.requests.PlanRequest``; ``speed_m_per_s`` or
             ``target_um`` at least.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    plain = planned(surface, model or DepositionModel(), PlanRequest(**wanted), frame_id, progress)
-    return optimised(plain, progress) if optimise else plain
+    request = PlanRequest(**wanted)
+    plain = planned(surface, model or DepositionModel(), request, frame_id, progress)
+    return optimised(plain, progress) if request.optimise else plain
 
 
+@takes(PlanRequest)
 def plan_faces(
     surface: Surface,
     model: DepositionModel | None = None,
@@ -70,7 +70,6 @@ def plan_faces(
     frame_id: str = 'part',
     face_angle_deg: float = math.degrees(WIDEST_RAD),
     envelope: GunEnvelope | None = None,
-    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> PartPlan:
@@ -78,15 +77,15 @@ def plan_faces(
 
     Args:
         surface, model, frame_id, progress, wanted: as for ``plan``. With ``outward``, faces on the
-            back are left out.
+            back are left out; ``optimise`` chooses the speeds along the passes for an even film on
+            all faces together.
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
         envelope: of the gun, for the check that it keeps clear of the part.
-        optimise: choose the speeds along the passes for an even film on all faces together.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
     return planned_faces(
         surface, model or DepositionModel(), PlanRequest(**wanted), frame_id,
-        math.radians(face_angle_deg), envelope, optimise, progress,
+        math.radians(face_angle_deg), envelope, progress,
     )  # fmt: skip

@@ -1,4 +1,4 @@
-"""The film that a recorded motion leaves on a part."""
+"""The film that recorded motions leave on a part, and how the guns ran over it."""
 
 from __future__ import annotations
 
@@ -8,150 +8,146 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import GunOnPart, look_at_guns, require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.between_brushes import by_set_points
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
+from paint_deposition.film.film import Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
-from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
-from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
+from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.part.facing import toward_the_guns
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class GunFilm:
-    """What one of the guns on a part did.
+class GunOnPart:
+    """A part and the motion of the gun over it.
 
     Attributes:
-        name: of the gun, '' for the only one.
-        trajectory: its motion as recorded; path: the same cut into sub-steps; counts: its poses.
-        model: its deposition model.
-        geometry: how it ran over the part.
-        painted_volume_cm3: solids that it laid on the part, before effects on the film [cm3].
-        emitted_volume_cm3: solids that a part which catches everything would get of it [cm3].
+        surface: the part, its outward side turned to the gun.
+        trajectory: the motion as recorded; path: the same cut into sub-steps; counts: its poses.
+        geometry: how the gun ran over the part, and what is odd.
     """
 
-    name: str
+    surface: Surface
     trajectory: Trajectory
     path: SprayPath
     counts: PoseCounts
-    model: DepositionModel
     geometry: SprayGeometry
-    painted_volume_cm3: float
-    emitted_volume_cm3: float
+
+    def __repr__(self) -> str:
+        return f'GunOnPart({self.geometry.sentence})'
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the mesh and the recording for the user."""
+        return (*self.surface.notes, *self.trajectory.notes)
 
     def to_dict(self) -> dict[str, Any]:
         """Figures by name."""
         return {
-            'name': self.name,
-            'trajectory': self.trajectory.source,
-            'effects': [effect.id for effect in self.model.effects],
-            'spraying_time_s': self.path.spraying_time_s,
-            'painted_volume_cm3': self.painted_volume_cm3,
-            'emitted_volume_cm3': self.emitted_volume_cm3,
-            'poses': self.counts.to_dict(),
             'geometry': self.geometry.to_dict(),
-        }
-
-
-@dataclass(frozen=True)
-class Film:
-    """The film on a part, with all that it was computed from.
-
-    Attributes:
-        surface: the part, its outward side turned to the gun.
-        guns: what laid the film, one as a rule.
-        film_um: (V,) film at the vertices of the surface [um].
-        statistics: of the film, weighted by area.
-        readings: places where the gauge should be predicted, or None.
-        predicted_um: (N,) what the gauge should show at each of them [um], or None.
-        paint: that was sprayed.
-    """
-
-    surface: Surface
-    guns: tuple[GunFilm, ...]
-    film_um: np.ndarray
-    statistics: FilmStatistics
-    readings: Readings | None = None
-    predicted_um: np.ndarray | None = None
-    paint: PaintUsed = NO_PAINT
-
-    def __repr__(self) -> str:
-        s = self.statistics
-        return (
-            f'Film({s.mean_um:.1f} ± {s.std_dev_um:.1f} µm at {len(self.film_um)} vertices, '
-            f'{100 * s.coverage:.0f} % of {s.area_m2:.2f} m² painted)'
-        )
-
-    @property
-    def trajectory(self) -> Trajectory:
-        """The motion of the first gun, as recorded."""
-        return self.guns[0].trajectory
-
-    @property
-    def model(self) -> DepositionModel:
-        """The deposition model of the first gun."""
-        return self.guns[0].model
-
-    @property
-    def path(self) -> SprayPath:
-        """The motion of all guns, cut into sub-steps."""
-        return SprayPath.of_guns([gun.path for gun in self.guns])
-
-    @property
-    def counts(self) -> PoseCounts:
-        """What became of the poses of all guns."""
-        return PoseCounts.of_guns([gun.counts for gun in self.guns])
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """Remarks on the mesh and the recordings for the user."""
-        return (*self.surface.notes, *self._of_each(lambda gun: gun.trajectory.notes))
-
-    @property
-    def warnings(self) -> tuple[str, ...]:
-        """What is odd in the geometry, each with its likely cause."""
-        spraying_s = sum(gun.path.spraying_time_s for gun in self.guns)
-        bare = (
-            f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
-            f'sprays {spraying_s:.3g} s only'
-        )
-        odd = self._of_each(lambda gun: gun.geometry.warnings)
-        odd = odd or ((bare,) if self.statistics.coverage == 0.0 else ())
-        return (*odd, *self._of_each(lambda gun: impossible_brushes(gun.model)))
-
-    def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
-        return tuple(
-            f'{gun.name}: {line}' if gun.name else line for gun in self.guns for line in lines(gun)
-        )
-
-    def to_dict(self) -> dict[str, Any]:
-        """Figures of the film and of how it was painted, as in ``stats.json``.
-
-        The geometry is that of the first gun; `atomizers` has each.
-        """
-        return self.statistics.to_dict() | {
             'frame_id': self.trajectory.frame_id,
             'down': self.surface.down.tolist(),
-            'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
-            'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
-            'paint': paint_figures(self),
+            'area_m2': self.surface.area_m2,
             'poses': self.counts.to_dict(),
-            'geometry': self.guns[0].geometry.to_dict(),
-            'atomizers': [gun.to_dict() for gun in self.guns],
             'notes': list(self.notes),
-            'warnings': list(self.warnings),
         }
+
+
+def look_at(
+    surface: Surface,
+    trajectory: Trajectory,
+    model: DepositionModel | None = None,
+    *,
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+) -> GunOnPart:
+    """Set a motion beside a part, as ``simulate`` does, without painting it.
+
+    Args:
+        surface: the part; it is turned round, with a note, if the gun looks at its back.
+        trajectory: poses and trigger in the frame of the mesh.
+        model: its pattern and projection say where the spray goes; default: a 50 mm bell.
+        max_pose_gap_s: a longer time between two poses counts as gun off [s].
+
+    Raises:
+        RecordingError: the poses make no motion, or the gun never sprays.
+    """
+    if model is not None:
+        require_brushes(trajectory, model)
+    model = model or DepositionModel()
+    return look_at_guns(surface, [trajectory], [model], max_pose_gap_s=max_pose_gap_s)[0]
+
+
+def look_at_guns(
+    surface: Surface,
+    trajectories: Sequence[Trajectory],
+    models: Sequence[DepositionModel],
+    *,
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+) -> list[GunOnPart]:
+    """The same for several guns on one part, each with its motion and its model.
+
+    The first gun whose axis meets the part says which side of it is outward.
+    """
+    paths = []
+    for trajectory, model in zip(trajectories, models, strict=True):
+        path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
+        _require_motion(trajectory.source, path, counts, max_pose_gap_s)
+        require_spraying(trajectory, path)
+        paths.append((path, counts))
+    surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p, _ in paths))
+    return [
+        GunOnPart(
+            surface, trajectory, path, counts,
+            spray_geometry(surface, path, model, trajectory.frame_id),
+        )
+        for trajectory, model, (path, counts) in zip(trajectories, models, paths, strict=True)
+    ]  # fmt: skip
+
+
+def require_brushes(trajectory: Trajectory, model: DepositionModel) -> None:
+    """Refuse a motion with brushes that the model does not have.
+
+    Raises:
+        ModelError: naming the motion and the brushes there are.
+    """
+    try:
+        model.require_brushes(trajectory.brushes)
+    except ModelError as error:
+        raise ModelError(f'{trajectory.source}: {error}') from None
+
+
+def _require_motion(
+    source: str, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
+) -> None:
+    if len(path):
+        return
+    reasons = {
+        'not finite': counts.not_finite,
+        'without a unit quaternion': counts.not_unit_quaternions,
+        'with a repeated stamp': counts.repeated_stamps,
+        'with a backward stamp': counts.backward_stamps,
+        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
+    }
+    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
+    raise RecordingError(
+        f'{source}: no two of its {counts.received} poses make a motion'
+        f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
+    )
 
 
 def simulate(
@@ -190,9 +186,10 @@ def simulate(
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
-    given, told = models, [by_set_points(m, its) for m, its in zip(motions, models, strict=True)]
-    motions, models = [motion for motion, _ in told], [its for _, its in told]
-    for motion, its_model in told:
+    given = models
+    pairs = [by_set_points(motion, its) for motion, its in zip(motions, models, strict=True)]
+    motions, models = [motion for motion, _ in pairs], [its for _, its in pairs]
+    for motion, its_model in pairs:
         require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
@@ -252,10 +249,10 @@ def _painted(
     before, steps = 0, sum(len(gun.path) for gun in seen)
     for gun, model in zip(seen, models, strict=True):
 
-        def tell(done: int, before: int = before) -> None:
+        def report(done: int, before: int = before) -> None:
             progress('painting', (before + done) / steps)
 
         integrators.append(FilmIntegrator(points, model, precision, surface.occluder))
-        integrators[-1].add(gun.path, tell)
+        integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))

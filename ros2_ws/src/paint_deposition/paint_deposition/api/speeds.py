@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from paint_deposition.motion.driven_speed import DrivenSpeed, driven_speed
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
 from paint_deposition.motion.trajectory import Trajectory
 
 

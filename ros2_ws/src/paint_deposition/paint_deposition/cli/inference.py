@@ -1,10 +1,10 @@
-"""Commands that set the model against readings: `compare`, `diagnose` and `refit`."""
+"""Commands that set the model against readings: `calibrate`, `compare`, `diagnose`, `refit`."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
@@ -16,6 +16,7 @@ from paint_deposition.cli.options import (
     JSON,
     PART_POSE,
     PICTURES,
+    file_lines,
     geometry_lines,
     model_option,
     output_option,
@@ -27,10 +28,6 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.report.drawing import DrawingProcess
-
-if TYPE_CHECKING:
-    from paint_deposition.files.model_file import ModelFile
 
 OUTPUT = output_option('the results')
 MODEL = model_option("Model to start from; default: the campaign's, else that of a 50 mm bell.")
@@ -38,10 +35,60 @@ SEED = seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
     'always the same'
 )
-OWN_EFFECTS = click.option(
-    '--effect-file', 'effect_files', multiple=True, type=FILE,
-    help='Python file with an effect of your own to consider as well; may be repeated.',
-)  # fmt: skip
+
+
+@click.command('calibrate')
+@CAMPAIGN
+@MODEL
+@output_option('model.yaml, calibration.json and pictures')
+@seed_option('the starts of the fit')
+@PART_POSE
+@PICTURES
+@JSON
+def calibrate_command(
+    campaign: Path,
+    model_file: Path | None,
+    output: Path,
+    seed: int,
+    part_pose: list[float] | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    """Fit the bell's pattern to the gauge readings of CAMPAIGN.
+
+    Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
+    effects of the model to start from are fitted as well; its projection is kept.
+    """
+    with Progress('calibrate') as show:
+        data, start = read_inputs(campaign, model_file, show, part_pose)
+        result = pd.calibrate(data, start.model if start else None, seed=seed, progress=show)
+        show('writing')
+        files = write_results(result, output, start=start, pictures=pictures)
+    say_geometry(result)
+    if not as_json:
+        say_all('note', data.understood)
+        say_all('warning', result.warnings)
+    lines = [*_calibration_lines(result), *file_lines(files)]
+    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
+    say_results(files, as_json, lines, model=words)
+
+
+def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
+    yield from geometry_lines(result)
+    for value in result.parameters:
+        mark = '' if value.determined else '   not determined'
+        yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
+    for experiment, found in zip(result.study.campaign.experiments, result.residuals, strict=True):
+        yield (
+            f'{experiment.name}: {len(found)} points, mean {found.measured_um.mean():.2f} µm '
+            f'measured, {found.predicted_um.mean():.2f} predicted, residual SD '
+            f'{found.sd_um:.2f} µm'
+        )
+    noise = result.study.noise
+    yield (
+        f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
+        f'{noise.typical_um:.2f} µm ({noise.source})'
+    )
 
 
 @click.command('compare')
@@ -68,26 +115,27 @@ def compare_command(
     Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
     report.html. With several models there is a table of residuals for each, and no meshes.
     """
-    with Progress('compare') as tell, DrawingProcess('profiles') as drawing:
-        if len(model_files) > 1:
-            data, _ = read_inputs(campaign, None, tell, part_pose)
+    several = len(model_files) > 1
+    model_file = model_files[0] if len(model_files) == 1 else None
+    with Progress('compare') as show:
+        data, start = read_inputs(campaign, model_file, show, part_pose)
+        result: pd.Comparison | pd.SideBySide
+        if several:
             models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
-            beside = pd.compare_models(data, models, progress=tell)
-            tell('writing the report')
-            files = write_results(beside, output, pictures=pictures, drawing=drawing)
-            words = ', '.join(map(str, model_files))
-            say_results(files, as_json, _side_by_side_lines(beside, output), model=words)
-            return
-        model_file = model_files[0] if model_files else None
-        data, start = read_inputs(campaign, model_file, tell, part_pose)
-        comparison = pd.compare(data, start.model if start else None, progress=tell)
-        tell('writing the report')
-        files = write_results(comparison, output, pictures=pictures, drawing=drawing)
+            result = pd.compare_models(data, models, progress=show)
+        else:
+            result = pd.compare(data, start.model if start else None, progress=show)
+        show('writing the report')
+        files = write_results(result, output, pictures=pictures)
     say_all('note', data.understood)
-    say_geometry(comparison)
-    say_all('warning', comparison.warnings)
-    words = campaign_model_words(data, model_file, start, fitted='')
-    say_results(files, as_json, _comparison_lines(comparison, output), model=words)
+    if isinstance(result, pd.SideBySide):
+        lines, words = _side_by_side_lines(result, output), ', '.join(map(str, model_files))
+    else:
+        say_geometry(result)
+        say_all('warning', result.warnings)
+        lines = _comparison_lines(result, output)
+        words = campaign_model_words(data, model_file, start, fitted='')
+    say_results(files, as_json, lines, model=words)
 
 
 def _names(files: tuple[Path, ...]) -> list[str]:
@@ -135,21 +183,15 @@ def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
 @CAMPAIGN
 @MODEL
 @OUTPUT
-@OWN_EFFECTS
+@click.option(
+    '--effect-file', 'effect_files', multiple=True, type=FILE,
+    help='Python file with an effect of your own to consider as well; may be repeated.',
+)  # fmt: skip
 @SEED
 @PART_POSE
 @PICTURES
 @JSON
-def diagnose_command(
-    campaign: Path,
-    model_file: Path | None,
-    output: Path,
-    effect_files: tuple[Path, ...],
-    seed: int,
-    part_pose: list[float] | None,
-    pictures: str,
-    as_json: bool,
-) -> None:
+def diagnose_command(effect_files: tuple[Path, ...], **given: Any) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
 
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
@@ -158,18 +200,11 @@ def diagnose_command(
     from paint_deposition.effects.user_effects import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
-    with Progress('diagnose') as tell, DrawingProcess('profiles') as drawing:
-        data, start = read_inputs(campaign, model_file, tell, part_pose)
-        diagnosis = pd.diagnose(
-            data, start.model if start else None, posterior=start.posterior if start else None,
-            own_effects=own, seed=seed, progress=tell,
-        )  # fmt: skip
-        files = _write(diagnosis, output, start, tell, pictures, drawing)
-    say_all('note', data.understood)
-    say_geometry(diagnosis)
-    say_all('warning', diagnosis.warnings)
-    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
+
+    def diagnosed(data: pd.Campaign, *start: Any, **options: Any) -> pd.Diagnosis:
+        return pd.diagnose(data, *start, own_effects=own, **options)
+
+    _diagnose(Progress('diagnose'), diagnosed, **given)
 
 
 @click.command('refit')
@@ -185,16 +220,7 @@ def diagnose_command(
 @PART_POSE
 @PICTURES
 @JSON
-def refit_command(
-    campaign: Path,
-    effect: str,
-    model_file: Path | None,
-    output: Path,
-    seed: int,
-    part_pose: list[float] | None,
-    pictures: str,
-    as_json: bool,
-) -> None:
+def refit_command(effect: str, **given: Any) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
@@ -207,13 +233,34 @@ def refit_command(
         added = None
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
-    with Progress('refit') as tell, DrawingProcess('profiles') as drawing:
-        data, start = read_inputs(campaign, model_file, tell, part_pose)
-        diagnosis = pd.refit(
-            data, added, start.model if start else None,
-            posterior=start.posterior if start else None, seed=seed, progress=tell,
-        )  # fmt: skip
-        files = _write(diagnosis, output, start, tell, pictures, drawing)
+
+    def refitted(data: pd.Campaign, *start: Any, **options: Any) -> pd.Diagnosis:
+        return pd.refit(data, added, *start, **options)
+
+    _diagnose(Progress('refit'), refitted, **given)
+
+
+def _diagnose(
+    progress: Progress,
+    diagnosed: Callable[..., pd.Diagnosis],
+    campaign: Path,
+    model_file: Path | None,
+    output: Path,
+    seed: int,
+    part_pose: list[float] | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    with progress as show:
+        data, start = read_inputs(campaign, model_file, show, part_pose)
+        model, posterior = (start.model, start.posterior) if start else (None, None)
+        diagnosis = diagnosed(data, model, posterior=posterior, seed=seed, progress=show)
+        show('comparing before and after')
+        _ = diagnosis.comparisons
+        show('looking for what to measure and spray next')
+        _ = diagnosis.proposals
+        show('writing the report')
+        files = write_results(diagnosis, output, start=start, pictures=pictures)
     say_all('note', data.understood)
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
@@ -221,25 +268,14 @@ def refit_command(
     say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
 
 
-def _write(
-    diagnosis: pd.Diagnosis,
-    output: Path,
-    start: ModelFile | None,
-    tell: Progress,
-    pictures: str,
-    drawing: DrawingProcess,
-) -> list[Path]:
-    tell('comparing before and after')
-    _ = diagnosis.comparisons
-    tell('looking for what to measure and spray next')
-    _ = diagnosis.proposals
-    tell('writing the report')
-    return write_results(diagnosis, output, start=start, pictures=pictures, drawing=drawing)
-
-
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     from paint_deposition.effects.learned.law import LearnedLaw
-    from paint_deposition.report.words import apart_words, effect_name, learned_words, sureness
+    from paint_deposition.report.words import (
+        effect_name,
+        learned_words,
+        probability_words,
+        separation_words,
+    )
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -247,7 +283,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
-        yield f'  {label}{effects.best}: {sureness(effects)}{others}'
+        yield f'  {label}{effects.best}: {probability_words(effects)}{others}'
         law = diagnosis.model.effect(effects.best)
         if isinstance(law, LearnedLaw):
             shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
@@ -269,7 +305,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
         todo = f'spray {spray.what}, and measure {spray.readings} points'
-        yield f'next: {todo}: {apart_words(spray)}'
+        yield f'next: {todo}: {separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in diagnosis.study.notes:

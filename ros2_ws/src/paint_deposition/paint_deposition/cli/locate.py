@@ -19,15 +19,14 @@ from paint_deposition.cli.options import (
 from paint_deposition.cli.progress import Progress
 
 if TYPE_CHECKING:
-    from paint_deposition.motion.touched_points import PartPlace
+    from paint_deposition.motion.part_location import PartPlace
 
 
 @click.command('locate')
 @click.option(
-    '--touched',
-    type=FILE,
+    '--touched', type=FILE,
     help='Points of the part that the robot touched, in its frame: CSV with point, x, y, z.',
-)
+)  # fmt: skip
 @click.option(
     '--points', type=FILE, help='The same points in the frame of the part, by the same names.'
 )
@@ -35,18 +34,12 @@ if TYPE_CHECKING:
 @click.option('--mesh', type=FILE, help='The part, for --scan.')
 @pose_option('--start', 'Pose of the part to begin with; default: found from the shapes.')
 @click.option(
-    '--pose-unit',
-    type=click.Choice(['m', 'mm', 'cm']),
-    help='Unit of points whose headings tell none.',
-)
+    '--pose-unit', type=click.Choice(['m', 'mm', 'cm']),
+    help='Unit of points whose headings have none.',
+)  # fmt: skip
 @MESH_SCALE
-@click.option(
-    '--scan-scale',
-    default=1.0,
-    show_default=True,
-    type=POSITIVE,
-    help='Metres per unit of the scan.',
-)
+@click.option('--scan-scale', default=1.0, show_default=True, type=POSITIVE,
+              help='Metres per unit of the scan.')  # fmt: skip
 @JSON
 def locate_command(
     touched: Path | None,
@@ -71,8 +64,8 @@ def locate_command(
     if touched and points and not (scan or mesh or start):
         place = locate_by_points(touched, points, pose_unit)
     elif scan and mesh and not (touched or points):
-        with Progress('locate') as tell:
-            tell('fitting the scan to the part')
+        with Progress('locate') as show:
+            show('fitting the scan to the part')
             place = locate_by_scan(scan, mesh, start, scan_scale, mesh_scale)
     else:
         raise click.UsageError('give --touched and --points, or --scan and --mesh')

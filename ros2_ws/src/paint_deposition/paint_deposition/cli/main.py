@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import importlib
 import os
 import sys
@@ -16,13 +15,11 @@ from paint_deposition.errors import PaintError, did_you_mean
 # be set before NumPy is loaded.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-OBJECTS_BETWEEN_SEARCHES = 100_000
-
 # Command, the module with its function, COMMAND_command, and what the list of commands says.
 # Modules are only loaded when their command is used, so that help comes at once.
 COMMANDS = {
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('calibrate', "Fit the bell's pattern to gauge readings."),
+    'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
     'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
@@ -30,11 +27,11 @@ COMMANDS = {
     'compare': ('inference', 'Set the model beside gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
-    'sweep': ('sweep', 'Many variations of one job, on all cores or a cluster.'),
-    'line': ('line', 'Many parts over days: what they share and what changes.'),
+    'sweep': ('batch', 'Many variations of one job, on all cores or a cluster.'),
+    'line': ('batch', 'Many parts over days: what they share and what changes.'),
     'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'runs': ('runs', 'List what a cell has painted, part by part, with figures.'),
+    'runs': ('recordings', 'List what a cell has painted, part by part, with figures.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 
@@ -87,7 +84,7 @@ def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> N
 def paint(context: click.Context) -> None:
     """Film build of robotic bells: from recordings and gauge readings to a model that fits.
 
-    Lengths are in metres, film in micrometres. `paint COMMAND --help` tells more.
+    Lengths are in metres, film in micrometres. `paint COMMAND --help` says more.
     """
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
@@ -95,12 +92,7 @@ def paint(context: click.Context) -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run a command: exit code 0, 2 with one line on stderr for bad input, 130 for Ctrl-C."""
-    # Nearly all that a command makes lives to its end: looking for cycles would find none.
-    gc.set_threshold(OBJECTS_BETWEEN_SEARCHES)
-    code = run(arguments)
-    # Else Python looks through all that is loaded once more before it ends: for half a second.
-    gc.freeze()
-    sys.exit(code)
+    sys.exit(run(arguments))
 
 
 def run(arguments: list[str] | None = None) -> int:

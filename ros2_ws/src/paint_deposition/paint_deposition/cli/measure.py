@@ -19,9 +19,7 @@ from paint_deposition.cli.options import (
     MESH,
     MESH_SCALE,
     MODEL,
-    NUMBER,
     PICTURES,
-    POSITIVE,
     direction_option,
     file_lines,
     max_edge_length_option,
@@ -29,15 +27,14 @@ from paint_deposition.cli.options import (
     output_option,
     say_all,
     say_results,
-    seed_option,
     write_results,
 )
+from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
+from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 
 if TYPE_CHECKING:
     import numpy as np
-
-    from paint_deposition.cli.model_choice import ChosenModel
 
 # Below this probability an effect is named as one that the part hardly shows.
 HARDLY = 0.15
@@ -52,19 +49,9 @@ HARDLY = 0.15
 )  # fmt: skip
 @MODEL
 @BRUSH
-@click.option('--points', default=60, show_default=True, help='How many points.')
-@click.option(
-    '--repeats', default=8, show_default=True,
-    help='Points to be read twice, which tell the noise of the gauge; 0 if you know it.',
-)  # fmt: skip
-@click.option(
-    '--foot-m', default=0.015, show_default=True, type=POSITIVE,
-    help="Radius of the gauge's foot: points keep this far off edges and bends.",
-)  # fmt: skip
-@click.option('--target-um', type=NUMBER, help='Mean film of passes to be planned [µm].')
-@click.option('--speed', 'speed_m_per_s', type=NUMBER, help='Speed of passes to be planned [m/s].')
+@options_of(MeasureRequest)
+@options_of(FilmBuild, into='passes')
 @output_option('points.csv, poses.csv, points.mod, points.png and measure.json')
-@seed_option('the places tried and the noise simulated')
 @motion_options
 @MESH_SCALE
 @BODY
@@ -76,12 +63,12 @@ HARDLY = 0.15
 @PICTURES
 @JSON
 def measure_command(
+    request: MeasureRequest,
+    passes: FilmBuild,
     mesh: Path,
     trajectory: Path | None,
     model_file: Path | None,
     brush: int,
-    target_um: float | None,
-    speed_m_per_s: float | None,
     output: Path,
     motion: dict[str, Any],
     mesh_scale: float,
@@ -90,21 +77,19 @@ def measure_command(
     down: np.ndarray | None,
     pictures: str,
     as_json: bool,
-    **wanted: Any,
 ) -> None:
     """Choose where to put the gauge on a part, so that missing effects are found soonest.
 
     Fill the column thickness_um of points.csv and give that file as the measurements of a
     campaign.
     """
-    passes: dict[str, Any] = {'target_um': target_um, 'speed_m_per_s': speed_m_per_s}
-    if trajectory is None and not any(passes.values()):
+    if trajectory is None and passes == FilmBuild():
         raise click.UsageError(
             'it is not said how the part is painted; give --trajectory, or --target-um for passes '
             'as `plan` would lay them'
         )
-    with Progress('measure') as tell:
-        tell('reading')
+    with Progress('measure') as show:
+        show('reading')
         chosen = (
             model_for(model_file, trajectory)
             if trajectory
@@ -113,17 +98,20 @@ def measure_command(
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         warnings: tuple[str, ...] = ()
         if trajectory is None:
-            recorded = pd.plan(surface, chosen.model, progress=tell, **passes).trajectory
+            recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
         else:
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
-        result = _chosen(surface, recorded, chosen, tell, wanted)
+        posterior = chosen.file.posterior if chosen.file else None
+        result = pd.choose_readings(
+            surface, recorded, chosen.model, posterior=posterior, progress=show, **dict(request)
+        )
         made_from = {
             'mesh_file': str(mesh),
             'trajectory': str(trajectory or ''),
             'model_file': str(chosen.path or ''),
         }
-        tell('writing and drawing')
+        show('writing and drawing')
         files = write_results(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
@@ -131,20 +119,6 @@ def measure_command(
     say_all('note', result.surface.notes)
     say_all('warning', warnings)
     say_results(files, as_json, [*_lines(result), *file_lines(files)], model=chosen.words)
-
-
-def _chosen(
-    surface: pd.Surface,
-    recorded: pd.Trajectory,
-    chosen: ChosenModel,
-    tell: Progress,
-    wanted: dict[str, Any],
-) -> pd.ChosenReadings:
-    """The points, with all that the model's file tells of it."""
-    posterior = chosen.file.posterior if chosen.file else None
-    return pd.choose_readings(
-        surface, recorded, chosen.model, posterior=posterior, progress=tell, **wanted
-    )
 
 
 def _lines(result: pd.ChosenReadings) -> Iterator[str]:

@@ -40,22 +40,12 @@ class ChosenModel:
         return model.with_brush(self.brush) if self.brush else model
 
 
-def chosen_model(
-    given: Path | None,
-    otherwise: str = 'default, a 50 mm bell; --model gives another',
-    brush: int = 0,
-) -> ChosenModel:
-    """The model named with --model, else the default.
-
-    Args:
-        given: the file, or None.
-        otherwise: what to say of the default.
-        brush: that of --brush, 0 for none.
-    """
+def chosen_model(given: Path | None, brush: int = 0) -> ChosenModel:
+    """The model named with --model, else the default; brush: that of --brush, 0 for none."""
     from paint_deposition.files.model_file import read_model_file
 
     if given is None:
-        return ChosenModel(None, None, otherwise, brush)
+        return ChosenModel(None, None, 'default, a 50 mm bell; --model gives another', brush)
     file = read_model_file(given)
     words = f'{_words(given, file)}, brush {brush}' if brush else _words(given, file)
     return ChosenModel(file, given, words, brush)
@@ -95,10 +85,7 @@ def models_for(
 ) -> list[ChosenModel]:
     """The model of each gun: one of those named with --model, else as ``model_for`` has it.
 
-    Args:
-        given: none, one for all guns or one for each.
-        motions: a file for all guns or one for each.
-        guns: their names, for the words.
+    Models and motions are given once for all guns or once for each.
 
     Raises:
         ModelError: there are models for some guns only.

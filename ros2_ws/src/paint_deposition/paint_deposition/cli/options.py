@@ -49,8 +49,7 @@ PICTURES = click.option(
 )  # fmt: skip
 PARETO = click.option(
     '--pareto', is_flag=True,
-    help='Also weigh paint from nothing to heavily: pareto.csv and a picture of evenness over '
-    'paint.',
+    help='Sweep the weight of the paint and plot the Pareto front of evenness over paint.',
 )  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
@@ -103,7 +102,7 @@ def _vector(
     import numpy as np
 
     if not any(given):
-        raise click.BadParameter('0 0 0 is none; give a direction, 0 0 -1 say', ctx, param)
+        raise click.BadParameter('0 0 0 has no direction; give a direction, as 0 0 -1', ctx, param)
     return np.array(given)
 
 
@@ -122,19 +121,10 @@ def _pose(
     return list(given)
 
 
-def _listed(
-    ctx: click.Context, param: click.Parameter, given: tuple[str, ...] | None
-) -> list[str] | None:
-    return None if given is None else list(given)
-
-
-GUN_SIGNAL = click.option(
-    '--gun-signal', help='Digital output that opens the gun, for a RAPID module that sets several.'
-)
 MESH_SCALE = click.option(
     '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-    help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP tell their '
-    'unit: leave it out there.',
+    help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP name '
+    'their unit: leave it out there.',
 )  # fmt: skip
 BODY = click.option(
     '--body', help='The one body to take of a mesh file with several; default: all as one part.'
@@ -159,55 +149,39 @@ PART_POSE = pose_option(
 MOTION = (
     click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),
     click.option(
-        '--state-topic',
-        '--trigger',
-        'state_topic',
+        '--state-topic', '--trigger', 'state_topic',
         help='Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
         'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: it '
         'sprays whenever poses flow.',
     ),
-    GUN_SIGNAL,
     click.option(
-        '--tf',
-        nargs=2,
-        metavar='TARGET SOURCE',
-        callback=_listed,
+        '--gun-signal',
+        help='Digital output that opens the gun, for a RAPID module that sets several.',
+    ),
+    click.option(
+        '--tf', nargs=2, metavar='TARGET SOURCE',
+        callback=lambda ctx, param, given: None if given is None else list(given),
         help='Take the poses from the transforms of the bag: frame SOURCE, the TCP, in TARGET.',
     ),
     click.option(
         '--urdf', type=click.Path(), help='Take the poses from joint states and this robot.'
     ),
+    click.option('--tip', '--tip-link', 'tip_link',
+                 help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
+    click.option('--base', '--base-link', 'base_link',
+                 help='Link of the URDF for the frame of the poses; default: its root.'),
+    click.option('--pose-unit', type=click.Choice(['m', 'mm', 'cm']),
+                 help='Unit of x, y, z in a table of poses whose headings have none.'),
     click.option(
-        '--tip',
-        '--tip-link',
-        'tip_link',
-        help='Link of the URDF that is the TCP; default: tool0, else its last link.',
-    ),
-    click.option(
-        '--base',
-        '--base-link',
-        'base_link',
-        help='Link of the URDF for the frame of the poses; default: its root.',
-    ),
-    click.option(
-        '--pose-unit',
-        type=click.Choice(['m', 'mm', 'cm']),
-        help='Unit of x, y, z in a table of poses whose headings tell none.',
-    ),
-    click.option(
-        '--rotation',
-        metavar='CONVENTION',
+        '--rotation', metavar='CONVENTION',
         help='Three numbers of an orientation in a table: rotvec, or Euler angles as ZYX (axes of '
         'the tool), xyz (fixed axes), kuka, abb, fanuc, rpy, staubli, kawasaki.',
     ),
-    click.option(
-        '--angle-unit',
-        type=click.Choice(['deg', 'rad']),
-        help='Unit of the angles in a table whose headings tell none.',
-    ),
+    click.option('--angle-unit', type=click.Choice(['deg', 'rad']),
+                 help='Unit of the angles in a table whose headings have none.'),
     click.option('--frame-id', help="Name of the part's frame; default: part."),
     PART_POSE,
-)
+)  # fmt: skip
 
 
 def motion_options(command: Callable) -> Callable:
@@ -235,23 +209,20 @@ def max_edge_length_option(default_m: float) -> Callable:
 def read_inputs(
     campaign: Path,
     model_file: Path | None,
-    tell: Callable[[str], None],
+    progress: Callable[[str], None],
     part_pose: list[float] | None = None,
 ) -> tuple[pd.Campaign, ModelFile | None]:
     """Read a campaign and the model to start from: the one given, or else the campaign's, if any.
 
-    `tell` gets each line of progress, stderr each note on an experiment. `part_pose` is that of
-    experiments without one of their own.
+    Notes and warnings on the experiments go to stderr. ``part_pose`` is that of experiments
+    without one of their own.
     """
     from paint_deposition.files.model_file import read_model_file
 
-    def show(line: str) -> None:
-        if line.startswith('reading '):
-            tell(line)
-        else:
-            click.echo(line if line.startswith('warning: ') else f'note: {line}', err=True)
+    def remark(kind: str, experiment: str, line: str) -> None:
+        say_all(kind, [f'{experiment}: {line}'])
 
-    data = pd.read_campaign(campaign, show, part_pose)
+    data = pd.read_campaign(campaign, progress, part_pose, remark)
     chosen = model_file or data.model_file
     return data, read_model_file(chosen) if chosen else None
 
@@ -294,7 +265,7 @@ def say_results(files: list[Path], as_json: bool, lines: Iterable[str], *, model
 
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
-    """Paint sprayed, transfer efficiency and wet film, where the model's brushes tell them."""
+    """Paint sprayed, transfer efficiency and wet film, where the model's brushes say enough."""
     from paint_deposition.film.paint_used import paint_sentence
 
     return (line for line in [paint_sentence(result)] if line)

@@ -18,13 +18,17 @@ class Progress:
     """A line that keeps counting the time, with a bar where the share of the work is known.
 
     Call it with what is being done and, where known, with the share of it that is done, 0 to 1.
+
+    Args:
+        command: its name, at the head of the line.
+        after_s: work that takes no longer shows nothing [s].
     """
 
-    def __init__(self, command: str) -> None:
-        self._command = command
+    def __init__(self, command: str, after_s: float = SHOW_PROGRESS_AFTER_S) -> None:
+        self._command, self._after_s = command, after_s
         self._bar = tqdm(
             total=1.0, desc=command, bar_format=LINE, disable=None, leave=False, file=sys.stderr,
-            delay=SHOW_PROGRESS_AFTER_S,
+            delay=after_s,
         )  # fmt: skip
         self._done = Event()
         self._clock = Thread(target=self._redraw, daemon=True)
@@ -47,7 +51,7 @@ class Progress:
 
     def _redraw(self) -> None:
         """Show the newest line again and again, so that the clock runs within a step too."""
-        pause_s = SHOW_PROGRESS_AFTER_S
+        pause_s = self._after_s
         while not self._done.wait(pause_s):
             self._bar.refresh()
             pause_s = REDRAWN_EVERY_S

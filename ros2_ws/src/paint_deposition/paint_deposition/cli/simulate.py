@@ -32,7 +32,6 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.progress import Progress
 from paint_deposition.files.parquet import require_libraries
-from paint_deposition.report.drawing import DrawingProcess
 
 if TYPE_CHECKING:
     import numpy as np
@@ -51,12 +50,9 @@ if TYPE_CHECKING:
     'NAME/atomizer/state; once for each gun.',
 )  # fmt: skip
 @click.option(
-    '--model',
-    'model_files',
-    type=FILE,
-    multiple=True,
+    '--model', 'model_files', type=FILE, multiple=True,
     help='Deposition model, YAML, one for all guns or one for each; default: a 50 mm bell.',
-)
+)  # fmt: skip
 @output_option('film.ply, film.csv, stats.json and film.png')
 @click.option(
     '--at', 'readings_file', type=FILE,
@@ -111,38 +107,33 @@ def simulate_command(
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     if parquet:
         require_libraries('--parquet')
-    with Progress('simulate') as tell, DrawingProcess('film') as drawing:
-        tell('loading')
-        from paint_deposition.files.gun_motions import read_gun_motions
+    with Progress('simulate') as show:
+        show('loading')
+        from paint_deposition.files.motion_files import read_gun_motions
         from paint_deposition.files.motion_source import MotionSource
         from paint_deposition.files.refusals import checked
 
-        tell('reading')
+        show('reading')
         source = checked(MotionSource, 'motion', motion, pd.PaintError)
         guns = read_gun_motions(trajectories, source, atomizers)
         chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
-        tell('refining the mesh')
+        show('refining the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
             surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
-            names=[gun.name for gun in guns], readings=readings, progress=tell, **wanted,
+            names=[gun.name for gun in guns], readings=readings, progress=show, **wanted,
         )  # fmt: skip
         made_from = {
             'mesh_file': str(mesh),
             'trajectory': ', '.join(map(str, trajectories)),
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
-        tell('writing and drawing')
+        show('writing and drawing')
         files = write_results(
-            film,
-            output,
-            made_from=made_from,
-            pictures=pictures,
-            drawing=drawing,
-            parquet=parquet,
+            film, output, made_from=made_from, pictures=pictures, parquet=parquet
         )
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])

@@ -28,7 +28,7 @@ def show_speeds(
         recorded, programme = pd.read_recording(path, **motion), pd.read_recording(programmed)
         speed = pd.compare_speeds(recorded, programme, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
-            from paint_deposition.report.pictures.driven_speed import write_speed_picture
+            from paint_deposition.report.pictures.motion import write_speed_picture
 
             tell('drawing')
             write_speed_picture(output, speed, f'{path.name} against {programmed.name}')

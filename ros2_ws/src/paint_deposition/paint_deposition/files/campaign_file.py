@@ -14,15 +14,18 @@ from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource, Number, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.files.tables.layout import Layout
-from paint_deposition.files.tables.words import UNITS_M, words_of
+from paint_deposition.files.tables.headings import length_of
+from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, spray_path
-from paint_deposition.motion.spraying import require_spraying
+from paint_deposition.motion.path_builder import (
+    DEFAULT_MAX_POSE_GAP_S,
+    require_spraying,
+    spray_path,
+)
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Readings are matched to the surface; a finer mesh only helps where the surface is strongly
 # curved.
@@ -34,6 +37,8 @@ _QUANTITIES = ', '.join(get_args(Quantity))
 
 
 Name = Annotated[str, BeforeValidator(str)]
+# Called with 'note' or 'warning', the name of an experiment and a line on it.
+Remark = Callable[[Literal['note', 'warning'], str, str], None]
 # Keys that only tell the reader of the report what it is about.
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
@@ -63,8 +68,7 @@ class _File(BaseModel, extra='forbid'):
     @property
     def head(self) -> dict[str, str]:
         """What is said of part and batch, by key."""
-        told = {key: getattr(self, key) for key in HEAD}
-        return {key: text for key, text in told.items() if text}
+        return {key: text for key in HEAD if (text := getattr(self, key))}
 
 
 class _Files(BaseModel):
@@ -130,14 +134,16 @@ def read_campaign(
     path: str | Path,
     progress: Callable[[str], None] = lambda line: None,
     part_pose: Sequence[float] | None = None,
+    remark: Remark = lambda kind, experiment, line: None,
 ) -> Campaign:
     """Read a campaign with all that it names.
 
     Args:
         path: YAML; paths in it are relative to it.
-        progress: called with a line for each experiment and each note on it.
+        progress: called with a line for each experiment.
         part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
             that has none of its own.
+        remark: called with 'note' or 'warning', the experiment's name and what is odd about it.
 
     Raises:
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
@@ -154,7 +160,7 @@ def read_campaign(
         if part_pose is not None and entry.part_pose is None:
             entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
-            experiments.append(_read_experiment(path.parent, name, entry, progress))
+            experiments.append(_read_experiment(path.parent, name, entry, remark))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     return Campaign(
@@ -183,9 +189,7 @@ def _start(path: Path, file: _File) -> str | None:
     return None if file.model is None else str(path.parent / file.model)
 
 
-def _read_experiment(
-    folder: Path, name: str, entry: _Entry, progress: Callable[[str], None]
-) -> Experiment:
+def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> Experiment:
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     motions = _motions(folder, entry)
     files |= _named([file for file, *_ in motions])
@@ -198,12 +202,12 @@ def _read_experiment(
         require_spraying(trajectory, path)
         paths.append(_with_brush(path, brush))
         if counts.rejected:
-            progress(f'{name}: {counts.rejected} of {counts.received} poses dropped')
+            remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
     for note in (*surface.notes, *(note for t in trajectories for note in t.notes)):
-        progress(f'{name}: {note}')
+        remark('note', name, note)
     for warning in (warning for t in trajectories for warning in t.warnings):
-        progress(f'warning: {name}: {warning}')
+        remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
     readings = read_readings(files['measurements'], points, _layout(entry), surface)
     off = frozenset(entry.switched_off)
@@ -254,10 +258,10 @@ def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
     """The path with the brush that the campaign names for it."""
     if number is None:
         return path
-    told = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
-    if told:
+    named = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
+    if named:
         raise ReadingsError(
-            f'brush is {number}, and the recording names {listed(told)}; leave it out'
+            f'brush is {number}, and the recording names {listed(named)}; leave it out'
         )
     return path.with_(brush=np.full(len(path), number))
 
@@ -265,7 +269,7 @@ def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
 def _layout(entry: _Entry) -> Layout:
     return Layout(
         columns=entry.columns,
-        unit={kind: UNITS_M[words_of(unit)[0]] for kind, unit in entry.unit.items()},
+        unit={kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
         decimal={None: '', 'comma': ',', 'point': '.'}[entry.decimal],
         sheet=entry.sheet or '',
     )

@@ -1,23 +1,27 @@
-"""Gauge readings from the files that gauges and spreadsheets write, and tables that we write."""
+"""Gauge readings and measuring points from the files that gauges and spreadsheets write."""
+
+from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from io import StringIO
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.measuring_points import MeasuringPoints, places_of
-from paint_deposition.files.tables.finding import read_table
-from paint_deposition.files.tables.layout import Layout
-from paint_deposition.files.tables.sheets import text_of
-from paint_deposition.files.tables.table import Table
-from paint_deposition.part.surface import Surface
+from paint_deposition.files.tables.headings import LENGTHS
+from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
+from paint_deposition.files.tables.reading_table import ReadingTable
+from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
+from paint_deposition.part.face_places import on_face_m
+from paint_deposition.part.surface import Surface
 
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0
+MOST_LABELS_SHOWN = 6
 
 
 def read_readings(
@@ -29,82 +33,154 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT or a workbook. The project's own columns are
+        path: CSV, TSV, TXT, Parquet or a workbook. The project's own columns are
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
-            ``session`` and ``nx,ny,nz``; others are known by the words of the trade. Without
-            labels, readings at exactly one place are repeats.
+            ``session`` and ``nx,ny,nz``; others are known by usual English and German headings.
+            Without labels, readings at exactly one place are repeats.
         points: file of the measuring points (label, x, y, z) of readings that name their point
             only.
-        layout: what the file does not tell itself.
+        layout: what the file does not say itself.
         surface: the part, for points that are given on its face.
 
     Raises:
         ReadingsError: what is wrong, with all lines at fault, and what to do.
     """
     path, layout = Path(path), layout or Layout()
-    table = read_table(path, 'thickness', layout)
-    thickness, row, film_words = table.films_um()
+    listed = None if points is None else MeasuringPoints.read(Path(points), layout, surface)
+    read = ReadingTable.read(path, 'thickness', layout, listed.labels if listed else ())
+    table = read.table
+    thickness, row, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
         span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
-        found = f'{table.heading("thickness")} is {thickness[k]:g}'
-        table.complaints.at(table.lines[row[k]], f'{found}; expected {span}')
-    if points is not None:
-        listed = MeasuringPoints.read(Path(points), layout, surface)
-        positions, normals, labels, place_words = listed.joined_to(table)
+        found = f'{read.heading("thickness")} is {thickness[k]:g}'
+        table.complain(row[k], f'{found}; expected {span}')
+    if listed is not None:
+        positions, normals, labels, place_words = listed.joined_to(read)
     else:
-        positions, normals, place_words = places_of(table, surface)
-        labels = _labels(table, positions)
-    sigma_um = _sigma_um(table)
-    table.complaints.refuse_any()
-    taken = table.select(row)
-    counted = f'{len(row)} readings'
-    parts = [f'{counted}, {table.form}', f'{place_words}, {film_words}', table.left_out]
+        positions, normals, place_words = _places(read, surface)
+        labels = _labels(read, positions)
+    sigma_um = np.full(len(read), np.nan)
+    if read.has('sigma'):
+        sigma_um = read.numbers('sigma', may_be_empty=True)
+        for k in np.flatnonzero(sigma_um <= 0.0):
+            text = f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0'
+            table.complain(k, text)
+    table.refuse_complaints()
+    said = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
     readings = Readings(
         positions[row],
         thickness,
         labels[row],
-        np.array(taken.texts('group')),
+        np.array(read.texts('group'))[row],
         sigma_um[row],
         None if normals is None else normals[row],
         str(path),
-        np.array(taken.texts('session')),
-        f'{path.name}: {"; ".join(filter(None, parts))}',
+        np.array(read.texts('session'))[row],
+        f'{path.name}: {"; ".join(filter(None, said))}',
     )
     require_repeats_close(readings)
     return readings
 
 
-def _labels(table: Table, positions_m: np.ndarray) -> np.ndarray:
-    if table.has('point'):
-        labels = zip(table.texts('point'), table.lines, strict=True)
-        return np.array([label or f'line {line}' for label, line in labels])
-    _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
-    return np.array([f'line {table.lines[row]}' for row in first[place.ravel()]])
+def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarray]:
+    """Positions (3,) [m] by the names of points, in the order of the table.
+
+    Args:
+        path: of a table with a column ``point`` and x, y, z.
+        unit: 'm', 'mm' or 'cm' where the headings have none.
+
+    Raises:
+        ReadingsError: what is wrong with the file.
+    """
+    given = Layout(unit={'position': LENGTHS[unit]} if unit else {})
+    points = MeasuringPoints.read(Path(path), given, None)
+    return dict(zip(points.labels, points.positions_m, strict=True))
 
 
-def _sigma_um(table: Table) -> np.ndarray:
-    if not table.has('sigma'):
-        return np.full(len(table), np.nan)
-    sigma_um, _ = table.numbers('sigma', may_be_empty=True)
-    for row in np.flatnonzero(sigma_um <= 0.0):
-        text = f'{table.heading("sigma")} is {sigma_um[row]:g}; expected above 0'
-        table.complaints.at(table.lines[row], text)
-    return sigma_um
+@dataclass(frozen=True)
+class MeasuringPoints:
+    """A list of points on a part.
+
+    Attributes:
+        path: of its file.
+        labels: one for each point.
+        positions_m: (P, 3) in the mesh frame [m].
+        normals: (P, 3) outward unit normals, or None.
+        words: what was understood, for the user.
+    """
+
+    path: Path
+    labels: list[str]
+    positions_m: np.ndarray
+    normals: np.ndarray | None
+    words: str
+
+    @staticmethod
+    def read(path: Path, layout: Layout, surface: Surface | None) -> MeasuringPoints:
+        """Read a list: point label and x, y, z, or from_left, height.
+
+        Raises:
+            ReadingsError: all that is wrong with the file.
+        """
+        read = ReadingTable.read(path, 'place', Layout(unit=layout.unit))
+        positions, normals, place_words = _places(read, surface)
+        quantity = 'point' if read.has('point') else 'number'
+        if not read.has(quantity):
+            raise read.table.error(
+                'the points have no labels; give a column point, with the labels of the readings'
+            )
+        labels = read.texts(quantity)
+        first: dict[str, int] = {}
+        for row, label in enumerate(labels):
+            other = first.setdefault(label, row)
+            if not label:
+                read.table.complain(row, 'the point has no label')
+            elif not np.array_equal(positions[row], positions[other]):
+                same = f"point '{label}' is elsewhere in line {read.table.lines[other]}"
+                read.table.complain(row, f'{same}; keep one')
+        read.table.refuse_complaints()
+        words = f'{place_words} of {len(labels)} points in {path.name} ({read.table.form})'
+        return MeasuringPoints(path, labels, positions, normals, words)
+
+    def joined_to(
+        self, readings: ReadingTable
+    ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, str]:
+        """Positions (N, 3) [m], normals, labels (N,) of the rows of readings, and what was done.
+
+        Rows that name no listed point are complained of in the table of readings.
+        """
+        quantity = 'point' if readings.has('point') else 'number'
+        if readings.has(quantity):
+            wanted, by = readings.texts(quantity), f"by '{readings.heading(quantity)}'"
+        else:
+            wanted, by = [str(k) for k in readings.order], 'by the order of the readings'
+        places = {label: row for row, label in enumerate(self.labels)}
+        for row, label in enumerate(wanted):
+            if label not in places:
+                known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
+                readings.table.complain(row, f"no point '{label}' in {self.path.name} ({known})")
+        rows = [places.get(label, 0) for label in wanted]
+        words = f'{self.words}, joined {by}'
+        if unmeasured := [label for label in self.labels if label not in set(wanted)]:
+            more = ', ...' if len(unmeasured) > MOST_LABELS_SHOWN else ''
+            named = ', '.join(unmeasured[:MOST_LABELS_SHOWN])
+            words += f' ({len(unmeasured)} of them without a reading: {named}{more})'
+        normals = None if self.normals is None else self.normals[rows]
+        return self.positions_m[rows], normals, np.array(wanted), words
 
 
-def write_predictions(
-    path: str | Path, readings_path: str | Path, predicted_um: np.ndarray
-) -> None:
-    """Write the readings' own columns with ``predicted_um`` (N,) added, whole or not at all.
+def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:
+    """Write the columns of the readings' file and ``predicted_um`` (N,), whole or not at all.
 
     A row with several readings is written once: they are at one place.
     """
-    table = read_table(Path(readings_path), 'thickness', Layout())
-    _, row, _ = table.films_um()
+    read = ReadingTable.read(Path(readings.source), 'thickness', Layout(), readings.point)
+    _, row, _ = read.films_um()
     rows, first = np.unique(row, return_index=True)
-    names = table.columns.headings
+    names = [heading.text for heading in read.columns.headings]
     kept = [k for k, name in enumerate(names) if name != 'predicted_um']
-    lines = [[text_of(table.rows[r][k]) for k in kept] for r in rows]
+    columns = [read.table.texts(k) for k in kept]
+    lines = [[column[r] for column in columns] for r in rows]
     for line, k in zip(lines, first, strict=True):
         line.append(f'{predicted_um[k]:.4f}')
     write_table(path, [[*(names[k] for k in kept), 'predicted_um'], *lines])
@@ -115,3 +191,65 @@ def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:
     text = StringIO(newline='')
     csv.writer(text, lineterminator='\n').writerows(lines)
     write_text(path, text.getvalue())
+
+
+def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
+    lines = read.table.lines
+    if read.has('point'):
+        labels = zip(read.texts('point'), lines, strict=True)
+        return np.array([label or f'line {line}' for label, line in labels])
+    _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
+    return np.array([f'line {lines[row]}' for row in first[place.ravel()]])
+
+
+def _places(
+    read: ReadingTable, surface: Surface | None
+) -> tuple[np.ndarray, np.ndarray | None, str]:
+    """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words.
+
+    Raises:
+        ReadingsError: the table does not say where its rows were taken.
+    """
+    table = read.table
+    if read.has(*AXES):
+        positions, words = read.lengths_m(AXES)
+        return positions, _normals(read), words
+    if read.has(*ON_FACE):
+        if surface is None:
+            raise table.error(
+                f"'{read.heading('from_left')}' and '{read.heading('height')}' are places on a "
+                'face; give x, y, z, or name the file in a campaign, which knows the part'
+            )
+        on_face, words = read.lengths_m(ON_FACE)
+        positions, hit = on_face_m(surface, on_face)
+        for row in np.flatnonzero(~hit & np.isfinite(on_face).all(axis=1)):
+            left, height = on_face[row]
+            table.complain(
+                row,
+                f'{left:.3f} m from the left and {height:.3f} m from the lower edge there is no '
+                'surface, as the gun sees the part',
+            )
+        return positions, None, words
+    missing = [axis for axis in AXES if not read.has(axis)]
+    if len(missing) < len(AXES):
+        raise table.error(
+            f'no column with numbers is known as {" or ".join(missing)} {shown(table.headings)}; '
+            f'give it with columns: {{{missing[0]}: ...}} in the campaign'
+        )
+    raise table.error(
+        f'the readings have no coordinates {shown(table.headings)}; give x, y, z, or a list of '
+        'measuring points (points: in a campaign, --points with simulate)'
+    )
+
+
+def _normals(read: ReadingTable) -> np.ndarray | None:
+    names = [name for name in NORMALS if read.has(name)]
+    if not names:
+        return None
+    if len(names) < len(NORMALS):
+        raise read.table.error(f'has {", ".join(names)} only; give all of nx,ny,nz or none')
+    normals = np.column_stack([read.numbers(name) for name in names])
+    lengths = np.linalg.norm(normals, axis=1)
+    for row in np.flatnonzero(lengths < 1e-6):
+        read.table.complain(row, 'the normal nx,ny,nz has length zero')
+    return normals / np.where(lengths < 1e-6, 1.0, lengths)[:, np.newaxis]

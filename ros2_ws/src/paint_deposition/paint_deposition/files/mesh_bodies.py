@@ -16,7 +16,7 @@ from paint_deposition.errors import MeshError, did_you_mean
 if TYPE_CHECKING:
     from trimesh import Scene
 
-# How each kind of file is told apart. Of those in the second row the unit is known.
+# Suffixes by kind. Of those in the second row the unit is known.
 PLAIN = ('.stl', '.ply', '.obj')
 WITH_UNIT = ('.gltf', '.glb', '.3mf', '.step', '.stp')
 SUFFIXES = (*PLAIN, *WITH_UNIT)
@@ -67,8 +67,8 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
     notes = []
     unit_m = 1.0
     if kind in WITH_UNIT:
-        unit_m, told = _unit(path, kind, scene)
-        notes.append(f'{path.name}: {told}')
+        unit_m, unit_words = _unit(path, kind, scene)
+        notes.append(f'{path.name}: {unit_words}')
     if body is not None:
         if body not in found:
             raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, found)}')

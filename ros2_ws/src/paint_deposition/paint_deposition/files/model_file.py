@@ -16,9 +16,9 @@ from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.brushes import read_brushes
 from paint_deposition.files.model_text import LEARNED_ID, model_text
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.files.refusals import Made, checked
 from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 

@@ -1,29 +1,33 @@
-"""Motions by the kind of their file, brought into the frame of the part."""
+"""Motions of guns from files of any kind, brought into the frame of the part."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.pose_tables.reading import PoseLayout, is_pose_table, read_pose_table
-from paint_deposition.files.rapid.motion import is_rapid, program_trajectory
-from paint_deposition.files.rapid.program import read_program
-from paint_deposition.files.recordings.bag_files import TRIGGER, custom_data
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
+from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
+from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.refusals import checked
+from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
 
-if TYPE_CHECKING:
-    from paint_deposition.files.recordings.joint_states import Robot
-    from paint_deposition.files.recordings.transforms import StaticFrames
-
 PART = 'part'
+
+
+@dataclass(frozen=True)
+class GunMotion:
+    """A gun by its name, '' for the only one, and its motion in the frame of the part."""
+
+    name: str
+    trajectory: Trajectory
 
 
 def read_recording(
@@ -49,13 +53,17 @@ def read_recording(
     return read_motion(path, checked(MotionSource, 'motion', given | more, RecordingError))
 
 
-def read_motion(path: str | Path, source: MotionSource) -> Trajectory:
-    """The same with the options as they come from a campaign or the command line."""
+def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajectory:
+    """The same with the options as they come from a campaign or the command line.
+
+    ``gun`` is the name of a gun whose topics in the bag stand behind it, '' for none.
+    """
     path = Path(path)
     if is_rapid(path):
         source.refuse_other(path, 'a RAPID module', 'gun_signal')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
-    elif is_pose_table(path):
+        return _brought_to_part(replace(recorded, source=str(path)), source, None)
+    if is_pose_table(path):
         source.refuse_other(
             path, 'a table of poses', 'state_topic', 'pose_unit', 'rotation', 'angle_unit'
         )
@@ -63,35 +71,78 @@ def read_motion(path: str | Path, source: MotionSource) -> Trajectory:
             source.state_topic, source.pose_unit, source.rotation, source.angle_unit
         )
         recorded = read_pose_table(path, layout)
-    else:
-        source.refuse_other(
-            path, 'a bag', 'pose_topic', 'state_topic', 'tf', 'urdf', 'tip_link', 'base_link'
-        )
-        # A plan's bag says itself what its trigger is.
-        planned = custom_data(path).get(TRIGGER)
-        trigger = source.state_topic or planned
-        recorded = read_trajectory(
-            path, source.pose_topic, trigger, source.tf, _robot(path, source)
-        )
-        if planned and not source.state_topic:
-            recorded = _noted(recorded, f'a plan: its trigger {planned} is used')
-    return _brought_to_part(replace(recorded, source=str(path)), source)
+        return _brought_to_part(replace(recorded, source=str(path)), source, None)
+    source.refuse_other(
+        path, 'a bag', 'pose_topic', 'state_topic', 'tf', 'urdf', 'tip_link', 'base_link'
+    )
+    with open_bag(path) as bag:
+        recorded = replace(_recorded(bag, source, gun), source=str(path))
+        return _brought_to_part(recorded, source, bag)
 
 
-def _robot(path: Path, source: MotionSource) -> Robot | None:
-    """The robot whose joints are recorded, None where poses are."""
+def read_gun_motions(
+    files: Sequence[Path], source: MotionSource, atomizers: Sequence[str] = ()
+) -> list[GunMotion]:
+    """Read the motion of each gun.
+
+    Args:
+        files: a bag, a RAPID module or a table for each gun, or one bag with all ``atomizers``.
+        source: what holds for each of them.
+        atomizers: names of guns in bags whose topics stand behind them, as
+            /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves.
+
+    Raises:
+        RecordingError: the names and the files do not go together, or a file cannot be read.
+    """
+    if not atomizers:
+        names = [file.stem for file in files]
+        if len(files) == 1:
+            names = ['']
+        elif len(set(names)) < len(names):
+            names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
+        motions = (read_motion(file, source) for file in files)
+        return [GunMotion(*pair) for pair in zip(names, motions, strict=True)]
+    if len(files) not in (1, len(atomizers)):
+        raise RecordingError(
+            f'{len(files)} files for {len(atomizers)} atomizers: give one with all of them, or '
+            'one for each'
+        )
+    if source.pose_topic or source.state_topic:
+        raise RecordingError(
+            'an atomizer is given by its name and by topics: leave out --atomizer, or '
+            '--pose-topic and --state-topic'
+        )
+    names = [name.strip('/') for name in atomizers]
+    each = list(files) * (len(names) if len(files) == 1 else 1)
+    motions = (read_motion(file, source, name) for name, file in zip(names, each, strict=True))
+    return [GunMotion(*pair) for pair in zip(names, motions, strict=True)]
+
+
+def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
+    """The motion as the bag has it."""
+    robot = None
     if source.urdf and source.tf:
-        raise RecordingError(f'{path}: both tf and urdf are given; leave one of them out')
+        raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
     if source.urdf:
         from paint_deposition.files.recordings.joint_states import Robot
 
-        return Robot.read(Path(source.urdf), source.tip_link, source.base_link)
-    if source.tip_link or source.base_link:
-        raise RecordingError(f'{path}: tip_link and base_link are links of a URDF; give --urdf')
-    return None
+        robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
+    elif source.tip_link or source.base_link:
+        raise RecordingError(
+            f'{bag.path}: tip_link and base_link are links of a URDF; give --urdf'
+        )
+    if gun:
+        state = bag.find(f'/{gun}{STATE_TOPIC}')
+        topics = f'/{gun}{POSE_TOPIC}', state and state.name
+        return trajectory_of(bag, *topics, source.tf, robot)
+    # A plan's bag says itself what its trigger is.
+    planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
+    trigger = source.state_topic or planned
+    recorded = trajectory_of(bag, source.pose_topic, trigger, source.tf, robot)
+    return _noted(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
 
 
-def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
+def _brought_to_part(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
     """By the pose of the part that is given, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
     if source.part_pose is not None:
@@ -106,17 +157,17 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource) -> Trajectory:
         return _noted(at_part(recorded, source.part_pose, part), said)
     if is_frame(named, part):
         return recorded
-    path = Path(recorded.source)
-    static = _static_frames(path)
-    place = static.pose_of(part, named)
-    if place is not None:
-        said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
-        return _noted(at_part(recorded, place.values, part), said + words(place))
-    from paint_deposition.files.recordings.transforms import poses_over_time
+    known = ''
+    if bag is not None:
+        from paint_deposition.files.recordings.transforms import StaticFrames, poses_over_time
 
-    if _has_frames(path) and (over_time := poses_over_time(path, part, named, recorded.stamps_ns)):
-        return _on_a_moving_part(recorded, part, *over_time)
-    known = static.words(named)
+        static = StaticFrames.in_bag(bag)
+        if place := static.pose_of(part, named):
+            said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
+            return _noted(at_part(recorded, place.values, part), said + words(place))
+        if over_time := poses_over_time(bag, part, named, recorded.stamps_ns):
+            return _on_a_moving_part(recorded, part, *over_time)
+        known = static.words(named)
     if source.frame_id:
         raise RecordingError(
             f"{recorded.source}: its poses are in frame '{named}', the mesh in '{part}', and no "
@@ -161,17 +212,6 @@ def _on_a_moving_part(
         )
         moved = replace(moved, warnings=(*moved.warnings, warning))
     return _noted(moved, f'/tf: {len(moved)} poses brought to the moving part, {frames}')
-
-
-def _static_frames(path: Path) -> StaticFrames:
-    from paint_deposition.files.recordings.transforms import StaticFrames
-
-    return StaticFrames.of(path) if _has_frames(path) else StaticFrames()
-
-
-def _has_frames(path: Path) -> bool:
-    """Only bags tell of frames."""
-    return not is_rapid(path) and not is_pose_table(path)
 
 
 def words(place: Rigid) -> str:

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.pose_tables.rotations import ROTATION_WORDS, is_rotation
+from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 
 Text = Annotated[str, Field(min_length=1)]

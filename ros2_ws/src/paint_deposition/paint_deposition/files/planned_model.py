@@ -13,7 +13,7 @@ from pathlib import Path
 
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.files.rapid.motion import is_rapid
+from paint_deposition.files.rapid.program import is_rapid
 from paint_deposition.files.recordings.bag_files import custom_data
 
 MODEL_FILE = 'model.yaml'
@@ -46,7 +46,7 @@ def planned_model(motion: Path) -> PlannedModel | None:
         ModelError: a model.yaml beside it is not valid.
     """
     folder = motion if motion.is_dir() else motion.parent
-    digest = _told_digest(motion, folder)
+    digest = _digest(motion, folder)
     if not digest:
         return None
     path = folder / MODEL_FILE
@@ -56,23 +56,20 @@ def planned_model(motion: Path) -> PlannedModel | None:
     return PlannedModel(path, digest, file)
 
 
-def _told_digest(motion: Path, folder: Path) -> str:
+def _digest(motion: Path, folder: Path) -> str:
+    """Digest of the model that a motion was planned with, '' for none."""
     if is_rapid(motion):
         try:
             found = IN_RAPID.search(motion.read_text(encoding='utf-8', errors='replace'))
         except OSError:
             return ''
         return found[1] if found else ''
-    if motion.suffix == '.csv':
-        return _figures_digest(folder) if motion.name == 'passes.csv' else ''
-    return custom_data(folder).get(DIGEST, '')
-
-
-def _figures_digest(folder: Path) -> str:
-    for name in (PLAN_FILE, IMPROVEMENT_FILE):
+    if motion.suffix != '.csv':
+        return custom_data(folder).get(DIGEST, '')
+    for name in (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ():
         try:
-            told = json.loads((folder / name).read_text(encoding='utf-8'))
+            figures = json.loads((folder / name).read_text(encoding='utf-8'))
         except (OSError, ValueError):
             continue
-        return str(told.get(DIGEST, '')) if isinstance(told, dict) else ''
+        return str(figures.get(DIGEST, '')) if isinstance(figures, dict) else ''
     return ''

@@ -1,19 +1,16 @@
 """Prepared parts kept on disk, so that a part seen before is there at once.
 
-A part is found by all that it was made from: the bytes and the name of its file, how it was asked
-for, and the code and libraries that prepared it. Processes may share the folder: files appear
+A part is found by all that it was made from: the bytes and the name of its file, the options,
+and the code and libraries that prepared it. Processes may share the folder: files appear
 whole, what is broken or gone is prepared anew, and the parts unused for longest make room.
 """
 
 import hashlib
-import math
 import os
-from collections.abc import Sequence
 from dataclasses import fields
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from zipfile import ZipFile
 
 import numpy as np
 from platformdirs import user_cache_path
@@ -32,13 +29,13 @@ ARRAYS = ('vertices_m', 'normals', 'vertex_areas_m2', 'down', 'rim_m', 'in_hem')
 INDICES = ('faces', 'neighbours')
 
 
-def place_of(path: Path, *asked: object) -> Path | None:
-    """The file that holds, or would hold, a part prepared as asked; None: it is not kept."""
+def place_of(path: Path, *options: object) -> Path | None:
+    """The file for a part prepared with these options; None where it is not kept."""
     folder = os.environ.get(FOLDER_VARIABLE)
     # A .gltf refers to other files, whose bytes are not seen here.
     if folder == '' or path.suffix.lower() == '.gltf' or not path.is_file():
         return None
-    digest = hashlib.sha256(repr((path.name, asked, _prepared_by())).encode())
+    digest = hashlib.sha256(repr((path.name, options, _prepared_by())).encode())
     with path.open('rb') as file:
         # Each block waits for whatever else Python does meanwhile: few of them, within memory.
         while block := file.read(1 << 24):
@@ -51,7 +48,6 @@ def find(place: Path) -> Surface | None:
     """The part that is kept there, or None."""
     try:
         with place.open('rb') as file, np.load(file, allow_pickle=False) as kept:
-            _refuse_claims(kept.zip)
             arrays = {name: kept[name] for name in ARRAYS}
             curved = [kept[f'curved_{item.name}'] for item in fields(CurvedEdges)]
             faces, neighbours = (kept[name].astype(np.int64) for name in INDICES)
@@ -61,18 +57,6 @@ def find(place: Path) -> Surface | None:
         return None
     arrays |= {'faces': faces, 'neighbours': neighbours}
     return Surface(notes=notes, curved_edges=CurvedEdges(*curved), **arrays)
-
-
-def _refuse_claims(package: ZipFile) -> None:
-    """Raise ValueError for an array that is said to be larger than its bytes in the file."""
-    for info in package.infolist():
-        with package.open(info) as member:
-            np.lib.format.read_magic(member)
-            shape, _, kind = np.lib.format.read_array_header_1_0(member)
-            if member.tell() + math.prod(shape) * kind.itemsize != info.file_size:
-                raise ValueError(f'{info.filename} has not the bytes of {shape}')
-        if info.compress_type or info.file_size != info.compress_size:
-            raise ValueError(f'{info.filename} is compressed')
 
 
 def keep(place: Path, surface: Surface) -> None:
@@ -89,27 +73,20 @@ def keep(place: Path, surface: Surface) -> None:
     try:
         with replacing(place) as temporary:
             np.savez(temporary, **arrays)
-        _make_room(sorted(place.parent.glob('*.npz'), key=_last_used))
+        _make_room(place.parent)
     except OSError:  # a full disk or a folder of somebody else: only time is lost
         return
 
 
-def _make_room(oldest_first: Sequence[Path]) -> None:
-    sizes = [_size(path) for path in oldest_first]
-    excess = sum(sizes) - MOST_BYTES
-    for path, size in zip(oldest_first, sizes, strict=True):
+def _make_room(folder: Path) -> None:
+    """Remove the parts unused for longest, until the others take no more than ``MOST_BYTES``."""
+    kept = [(path.stat(), path) for path in folder.glob('*.npz')]
+    excess = sum(about.st_size for about, _ in kept) - MOST_BYTES
+    for about, path in sorted(kept, key=lambda pair: pair[0].st_mtime):
         if excess <= 0:
             return
         path.unlink(missing_ok=True)
-        excess -= size
-
-
-def _last_used(path: Path) -> float:
-    return path.stat().st_mtime if path.exists() else 0.0
-
-
-def _size(path: Path) -> int:
-    return path.stat().st_size if path.exists() else 0
+        excess -= about.st_size
 
 
 @cache

@@ -1,4 +1,4 @@
-"""Which state of the repository a package is, told without loading anything."""
+"""Which state of the repository a package is, without loading anything."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, SetPoints, listed
 from paint_deposition.model.brush_law import SETTINGS, BrushLaw
-from paint_deposition.motion.motion_log import TriggerChange
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 

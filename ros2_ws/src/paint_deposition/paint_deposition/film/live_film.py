@@ -12,13 +12,13 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.between_brushes import taken_over, told_instead, with_set_points
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.lines_of_sight import Obstacle
-from paint_deposition.motion.motion_log import (
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
+from paint_deposition.motion.pose_stream import (
     DEFAULT_LIMIT_POSES,
     MotionLog,
     PoseBatch,
     TriggerChange,
 )
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints

@@ -11,14 +11,14 @@ from scipy.spatial import cKDTree
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.path import SprayPath
 
-# A place of the programme is known by where it is and whither it leads: a turn of the heading by
-# 60 degrees counts as much as this distance.
+# Places of the programme differ by where they are and by their heading: a turn of it by 60 degrees
+# counts as much as this distance.
 HEADING_M = 0.2
 # Zones cut corners by less.
 NEAR_M = 0.05
 # The speed is the mean over so much way: single poses carry the noise of the encoders.
 WINDOW_M = 0.02
-# Slower than programmed by more is told.
+# Slower than programmed by more is reported.
 TOLERANCE = 0.05
 # Robots need about so much way to get up to speed.
 TURN_M = 0.1
@@ -85,11 +85,9 @@ class DrivenSpeed:
 
     def to_dict(self) -> dict[str, Any]:
         """The figures by name."""
-        return {
-            'on_programme': self.on_programme,
-            **{name: value for name, value in vars(self.whole).items() if name != 'number'},
-            'passes': [vars(one) for one in self.passes],
-        }
+        whole = {name: value for name, value in vars(self.whole).items() if name != 'number'}
+        passes = [vars(one) for one in self.passes]
+        return {'on_programme': self.on_programme, **whole, 'passes': passes}
 
 
 def driven_speed(driven: SprayPath, programmed: SprayPath) -> DrivenSpeed:
@@ -107,8 +105,7 @@ def driven_speed(driven: SprayPath, programmed: SprayPath) -> DrivenSpeed:
     sprayed = driven.select(where)
     _, nearest = cKDTree(_places(programmed)).query(_places(sprayed))
     away_m = np.linalg.norm(sprayed.position_m - programmed.position_m[nearest], axis=1)
-    step_m = sprayed.dwell_s * sprayed.speed_m_per_s
-    near = away_m < NEAR_M
+    step_m, near = sprayed.dwell_s * sprayed.speed_m_per_s, away_m < NEAR_M
     on_programme = float(step_m[near].sum() / step_m.sum())
     if on_programme < 0.5:
         raise RecordingError(
@@ -116,31 +113,24 @@ def driven_speed(driven: SprayPath, programmed: SprayPath) -> DrivenSpeed:
             f'{1e3 * NEAR_M:.0f} mm of the programme: are both of the same part, and in the same '
             'frame? see --part-pose'
         )
-    rows = [
-        found
-        for number in np.unique(sprayed.spray_pass)
-        if step_m[found := np.flatnonzero((sprayed.spray_pass == number) & near)].sum()
-        >= SHORTEST_PASS_M
-    ]
-    speed = programmed.speed_m_per_s[nearest]
-    smooth = np.concatenate(
-        [
-            _over_window(step_m[stretch], sprayed.dwell_s[stretch])
-            for found in rows
-            for stretch in np.split(found, 1 + np.flatnonzero(np.diff(where[found]) > 1))
-        ]
-    )
-    kept = np.concatenate(rows)
-    owner = np.repeat(np.arange(1, len(rows) + 1), [len(found) for found in rows])
-    ends = _at_ends(sprayed)[kept]
-    columns = (step_m[kept], sprayed.dwell_s[kept], speed[kept], smooth, ends)
+    numbers = np.unique(sprayed.spray_pass)
+    on_passes = [np.flatnonzero((sprayed.spray_pass == number) & near) for number in numbers]
+    on_passes = [rows for rows in on_passes if step_m[rows].sum() >= SHORTEST_PASS_M]
+    smooth = np.concatenate([
+        _over_window(step_m[stretch], sprayed.dwell_s[stretch])
+        for rows in on_passes
+        for stretch in np.split(rows, 1 + np.flatnonzero(np.diff(where[rows]) > 1))
+    ])  # fmt: skip
+    kept = np.concatenate(on_passes)
+    owner = np.repeat(np.arange(1, len(on_passes) + 1), [len(rows) for rows in on_passes])
+    speed = programmed.speed_m_per_s[nearest][kept]
+    columns = (step_m[kept], sprayed.dwell_s[kept], speed, smooth, _at_ends(sprayed)[kept])
     passes = tuple(
         _figures(number, *(column[owner == number] for column in columns))
-        for number in range(1, len(rows) + 1)
+        for number in range(1, len(on_passes) + 1)
     )
     way_m = np.cumsum(step_m[kept]) - 0.5 * step_m[kept]
-    whole = _figures(0, *columns)
-    return DrivenSpeed(way_m, smooth, speed[kept], owner, passes, whole, on_programme)
+    return DrivenSpeed(way_m, smooth, speed, owner, passes, _figures(0, *columns), on_programme)
 
 
 def _places(path: SprayPath) -> np.ndarray:
@@ -153,11 +143,8 @@ def _over_window(step_m: np.ndarray, dwell_s: np.ndarray) -> np.ndarray:
     """(N,) way over time around each sub-step [m/s]."""
     way_m, time_s = (np.concatenate([[0.0], np.cumsum(column)]) for column in (step_m, dwell_s))
     middle_m = 0.5 * (way_m[1:] + way_m[:-1])
-    begin_m = np.maximum(middle_m - 0.5 * WINDOW_M, 0.0)
-    end_m = np.minimum(middle_m + 0.5 * WINDOW_M, way_m[-1])
-    return (end_m - begin_m) / (
-        np.interp(end_m, way_m, time_s) - np.interp(begin_m, way_m, time_s)
-    )
+    ends_m = np.clip(middle_m + 0.5 * WINDOW_M * np.array([[-1.0], [1.0]]), 0.0, way_m[-1])
+    return np.diff(ends_m, axis=0)[0] / np.diff(np.interp(ends_m, way_m, time_s), axis=0)[0]
 
 
 def _at_ends(path: SprayPath) -> np.ndarray:
@@ -171,17 +158,10 @@ def _figures(
     number: int, step_m: np.ndarray, dwell_s: np.ndarray, programmed: np.ndarray,
     driven: np.ndarray, ends: np.ndarray,
 ) -> PassSpeed:  # fmt: skip
-    way_m = float(step_m.sum())
+    way_m, time_s, planned_s = step_m.sum(), dwell_s.sum(), np.sum(step_m / programmed)
     slower = driven < (1.0 - TOLERANCE) * programmed
-    slow_m = float(step_m[slower].sum())
-    time_s, planned_s = float(dwell_s.sum()), float(np.sum(step_m / programmed))
-    return PassSpeed(
-        number=number,
-        way_m=way_m,
-        programmed_m_per_s=way_m / planned_s,
-        driven_m_per_s=way_m / time_s,
-        slowest_m_per_s=float(driven.min()),
-        slower=slow_m / way_m,
-        slower_at_ends=float(step_m[slower & ends].sum()) / slow_m if slow_m else float('nan'),
-        film=time_s / planned_s,
-    )
+    slow_m = step_m[slower].sum()
+    at_ends = step_m[slower & ends].sum() / slow_m if slow_m else np.nan
+    figures = (way_m, way_m / planned_s, way_m / time_s, driven.min(), slow_m / way_m, at_ends,
+               time_s / planned_s)  # fmt: skip
+    return PassSpeed(number, *map(float, figures))

@@ -86,13 +86,7 @@ class Rigid:
 
 
 def at_part(trajectory: Trajectory, part_pose: Sequence[float], frame_id: str) -> Trajectory:
-    """A motion in the frame of the part.
-
-    Args:
-        trajectory: poses in another frame.
-        part_pose: where the part stands in that frame, [x y z qx qy qz qw].
-        frame_id: what the part's frame is called.
-    """
+    """A motion in the frame of the part, which stands at ``part_pose`` in that of the poses."""
     return moved(trajectory, Rigid.of(part_pose).inverse(), frame_id)
 
 

@@ -53,20 +53,16 @@ class SprayPath:
 
     @staticmethod
     def of(
-        stamp_ns: np.ndarray,
-        dwell_s: np.ndarray,
-        flow: np.ndarray,
-        position_m: np.ndarray,
-        rotation: np.ndarray,
-        velocity_m_per_s: np.ndarray,
-    ) -> 'SprayPath':
+        stamp_ns: np.ndarray, dwell_s: np.ndarray, flow: np.ndarray, position_m: np.ndarray,
+        rotation: np.ndarray, velocity_m_per_s: np.ndarray,
+    ) -> 'SprayPath':  # fmt: skip
         """The motion alone, as one endless pass without turns and trigger changes."""
-        numbers, never = np.zeros(len(flow), np.int64), np.full(len(flow), np.inf)
+        count = len(flow)
+        numbers, never = np.zeros(count, np.int64), np.full(count, np.inf)
         return SprayPath(
-            stamp_ns, np.full(len(flow), np.nan), dwell_s, flow, position_m, rotation,
-            velocity_m_per_s, np.zeros((len(flow), 2)), numbers, numbers, numbers,
-            np.ones(len(flow)),
-            never, never, never, never, never, never, numbers,
+            stamp_ns, np.full(count, np.nan), dwell_s, flow, position_m, rotation,
+            velocity_m_per_s, np.zeros((count, 2)), *[numbers] * 3, np.ones(count), *[never] * 6,
+            numbers,
         )  # fmt: skip
 
     def __len__(self) -> int:

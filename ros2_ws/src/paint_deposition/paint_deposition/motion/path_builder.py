@@ -6,16 +6,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.flow_schedule import FlowSchedule
-from paint_deposition.motion.look_ahead import look_ahead
-from paint_deposition.motion.motion_log import PoseBatch
+from paint_deposition.motion.passes import first_pass, follow_passes
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.screening import PoseScreen
-from paint_deposition.motion.spray_pass import first_pass, follow_passes
-from paint_deposition.motion.stroke import first_stroke, follow_strokes
+from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
+from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
 from paint_deposition.motion.sub_steps import followed_poses, split_segments
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH, first_trigger, follow_trigger
+from paint_deposition.motion.trigger import ONLY_BRUSH, FlowSchedule, first_trigger, follow_trigger
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
@@ -37,9 +34,9 @@ def gap_ns(max_pose_gap_s: float) -> int:
 class PathBuilder:
     """Screens poses as they come and turns them into sub-steps.
 
-    Feed it in any batches: the sub-steps depend on the poses and trigger changes alone. Which
-    poses are dropped and when a stream counts as restarted, see ``PoseScreen``; a restarted stream
-    is followed as after a gap.
+    Feed it in any batches: the sub-steps depend on the poses and trigger changes alone.
+    ``PoseScreen`` says which poses are dropped and when a stream counts as restarted; that is
+    followed as after a gap.
 
     Args:
         max_pose_gap_s: a longer time between two poses is gun off [s].
@@ -90,10 +87,7 @@ class PathBuilder:
         self._flow.add(stamp_ns, flow, brush, another_stream=late_ns > self.max_gap_ns)
 
     def add_poses(
-        self,
-        stamps_ns: ArrayLike,
-        positions_m: ArrayLike,
-        quaternions_xyzw: ArrayLike,
+        self, stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
     ) -> None:
         """Take poses: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
         batch = PoseBatch(
@@ -101,8 +95,8 @@ class PathBuilder:
             np.asarray(positions_m, dtype=float),
             np.asarray(quaternions_xyzw, dtype=float),
         )
-        going_on, *restarted = self._screen.take(batch)
-        self._waiting.append(going_on)
+        continued, *restarted = self._screen.take(batch)
+        self._waiting.append(continued)
         for stream in restarted:
             self._cut_segments(until_ns=None, finish=True)
             self.counts.late_triggers -= self._flow.restart()
@@ -149,20 +143,15 @@ class PathBuilder:
         cuts, flows, brushes = self._flow.steps()
         now = come.select(rows)
         stamp, dwell, position, rotation, velocity, after_gap = split_segments(
-            now.stamps_ns,
-            now.positions_m,
-            now.quaternions_xyzw,
-            cuts,
-            self.max_gap_ns,
+            now.stamps_ns, now.positions_m, now.quaternions_xyzw, cuts, self.max_gap_ns,
             self.max_step_m,
-        )
+        )  # fmt: skip
         if len(stamp):
             after_gap[0] |= self._gap_before_next
             self._gap_before_next = False
-            now_set = np.searchsorted(cuts, stamp, side='right')
-            path = SprayPath.of(stamp, dwell, flows[now_set], position, rotation, velocity)
-            path = path.with_(brush=brushes[now_set])
-            self._finished.append(self._followed(path, after_gap))
+            change = np.searchsorted(cuts, stamp, side='right')
+            path = SprayPath.of(stamp, dwell, flows[change], position, rotation, velocity)
+            self._finished.append(self._followed(path.with_(brush=brushes[change]), after_gap))
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
@@ -187,29 +176,19 @@ class PathBuilder:
         if self._began_ns is None:
             self._began_ns = int(path.stamp_ns[0])
         return path.with_(
-            time_s=(path.stamp_ns - self._began_ns) * 1e-9,
-            stroke=stroke,
-            spray_pass=spray_pass,
-            passes_before=np.maximum(spray_pass, 0),
-            open_flow=open_flow,
-            since_on_s=since_on,
-            since_off_s=since_off,
-            from_turn_m=from_turn,
-            brush=open_brush,
-        )
+            time_s=(path.stamp_ns - self._began_ns) * 1e-9, stroke=stroke, spray_pass=spray_pass,
+            passes_before=np.maximum(spray_pass, 0), open_flow=open_flow, since_on_s=since_on,
+            since_off_s=since_off, from_turn_m=from_turn, brush=open_brush,
+        )  # fmt: skip
 
     def _whole_strokes(self, path: SprayPath, finish: bool) -> SprayPath:
         stroke = path.stroke
         ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
         # The last stroke's end shows with the first row of the next, which the look ahead needs.
         until_on, until_off, to_turn = look_ahead(
-            stroke,
-            path.velocity_m_per_s,
-            path.dwell_s,
-            path.flow,
-            path.since_on_s,
+            stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s,
             path.from_turn_m,
-        )
+        )  # fmt: skip
         complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
         self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
@@ -227,3 +206,26 @@ def spray_path(
         builder.add_trigger(*change)
     builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
     return builder.take(finish=True), builder.counts
+
+
+def require_spraying(trajectory: Trajectory, path: SprayPath) -> None:
+    """Refuse a motion, with at least one sub-step, along which the gun never sprays.
+
+    Raises:
+        RecordingError: the trigger never opens, or only while there are no poses.
+    """
+    if np.any(path.flow > 0.0):
+        return
+    stamps_ns, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow
+    remedy = 'check --state-topic; without a trigger the gun sprays whenever poses flow'
+    if not np.any(flow > 0.0):
+        raise RecordingError(
+            f'{trajectory.source}: the gun never sprays, none of the {len(flow)} messages of its '
+            f'trigger opens it; {remedy}'
+        )
+    apart_s = 1e-9 * float(stamps_ns[np.argmax(flow > 0.0)] - trajectory.stamps_ns.min())
+    raise RecordingError(
+        f'{trajectory.source}: the gun never sprays while there are poses, its trigger first '
+        f'opens {abs(apart_s):.3g} s {"after" if apart_s > 0.0 else "before"} the first of them: '
+        f'check that both are stamped by one clock; {remedy}'
+    )

@@ -46,15 +46,9 @@ def slerp(q0, q1, t):
 def write_rotation(out, quaternion):
     """Write the rotation matrix of a unit quaternion, scalar last, into ``out`` (3, 3)."""
     x, y, z, w = quaternion
-    out[0, 0] = 1.0 - 2.0 * (y * y + z * z)
-    out[0, 1] = 2.0 * (x * y - z * w)
-    out[0, 2] = 2.0 * (x * z + y * w)
-    out[1, 0] = 2.0 * (x * y + z * w)
-    out[1, 1] = 1.0 - 2.0 * (x * x + z * z)
-    out[1, 2] = 2.0 * (y * z - x * w)
-    out[2, 0] = 2.0 * (x * z - y * w)
-    out[2, 1] = 2.0 * (y * z + x * w)
-    out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
+    out[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
+    out[1] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
+    out[2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
 
 
 @njit(cache=True)
@@ -141,12 +135,8 @@ def split_segments(stamps_ns, positions, quaternions, cuts_ns, max_gap_ns, max_s
                 positions[i], positions[i + 1], quaternions[i], quaternions[i + 1], max_step_m
             )
             most += whole[i]
-    stamp = np.empty(most, np.int64)
-    dwell = np.empty(most)
-    position = np.empty((most, 3))
-    rotation = np.empty((most, 3, 3))
-    velocity = np.empty((most, 3))
-    after_gap = np.zeros(most, np.bool_)
+    stamp, dwell, after_gap = np.empty(most, np.int64), np.empty(most), np.zeros(most, np.bool_)
+    position, rotation, velocity = np.empty((most, 3)), np.empty((most, 3, 3)), np.empty((most, 3))
     row, cut, fresh = 0, 0, False
     for i in range(segments):
         if whole[i] == 0:

@@ -26,12 +26,8 @@ class PoseCounts:
     @property
     def rejected(self) -> int:
         """Poses that were dropped."""
-        return (
-            self.repeated_stamps
-            + self.backward_stamps
-            + self.not_finite
-            + self.not_unit_quaternions
-        )
+        stamps = self.repeated_stamps + self.backward_stamps
+        return stamps + self.not_finite + self.not_unit_quaternions
 
     @staticmethod
     def of_guns(counts: Sequence['PoseCounts']) -> 'PoseCounts':
@@ -66,8 +62,8 @@ class Trajectory:
         trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one,
             throughout.
         trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
-            magnitude of the voltage [kV] from that time on; not above 0 or NaN is not told. Empty:
-            none is.
+            magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.
+            Empty: all are unknown.
         notes: remarks on the recording for the user, a line each.
         warnings: what is likely wrong with it, a line each with the remedy.
         source: the file it came from, for messages.
@@ -101,23 +97,17 @@ class Trajectory:
                 f'{count} stamps go with positions {shapes[0]} and quaternions {shapes[1]}; '
                 f'expected ({count}, 3) and ({count}, 4)'
             )
-        if np.shape(self.trigger_stamps_ns) != np.shape(self.trigger_flow):
-            raise RecordingError(
-                f'{len(self.trigger_stamps_ns)} trigger stamps go with '
-                f'{len(self.trigger_flow)} flow values; give one flow a stamp'
-            )
-
-        if len(self.trigger_brush) not in (0, len(self.trigger_flow)):
-            raise RecordingError(
-                f'{len(self.trigger_flow)} trigger flows go with {len(self.trigger_brush)} '
-                'brushes; give one brush a flow, or none'
-            )
-
-        if len(self.trigger_set_points) not in (0, len(self.trigger_flow)):
-            raise RecordingError(
-                f'{len(self.trigger_flow)} trigger flows go with {len(self.trigger_set_points)} '
-                'rows of set-points; give one row a flow, or none'
-            )
+        changes = len(self.trigger_stamps_ns)
+        for what, column, may_lack in (
+            ('flow values', self.trigger_flow, False),
+            ('brushes', self.trigger_brush, True),
+            ('rows of set-points', self.trigger_set_points, True),
+        ):
+            if len(column) != changes and not (may_lack and not len(column)):
+                raise RecordingError(
+                    f'{changes} trigger stamps go with {len(column)} {what}; give one a stamp'
+                    f'{", or none" if may_lack else ""}'
+                )
 
     @property
     def triggers(self) -> list[tuple[int, float, int]]:
@@ -127,7 +117,7 @@ class Trajectory:
         return list(zip(*(column.tolist() for column in columns), strict=True))
 
     def set_points_of(self, row: int) -> tuple[float, ...]:
-        """Those from a change of the trigger on, none where none are told."""
+        """Those from a change of the trigger on, none where all are unknown."""
         return tuple(map(float, self.trigger_set_points[row : row + 1].ravel()))
 
     @property

@@ -8,44 +8,14 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.errors import require_above_zero
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.requests import GunEnvelope
 
 # Poses are looked at after this much travel or turn.
 STEP_M, STEP_RAD = 0.01, math.radians(2.0)
 # Contacts closer together in time than this are one.
 ONE_CONTACT_S = 0.5
-
-
-@dataclass(frozen=True)
-class GunEnvelope:
-    """What must stay clear of the part, on the tool's axis.
-
-    Attributes:
-        radius_m: of the gun and of the cylinder before it.
-        length_m: of the gun, behind the TCP.
-        before_m: of the cylinder before the TCP in which there must be no part.
-    """
-
-    radius_m: float = 0.08
-    length_m: float = 0.4
-    before_m: float = 0.1
-
-    def __post_init__(self) -> None:
-        require_above_zero(gun_radius_m=self.radius_m, gun_length_m=self.length_m)
-        if self.before_m < 0.0:
-            require_above_zero(keep_off_m=self.before_m)
-
-    @property
-    def middle_m(self) -> float:
-        """Of the whole cylinder, along tool z from the TCP [m]."""
-        return 0.5 * (self.before_m - self.length_m)
-
-    @property
-    def reach_m(self) -> float:
-        """Radius of the sphere about that middle that holds it all [m]."""
-        return math.hypot(self.radius_m, 0.5 * (self.before_m + self.length_m))
 
 
 @dataclass(frozen=True)
@@ -88,7 +58,7 @@ def contacts(
 
     What is smaller than an edge of that mesh may be missed by half an edge.
     """
-    rows = _telling(trajectory)
+    rows = _steps(trajectory)
     positions = trajectory.positions_m[rows]
     turns = Rotation.from_quat(trajectory.quaternions_xyzw[rows])
     axes = turns.as_matrix()[:, :, 2]
@@ -127,7 +97,7 @@ def _joined(before: Contact, here: Contact) -> Contact:
     return Contact(before.begin_s, here.end_s, deeper.place_m, deeper.depth_m, by_gun)
 
 
-def _telling(trajectory: Trajectory) -> np.ndarray:
+def _steps(trajectory: Trajectory) -> np.ndarray:
     """Rows of poses that lie a step apart, with the last one."""
     way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / STEP_M
     turns = Rotation.from_quat(trajectory.quaternions_xyzw)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -18,16 +18,14 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.clearance import Contact, GunEnvelope, contacts
-from paint_deposition.planning.face_order import in_order, motion_over
-from paint_deposition.planning.improvement.improve import timed_for_evenness
-from paint_deposition.planning.improvement.limits import Wish
-from paint_deposition.planning.improvement.moves import moves_of
-from paint_deposition.planning.improvement.programme import Programme
+from paint_deposition.planning.clearance import Contact, contacts
+from paint_deposition.planning.faces import blend, in_order, motion_over
+from paint_deposition.planning.films import evenness, simulated
+from paint_deposition.planning.improvement.programme import Programme, moves_of
+from paint_deposition.planning.improvement.retiming import retime_for_evenness
 from paint_deposition.planning.passes import PlannedPass
-from paint_deposition.planning.plan import evenness, plan, planned_statistics, simulated
-from paint_deposition.planning.plan_request import PlanRequest
-from paint_deposition.planning.seams import blend
+from paint_deposition.planning.plan import plan, planned_statistics
+from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 
 # Faces that turn further from the side of the gun are its back.
 BACK_COSINE = -0.1
@@ -48,7 +46,6 @@ class PartPlan:
             nan where it has no one side.
         contacts: where gun or spray come too near to the part. envelope: of the gun.
         model: what the gun sprays. paint: that is sprayed.
-        optimised: whether the speeds along the passes were chosen, not only one for each.
     """
 
     surface: Surface
@@ -69,7 +66,6 @@ class PartPlan:
     envelope: GunEnvelope
     model: DepositionModel
     paint: PaintUsed = NO_PAINT
-    optimised: bool = False
 
     @property
     def cycle_time_s(self) -> float:
@@ -108,7 +104,7 @@ class PartPlan:
         return (
             f'{raster}; {self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
             f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with '
-            f'{"speeds along" if self.optimised else "a time for"} each pass '
+            f'{"speeds along" if self.request.optimise else "a time for"} each pass '
             f'{100 * self.sigma_n:.1f} %'
         )
 
@@ -138,7 +134,7 @@ class PartPlan:
             },
             'film': self.statistics.to_dict(),
             'paint': paint_figures(self),
-            'gun': vars(self.envelope),
+            'gun': self.envelope.model_dump(),
             'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
 
@@ -150,7 +146,6 @@ def plan_faces(
     frame_id: str = '',
     widest_rad: float = WIDEST_RAD,
     envelope: GunEnvelope | None = None,
-    optimise: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
@@ -158,12 +153,11 @@ def plan_faces(
     Args:
         surface: the part; what faces away from ``request.outward``, if given, stays bare.
         model: what the gun sprays.
-        request: for each face.
+        request: for each face; to optimise is to choose the speeds along all passes, and where
+            the gun opens and closes, for an even film on all faces together.
         frame_id: of the poses.
         widest_rad: greatest angle between a normal of a face and its mean.
         envelope: of the gun, for the check that it keeps clear of the part.
-        optimise: choose the speeds along all passes, and where the gun opens and closes, for an
-            even film on all faces together.
         progress: called with what is done and its share, 0 to 1.
 
     Raises:
@@ -174,20 +168,19 @@ def plan_faces(
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     area = np.where(painted, surface.vertex_areas_m2, 0.0)
-    each = replace(request, outward=None, tolerance=None)
+    each = request.model_copy(update={'outward': None, 'tolerance': None})
     blended = blend(surface, model, each, faces, area, progress)
     running = in_order(blended.faces)
     progress('motion', 0.0)
-    motion = motion_over(running, frame_id, lambda way: not contacts(surface, way, envelope))
-    trajectory, moves = motion.trajectory, motion.moves
-    if optimise:
-        limits = request.limits(running[0].style.overspray_m)
-        retiming = timed_for_evenness(
-            surface, painted, Programme.of(trajectory), [model], limits,
-            Wish(request.target_um), progress, explained=False,
-        )  # fmt: skip
-        trajectory = retiming.programme.trajectory()
-        moves = tuple(moves_of(retiming.programme, limits))
+    trajectory, moves = motion_over(
+        running, frame_id, lambda way: not contacts(surface, way, envelope)
+    )
+    if request.optimise:
+        wanted = request.improvement(running[0].style.overspray_m, request.target_um)
+        retimed = retime_for_evenness(
+            surface, painted, Programme.of(trajectory), [model], wanted, progress, explained=False
+        ).programme
+        trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, wanted))
     film, paint = simulated(surface, model, trajectory)
     _, sigma_n = evenness(film, area)
     if request.tolerance is not None and sigma_n > request.tolerance:
@@ -196,14 +189,14 @@ def plan_faces(
             f'closest is {sigma_n:.4f}: allow that much, or narrower faces (--face-angle-deg)'
         )
     progress('one raster', 0.0)
-    raster = _one_raster(surface, model, replace(request, tolerance=None), painted, area)
+    anyhow = request.model_copy(update={'tolerance': None})
+    raster = _one_raster(surface, model, anyhow, painted, area)
     statistics = planned_statistics(film[painted], area[painted], paint.emitted_cm3, request)
     passes = tuple(planned for face in running for planned in face.passes)
     return PartPlan(
         surface, request, faces, blended.margin_m, passes, moves, trajectory,
         film, painted, statistics, sigma_n, blended.sigma_n_before,
-        *raster, contacts(surface, trajectory, envelope), envelope, model,
-        paint, optimise,
+        *raster, contacts(surface, trajectory, envelope), envelope, model, paint,
     )  # fmt: skip
 
 

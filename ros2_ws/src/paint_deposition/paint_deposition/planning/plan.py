@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import require_above_zero
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
@@ -18,15 +16,19 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.pass_films import LineFilms
-from paint_deposition.planning.pass_motion import planned_moves, trajectory_of
-from paint_deposition.planning.pass_placement import Placing, centred, place_passes
-from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_passes
-from paint_deposition.planning.plan_request import PlanRequest
+from paint_deposition.planning.films import LineFilms, evenness, simulated
+from paint_deposition.planning.passes import (
+    PassStyle,
+    PlannedPass,
+    plan_passes,
+    planned_moves,
+    trajectory_of,
+)
+from paint_deposition.planning.placing import Placing, centred, place_passes
 from paint_deposition.planning.plane_passes import passes_to_cover
 from paint_deposition.planning.recommendation import Recommendation, recommend
+from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
-from paint_deposition.planning.trade_off import Point
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
@@ -34,6 +36,18 @@ INDEX_SHARES = (0.75, 1.25)
 OVERSPRAY_SHARE = 0.9
 TARGET_ROUNDS = 4
 TARGET_PRECISION = 2e-3
+
+
+@dataclass(frozen=True)
+class TradeOffPoint:
+    """A result of one weight of the paint, as ``pareto.csv`` has it."""
+
+    paint_weight: float
+    sigma_n: float
+    mean_um: float
+    paint_cm3: float
+    cycle_time_s: float
+    passes: int
 
 
 @dataclass(frozen=True)
@@ -106,27 +120,25 @@ class Plan:
             f'{self.cycle_time_s:.1f} s'
         )
 
+    @property
+    def comparison(self) -> str:
+        """What the part's shape makes of passes for a plane, in a sentence."""
+        return (
+            f'on a plane: sigma_n {100 * self.plane.sigma_n:.1f} % at '
+            f'{self.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
+            f'{100 * self.plane_on_part.sigma_n:.1f} %'
+        )
+
     def __repr__(self) -> str:
         return f'Plan({self.sentence})'
 
     @property
-    def point(self) -> Point:
+    def point(self) -> TradeOffPoint:
         """The plan in a trade-off."""
-        return Point(
+        return TradeOffPoint(
             self.request.paint_weight, self.sigma_n, self.mean_um,
             self.statistics.emitted_volume_cm3, self.cycle_time_s, self.placing.passes,
         )  # fmt: skip
-
-    def brief(self) -> dict[str, Any]:
-        """The figures by which plans are compared."""
-        return {
-            'passes': self.placing.passes,
-            'sigma_n': self.sigma_n,
-            'mean_um': self.mean_um,
-            'paint_cm3': self.statistics.emitted_volume_cm3,
-            'capture_fraction': self.statistics.capture_fraction,
-            'cycle_time_s': self.cycle_time_s,
-        }
 
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
@@ -149,7 +161,11 @@ class Plan:
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
             'paint': paint_figures(self),
-            'plain': self.plain and self.plain.brief(),
+            'plain': self.plain
+            and {
+                **{k: v for k, v in vars(self.plain.point).items() if k != 'paint_weight'},
+                'capture_fraction': self.plain.statistics.capture_fraction,
+            },
             'plane': {
                 'index_m': self.plane.index_m,
                 'passes': self.plane_on_part.passes,
@@ -233,23 +249,9 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
 
 def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, float]:
     if request.index_m is not None:
-        require_above_zero(index_m=request.index_m)
         return request.index_m, request.index_m
     low, high = (share * plane.index_m for share in INDEX_SHARES)
     return request.index_min_m or low, request.index_max_m or high
-
-
-def simulated(
-    surface: Surface,
-    model: DepositionModel,
-    trajectory: Trajectory,
-    progress: Callable[[float], None] = lambda share: None,
-) -> tuple[np.ndarray, PaintUsed]:
-    """(V,) film of a motion [um], and what it sprays."""
-    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
-    integrator.add(path, lambda done: progress(done / len(path)))
-    return integrator.film_um, integrator.used
 
 
 def planned_statistics(
@@ -260,10 +262,3 @@ def planned_statistics(
     return film_statistics(
         film_um, area_m2, emitted_cm3, target_um=target, target_tolerance_um=0.1 * target
     )
-
-
-def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
-    """Mean film [um] and sigma_n, weighted by area."""
-    weight = area_m2 / area_m2.sum()
-    mean = float(weight @ film_um)
-    return mean, math.sqrt(float(weight @ (film_um - mean) ** 2)) / mean

@@ -9,7 +9,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.collapse import Collapse, half_width_m
 from paint_deposition.model.uniformity import ParallelPasses
-from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
 from paint_deposition.planning.index_search import (
     SEARCHED,
     IndexCurve,
@@ -24,6 +23,7 @@ from paint_deposition.planning.plane_passes import (
     passes_to_cover,
     variation_over_width,
 )
+from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
 
 # Film below this share of the mean, between passes, is a bare stripe.
 BARE = 0.01
@@ -118,7 +118,7 @@ class Recommendation:
         }
 
 
-def recommend(model: DepositionModel, request: Request) -> Recommendation:
+def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     """Find the index that lays the most even film, or the widest one within the tolerance.
 
     Without a tolerance it is the deepest local minimum in the range. With one it lies in the
@@ -197,7 +197,7 @@ def _refuse_stripes(parallel: ParallelPasses, best: Minimum, half_width_m: float
 def _at_target(
     model: DepositionModel,
     setup: PassSetup,
-    request: Request,
+    request: IndexRequest,
     curve: IndexCurve,
     best: Minimum,
     speed: float,
@@ -228,7 +228,7 @@ def _at_target(
 def _notes(
     model: DepositionModel,
     setup: PassSetup,
-    request: Request,
+    request: IndexRequest,
     curve: IndexCurve,
     best: Minimum,
     speed: float,

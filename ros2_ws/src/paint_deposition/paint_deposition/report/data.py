@@ -8,19 +8,18 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.part.points import SurfacePoints
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.residuals import root_mean_square
-from paint_deposition.report.profile_charts import ModelLine, ProfileChart
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
 from paint_deposition.report.writers.fitted_model import history_as_list
 
 
@@ -78,6 +77,21 @@ class ReportData:
         return self.comparisons[0].study
 
     @property
+    def experiments(self) -> tuple[Experiment, ...]:
+        """Of the campaign."""
+        return self.study.campaign.experiments
+
+    @property
+    def target_um(self) -> float | None:
+        """The film wanted [um], if the campaign says so."""
+        return self.study.campaign.target_um
+
+    @property
+    def tolerance_um(self) -> float | None:
+        """What it may differ [um]."""
+        return self.study.campaign.tolerance_um
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user."""
         return self.diagnosis.notes if self.diagnosis else self.study.notes
@@ -88,46 +102,14 @@ class ReportData:
         return tuple(comparison.model for comparison in self.comparisons)
 
     @property
-    def proposals(self) -> tuple[list[Place], list[Spray]]:
-        """What to measure and what to spray next."""
-        return self.diagnosis.proposals if self.diagnosis else ([], [])
-
-    @property
-    def history(self) -> list[dict[str, Any]]:
-        """Of the model, oldest first, as in its file."""
-        if self.diagnosis is None:
-            return []
-        return history_as_list(self.study, self.diagnosis.history, self.older)
-
-    def effect_class(self, effect_id: str) -> type[Effect] | None:
-        """An effect that was looked for or is in the models; None if it is neither."""
-        owned = {e.id: type(e) for model in self.models for e in model.effects}
-        return (owned | dict(self.diagnosis.library if self.diagnosis else {})).get(effect_id)
-
-    @property
-    def experiments(self) -> tuple[Experiment, ...]:
-        """Of the campaign."""
-        return self.study.campaign.experiments
-
-    @property
-    def target_um(self) -> float | None:
-        """The film wanted [um], if the campaign tells it."""
-        return self.study.campaign.target_um
-
-    @property
-    def tolerance_um(self) -> float | None:
-        """What it may differ [um]."""
-        return self.study.campaign.tolerance_um
+    def model(self) -> DepositionModel:
+        """The best model."""
+        return self.models[-1]
 
     @property
     def improved(self) -> bool:
         """Whether there is a before and an after."""
         return len(self.models) > 1 and not self.names
-
-    @property
-    def model(self) -> DepositionModel:
-        """The best model."""
-        return self.models[-1]
 
     @property
     def model_names(self) -> tuple[str, ...]:
@@ -151,6 +133,36 @@ class ReportData:
         lines = [{'color': INK, 'width': 1.2}, {'color': ACCENT, 'width': 3.5}]
         return lines[-len(self.models) :]
 
+    @property
+    def proposals(self) -> tuple[list[Place], list[Spray]]:
+        """What to measure and what to spray next."""
+        return self.diagnosis.proposals if self.diagnosis else ([], [])
+
+    @property
+    def history(self) -> list[dict[str, Any]]:
+        """Of the model, oldest first, as in its file."""
+        if self.diagnosis is None:
+            return []
+        return history_as_list(self.study, self.diagnosis.history, self.older)
+
+    @cached_property
+    def changes(self) -> dict[str, Change]:
+        """What each effect that was added changes in the prediction at the points, by id.
+
+        The model with it and the model without it are each fitted to all readings: what the
+        pattern can imitate counts as no change.
+        """
+        steps = self.diagnosis.history if self.diagnosis else ()
+        return {
+            step.added: Change.of(step.fit.predicted_um - before.fit.predicted_um)
+            for before, step in pairwise(steps)
+        }
+
+    def effect_class(self, effect_id: str) -> type[Effect] | None:
+        """An effect that was looked for or is in the models; None if it is neither."""
+        own = {e.id: type(e) for model in self.models for e in model.effects}
+        return (own | dict(self.diagnosis.library if self.diagnosis else {})).get(effect_id)
+
     @cached_property
     def residuals_um(self) -> list[np.ndarray]:
         """For each model (P,) at the points, averaged over repeats [um]."""
@@ -166,58 +178,25 @@ class ReportData:
         """Along columns and rows."""
         return profiles_of(self.study, self.models)
 
-    @cached_property
-    def charts(self) -> tuple[ProfileChart, ...]:
-        """Of each profile."""
-        return tuple(map(self._chart, self.profiles))
-
-    def _chart(self, profile: Profile) -> ProfileChart:
-        rows, name = profile.rows, f'{profile.experiment}, ' if len(self.experiments) > 1 else ''
-        measured_um = self.study.measured_um[rows]
-        models = []
-        for k, (called, line) in enumerate(zip(self.model_names, self.lines, strict=True)):
-            residual_um = self.residuals_um[k][rows]
-            film_um = profile.lines_um[k] if len(profile.line_m) else measured_um - residual_um
-            style = line['color'], line['width'], self.colours[k]
-            models.append(ModelLine(called, film_um, residual_um, *style))
-        return ProfileChart(
-            f'{name}{profile.label}:  {self.errors_in_words(rows)}', profile.axis,
-            profile.position_m, measured_um, TWO_SIDED_95 * self.study.sigma_um[rows],
-            profile.line_m, profile.passes_um, tuple(models),
-        )  # fmt: skip
-
-    @cached_property
-    def painted(self) -> list[list[FilmIntegrator]]:
-        """The surface painted: for each experiment, with each model."""
-        numbers = range(len(self.experiments))
-        return [[self._paint(k, model) for model in self.models] for k in numbers]
-
-    @cached_property
-    def changes(self) -> dict[str, Change]:
-        """What each effect that was added changes in the prediction at the points, by id.
-
-        The model with it and the model without it are each fitted to all readings: what the
-        pattern can imitate counts as no change.
-        """
-        steps = self.diagnosis.history if self.diagnosis else ()
-        return {
-            step.added: Change.of(step.fit.predicted_um - before.fit.predicted_um)
-            for before, step in pairwise(steps)
-        }
-
-    @cached_property
-    def _surfaces(self) -> list[SurfacePoints]:
-        return [experiment.surface.points() for experiment in self.experiments]
-
-    def _paint(self, index: int, model: DepositionModel) -> FilmIntegrator:
-        experiment, points = self.experiments[index], self._surfaces[index]
-        integrator = FilmIntegrator(
-            points, model.without(experiment.switched_off), 'double', experiment.surface.occluder
-        )
-        integrator.add(experiment.path)
-        return integrator
-
     def rows_of(self, index: int) -> slice:
         """Points of the study that belong to an experiment."""
         first, stop = np.searchsorted(self.study.campaign.experiment_of, [index, index + 1])
         return slice(int(first), int(stop))
+
+    @cached_property
+    def painted(self) -> list[list[FilmIntegrator]]:
+        """The surface painted: for each experiment, with each model."""
+        return [
+            [_painted(experiment, points, model) for model in self.models]
+            for experiment in self.experiments
+            for points in [experiment.surface.points()]
+        ]
+
+
+def _painted(
+    experiment: Experiment, points: SurfacePoints, model: DepositionModel
+) -> FilmIntegrator:
+    model = model.without(experiment.switched_off)
+    integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
+    integrator.add(experiment.path)
+    return integrator

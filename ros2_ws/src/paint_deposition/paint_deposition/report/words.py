@@ -6,15 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
-from paint_deposition.inference.diagnosis.proposals import Spray
-from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
+from paint_deposition.inference.diagnosis.proposals import Spray
+from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.style import TWO_SIDED_95
 from paint_deposition.report.writers.fitted_model import PATTERN, REFIT
@@ -57,7 +57,7 @@ def covariate_label(name: str) -> str:
 def effect_name(effect_id: str) -> str:
     """'air_drift' as 'air drift'; names are kept for file and command line.
 
-    A learned law is told by its covariate, several joined by 'and' one after the other.
+    A learned law is named by its covariate, several joined by 'and' one after the other.
     """
     if ' and ' in effect_id:
         return joined([effect_name(one) for one in effect_id.split(' and ')])
@@ -68,18 +68,18 @@ def effect_name(effect_id: str) -> str:
     return name.replace('_', ' ')
 
 
-def competing(spray: Spray) -> str:
-    """The explanations that a spray is to tell apart."""
+def competing_explanations(spray: Spray) -> str:
+    """The explanations that a spray is to separate."""
     shapeless = {UNKNOWN: 'a cause outside the library', FOOTPRINT: 'another shape of the pattern'}
     return joined([shapeless.get(name) or effect_name(name) for name in spray.separates])
 
 
-def apart_words(spray: Spray) -> str:
+def separation_words(spray: Spray) -> str:
     """How far apart the explanations are now, and with a spray; the chance that one is left."""
     several = 'the two least apart of ' if len(spray.separates) > 2 else ''
     words = (
-        f'{several}{competing(spray)} then differ by {spray.separation:.1f} standard deviations, '
-        f'now by {spray.now:.1f}'
+        f'{several}{competing_explanations(spray)} then differ by {spray.separation:.1f} standard '
+        f'deviations, now by {spray.now:.1f}'
     )
     if spray.chance == spray.chance:
         words += f'; the chance that one is left alone is {percent(spray.chance)}'
@@ -161,7 +161,7 @@ def _band_words(law: LearnedCurve) -> str:
     )
 
 
-def sureness(found: EffectClass) -> str:
+def probability_words(found: EffectClass) -> str:
     """The probability of a group; a learned law that was kept for what it predicts has none."""
     if is_learned(found.best) and found.probability == 1.0:
         return 'kept'
@@ -200,7 +200,7 @@ def capital(text: str) -> str:
 
 
 def micrometres(value: float, signed: bool = False) -> str:
-    """'2.31 µm'; with a sign if asked."""
+    """'2.31 µm'; with a sign if wanted."""
     text = f'{value:+.2f}' if signed and abs(value) >= 0.005 else f'{value:.2f}'
     text = '0' if float(text) == 0.0 else text
     return f'{minus(text)} µm'

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.api.geometry import look_at
-from paint_deposition.effects.base import Effect
+from paint_deposition.api.simulation import look_at
+from paint_deposition.batch.line.pooling import amplitudes
+from paint_deposition.batch.line.runs import LineFile, Run
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, PaintError
@@ -23,17 +24,14 @@ from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.provenance import sha256
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
-from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.diagnosis.sensitivities import mark_um
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.batch.line.line_file import LineFile, Run
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
-# Amplitudes are stepped by this share of their typical size.
-STEP = 0.25
 # Stamps before this are no dates: clocks of simulations and controllers begin at 0.
 EARLIEST_S = 946684800.0
 DATE = re.compile(r'(\d{4})-?(\d{2})-?(\d{2})(?:[T_-]?(\d{2})[-:h]?(\d{2})(?:[-:m]?(\d{2}))?)?')
@@ -65,22 +63,19 @@ def computed(given: Mapping[str, Any]) -> Columns:
     return {name: [row.get(name) for row in rows] for name in names}
 
 
-def amplitudes() -> list[tuple[str, str]]:
-    """(effect, parameter) of every amplitude of the catalogue, in its order."""
-    return [(e.id, name) for e in EFFECTS.values() for name in e.amplitudes()]
-
-
 def _rows(
     run: Run, file: LineFile, folder: Path, model: DepositionModel, mesh: str
 ) -> Iterator[dict[str, Any]]:
     if run.is_campaign:
-        odd: list[str] = []
-        campaign = read_campaign(run.path, odd.append, file.part_pose)
+        odd: list[tuple[str, str, str]] = []
+        campaign = read_campaign(
+            run.path, part_pose=file.part_pose, remark=lambda *said: odd.append(said)
+        )
         time_s = _date(campaign.head.get('date', ''), run)
         for experiment in campaign.experiments:
             name = run.name if len(campaign.experiments) == 1 else f'{run.name}/{experiment.name}'
-            warning = f'warning: {experiment.name}: '
-            remarks = [line.removeprefix(warning) for line in odd if line.startswith(warning)]
+            mine = ('warning', experiment.name)
+            remarks = [line for *about, line in odd if tuple(about) == mine]
             pooled = sha256(experiment.files['mesh']) == mesh
             if not pooled:
                 other = Path(experiment.files['mesh']).name
@@ -90,7 +85,10 @@ def _rows(
                      'pooled': pooled, **painted}  # fmt: skip
             yield from _measured(about, experiment, model)
         return
-    surface = _surface(folder, file)
+    down = None if file.down is None else tuple(file.down)
+    surface = _read_surface(
+        folder / file.mesh, file.mesh_scale, file.max_edge_length_m, down, file.body
+    )
     motion = read_motion(run.path, file)
     seen = look_at(surface, motion, model, max_pose_gap_s=file.max_pose_gap_s)
     stamp_s = 1e-9 * float(motion.stamps_ns[0])
@@ -120,8 +118,8 @@ def _date(text: str, run: Run) -> float:
     try:
         if found:
             year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
-            told = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
-            return told.timestamp()
+            found_at = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+            return found_at.timestamp()
     except ValueError:
         pass
     raise ManyError(
@@ -135,13 +133,6 @@ def _read_surface(
     path: Path, scale: float, edge_m: float, down: tuple[float, ...] | None, body: str | None
 ) -> Surface:
     return read_mesh(path, scale, edge_m, None if down is None else np.array(down), body)
-
-
-def _surface(folder: Path, file: LineFile) -> Surface:
-    down = None if file.down is None else tuple(file.down)
-    return _read_surface(
-        folder / file.mesh, file.mesh_scale, file.max_edge_length_m, down, file.body
-    )
 
 
 def _film(surface: Surface, path: SprayPath, model: DepositionModel) -> dict[str, float | None]:
@@ -163,7 +154,11 @@ def _measured(
         study.forward, parameters, parameters.encode(model), np.ones(len(study))
     )
     predicted_um = study.forward.predict_um(model)
-    by_effect = _marks_um(study.forward, model, predicted_um)
+    effects = {e.id: model.effect(e.id) or e() for e in EFFECTS.values()}
+    by_effect = np.column_stack([
+        mark_um(study.forward, model, effects[effect], name, predicted_um)
+        for effect, name in amplitudes()
+    ])  # fmt: skip
     campaign = study.campaign
     for row in range(len(study)):
         first = campaign.means.first[row]
@@ -178,25 +173,3 @@ def _measured(
             'by_pattern': by_pattern[row].tolist(),
             'by_effect': by_effect[row].tolist(),
         }  # fmt: skip
-
-
-def _marks_um(forward: Forward, model: DepositionModel, predicted_um: np.ndarray) -> np.ndarray:
-    """(P, A) change of the readings by each amplitude of the catalogue, in its typical size."""
-    columns = []
-    for effect_id, name in amplitudes():
-        effect: Effect = model.effect(effect_id) or EFFECTS[effect_id]()
-        info = type(effect).parameters()[name]
-        here = getattr(effect, name)
-        step = STEP * info['typical']
-        ends = [
-            value for value in (here - step, here + step) if info['low'] <= value <= info['high']
-        ]
-        moved = [
-            forward.predict_um(model.with_effect(effect.model_copy(update={name: value})))
-            for value in ends
-        ]
-        if len(ends) == 2:
-            columns.append((moved[1] - moved[0]) / (2.0 * STEP))
-        else:
-            columns.append((moved[0] - predicted_um) / (STEP if ends[0] > here else -STEP))
-    return np.column_stack(columns)

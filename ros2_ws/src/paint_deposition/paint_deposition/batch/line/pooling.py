@@ -1,4 +1,4 @@
-"""What many parts say together: a pattern and a misfit that they share, a level of each.
+"""What many parts say together: a pattern, a misfit and effects that they share, a level of each.
 
 The readings of part i are linear about the model,
 
@@ -6,37 +6,114 @@ The readings of part i are linear about the model,
 
 with the pattern's change b, the level l_i of the part (standard deviation tau), a misfit g of
 each place of the part as a share of the film f_i, amplitudes a of effects, and noise e_i. All are
-normal, so that everything but tau, the scale of the noise and the size and width of the misfit
-has a closed form (Gelman et al., Bayesian Data Analysis, 2013, chapters 5 and 15). The misfit
-stands for all that no effect explains: without it any error of the model, seen often enough,
-would be taken for an effect.
+normal, so that everything but the scales, tau, the noise and the size and width of the misfit, has
+a closed form (Gelman et al., Bayesian Data Analysis, 2013, chapters 5 and 15). The misfit stands
+for all that no effect explains: without it any error of the model, seen often enough, would be
+taken for an effect.
+
+Effects are found one after the other, by their evidence. Each set of effects is judged with the
+scales that are the likeliest beside it: those fitted without an effect would take it for noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 from scipy.linalg import block_diag, cho_factor, cho_solve
 from scipy.special import logsumexp
 
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.batch.line.measured import Measured, places
+from paint_deposition.report.words import unit_words
 
+# Readings so near to each other are of one place of the part.
+PLACE_M = 0.05
 LEVELS = np.geomspace(1e-3, 0.2, 24).tolist()
 NOISES = np.geomspace(0.5, 3.0, 19).tolist()
 # Size of the misfit as a share of the film, and how far it reaches over the part [m].
 MISFITS = tuple(product((0.005, 0.01, 0.02, 0.05, 0.1), (0.02, 0.1, 0.25)))
 # Half of the belief before the readings is that there is no misfit.
 NO_MISFIT = 0.5
+# An effect is accepted if it is so probable that something of the catalogue acts.
+SURE = 0.99
+MOST_ACCEPTED = 3
+# Effects whose evidence is within this of the best are not told apart (odds of 20 to 1).
+TOGETHER = 3.0
 ONE_BRUSH = PatternVector()
 
 
 @dataclass(frozen=True)
-class Sums:
+class Measured:
+    """One part and its P points.
+
+    Attributes:
+        name: of the part. time_s: when it was painted, seconds since 1970.
+        residual_um, sigma_um, predicted_um: (P,) measured minus predicted; standard deviation;
+            predicted [um].
+        positions_m: (P, 3).
+        by_pattern: (P, k) derivatives by the coordinates of the pattern, of all brushes [um].
+        by_effect: (P, A) by each amplitude of the catalogue in its typical size [um].
+    """
+
+    name: str
+    time_s: float
+    residual_um: np.ndarray
+    sigma_um: np.ndarray
+    predicted_um: np.ndarray
+    positions_m: np.ndarray
+    by_pattern: np.ndarray
+    by_effect: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.residual_um)
+
+
+def amplitudes() -> list[tuple[str, str]]:
+    """(effect, parameter) of every amplitude of the catalogue, in its order."""
+    return [(e.id, name) for e in EFFECTS.values() for name in e.amplitudes()]
+
+
+def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
+    """The measured parts of the line's mesh among the rows of all runs, oldest first."""
+    if 'measured_um' not in columns:
+        return []
+    rows_of: dict[str, list[int]] = {}
+    cells = zip(columns['part'], columns['measured_um'], columns['pooled'], strict=True)
+    for row, (part, value, pooled) in enumerate(cells):
+        if value is not None and pooled:
+            rows_of.setdefault(part, []).append(row)
+
+    def taken(name: str, rows: list[int]) -> np.ndarray:
+        return np.array([columns[name][row] for row in rows], dtype=float)
+
+    found = [
+        Measured(
+            part, float(columns['time_s'][rows[0]]),
+            taken('measured_um', rows) - taken('predicted_um', rows),
+            taken('sigma_um', rows), taken('predicted_um', rows),
+            np.column_stack([taken(f'{axis}_m', rows) for axis in 'xyz']),
+            taken('by_pattern', rows), taken('by_effect', rows),
+        )
+        for part, rows in rows_of.items()
+    ]  # fmt: skip
+    return sorted(found, key=lambda part: part.time_s)
+
+
+def places(parts: Sequence[Measured]) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Places at which the line is measured: (F, 3) [m], and (P,) that of each point, by part."""
+    cells = np.round(np.concatenate([part.positions_m for part in parts]) / PLACE_M).astype(int)
+    unique, place_of = np.unique(cells, axis=0, return_inverse=True)
+    ends = np.cumsum([len(part) for part in parts])[:-1]
+    return unique * PLACE_M, np.split(place_of.ravel(), ends)
+
+
+@dataclass(frozen=True)
+class SufficientStatistics:
     """The readings of all parts, summed up; K = k + F + A columns: pattern, places, effects.
 
     Attributes:
@@ -60,39 +137,30 @@ class Sums:
     between_jobs: np.ndarray
 
     @staticmethod
-    def of(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Sums:
+    def of(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> SufficientStatistics:
         """Sum up; at least one part."""
         place_m, place_of = places(parts)
-        first, gram = 0, np.zeros(())
-        rows: dict[str, list] = {name: [] for name in ('score', 'gram', 'level', 'own', 'square')}
-        for part in parts:
-            here = place_of[first : first + len(part)]
-            first += len(part)
+        rows = []
+        for part, here in zip(parts, place_of, strict=True):
             at_place = np.zeros((len(part), len(place_m)))
             at_place[np.arange(len(part)), here] = part.predicted_um
             columns = np.hstack([part.by_pattern, at_place, part.by_effect])
             columns = columns / part.sigma_um[:, np.newaxis]
             residual, film = part.residual_um / part.sigma_um, part.predicted_um / part.sigma_um
-            gram = gram + columns.T @ columns
-            rows['score'].append(columns.T @ residual)
-            rows['gram'].append(film @ columns)
-            rows['level'].append(film @ residual)
-            rows['own'].append(film @ film)
-            rows['square'].append(residual @ residual)
-        return Sums(
-            gram, np.sum(rows['score'], axis=0), float(np.sum(rows['square'])),
-            np.array(rows['gram']), np.array(rows['level']), np.array(rows['own']),
-            first, place_m, pattern.between_jobs,
+            rows.append((
+                columns.T @ columns, columns.T @ residual, residual @ residual, film @ columns,
+                film @ residual, film @ film,
+            ))  # fmt: skip
+        gram, score, square, *of_levels = zip(*rows, strict=True)
+        return SufficientStatistics(
+            sum(gram), np.sum(score, axis=0), float(np.sum(square)), *map(np.array, of_levels),
+            sum(map(len, parts)), place_m, pattern.between_jobs,
         )  # fmt: skip
 
     @property
-    def shared(self) -> slice:
-        """Columns of the pattern and the places."""
-        return slice(0, len(self.between_jobs) + len(self.place_m))
-
-    def column(self, amplitude: int) -> int:
-        """Of an amplitude of the catalogue."""
-        return self.shared.stop + amplitude
+    def shared(self) -> int:
+        """How many columns the pattern and the places have; those of the effects follow."""
+        return len(self.between_jobs) + len(self.place_m)
 
 
 @dataclass(frozen=True)
@@ -110,18 +178,18 @@ class Scales:
 
 
 @dataclass(frozen=True)
-class Pool:
+class LinePosterior:
     """The readings with the levels of the parts integrated out, for some scales."""
 
-    sums: Sums
+    statistics: SufficientStatistics
     scales: Scales
 
     @cached_property
-    def _levelled(self) -> tuple[np.ndarray, np.ndarray, float]:
-        sums, precision = self.sums, 1.0 / self.scales.noise**2
-        weight = self.scales.level**2 / (
-            1.0 + self.scales.level**2 * precision * sums.level_square
-        ) * precision**2  # fmt: skip
+    def _levels_out(self) -> tuple[np.ndarray, np.ndarray, float]:
+        """Gram matrix, score and square of the residuals without what the levels explain."""
+        sums, precision = self.statistics, 1.0 / self.scales.noise**2
+        variance = self.scales.level**2
+        weight = variance / (1.0 + variance * precision * sums.level_square) * precision**2
         weighted = weight[:, np.newaxis] * sums.level_gram
         gram = precision * sums.gram - sums.level_gram.T @ weighted
         score = precision * sums.score - weighted.T @ sums.level_score
@@ -129,75 +197,194 @@ class Pool:
         return gram, score, float(square)
 
     @cached_property
-    def _prior(self) -> np.ndarray:
-        """Precision of pattern and places."""
-        return block_diag(np.linalg.inv(self.sums.between_jobs), np.linalg.inv(self._field))
-
-    @cached_property
-    def _field(self) -> np.ndarray:
-        """(F, F) covariance of the misfit at the places."""
+    def _prior(self) -> tuple[np.ndarray, float]:
+        """Precision of pattern and places before the readings, and its log determinant."""
         size, width_m = self.scales.misfit or (1e-6, 1e-3)
-        apart = np.linalg.norm(
-            self.sums.place_m[:, np.newaxis] - self.sums.place_m[np.newaxis], axis=2
-        )
+        place_m = self.statistics.place_m
+        apart = np.linalg.norm(place_m[:, np.newaxis] - place_m[np.newaxis], axis=2)
         smooth = np.exp(-0.5 * (apart / width_m) ** 2)
-        return size**2 * (smooth + 1e-3 * np.eye(len(apart)))
+        blocks = (self.statistics.between_jobs, size**2 * (smooth + 1e-3 * np.eye(len(apart))))
+        log_det = -sum(float(np.linalg.slogdet(block)[1]) for block in blocks)
+        return block_diag(*map(np.linalg.inv, blocks)), log_det
 
     def solved(self, chosen: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray, float]:
         """Mean (k,) and covariance (k, k) of pattern, places and these amplitudes; log evidence.
 
         Amplitudes are standard normal before the readings, in their typical sizes.
         """
-        gram, score, square = self._levelled
-        rows = [*range(self.sums.shared.stop), *(self.sums.column(one) for one in chosen)]
+        gram, score, square = self._levels_out
+        precision, log_prior = self._prior
+        shared, scales = self.statistics.shared, self.scales
+        rows = [*range(shared), *(shared + one for one in chosen)]
         prior = np.eye(len(rows))
-        shared = self.sums.shared.stop
-        prior[:shared, :shared] = self._prior
-        posterior = gram[np.ix_(rows, rows)] + prior
-        factor = cho_factor(posterior, lower=True)
+        prior[:shared, :shared] = precision
+        factor = cho_factor(gram[np.ix_(rows, rows)] + prior, lower=True)
         mean = cho_solve(factor, score[rows])
         log_det = 2.0 * np.log(np.diag(factor[0])).sum()
-        log_prior = self._log_det_prior
-        levels = np.log1p(
-            self.scales.level**2 * self.sums.level_square / self.scales.noise**2
-        ).sum()
-        evidence = -0.5 * (
+        levels = np.log1p(scales.level**2 * self.statistics.level_square / scales.noise**2).sum()
+        log_evidence = -0.5 * (
             square - score[rows] @ mean + log_det - log_prior + levels
-            + 2.0 * self.sums.count * np.log(self.scales.noise)
+            + 2.0 * self.statistics.count * np.log(scales.noise)
         )  # fmt: skip
-        return mean, cho_solve(factor, np.eye(len(rows))), float(evidence)
+        return mean, cho_solve(factor, np.eye(len(rows))), float(log_evidence)
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """A posterior for each misfit that is considered, with the logarithm of its prior share."""
+
+    posteriors: tuple[LinePosterior, ...]
+    log_share: np.ndarray
+
+    @staticmethod
+    def beside(statistics: SufficientStatistics, chosen: Sequence[int]) -> Weighed:
+        """With the level and the noise that are the likeliest beside these amplitudes."""
+        misfits: list[tuple[float, float] | None] = [None, *MISFITS]
+        scales = Scales(0.02, 1.0, None)
+        for _ in range(2):
+            for tried in (
+                [replace(scales, misfit=misfit) for misfit in misfits],
+                [replace(scales, noise=noise) for noise in NOISES],
+                [replace(scales, level=level) for level in LEVELS],
+            ):
+                scales = max(
+                    tried, key=lambda one: LinePosterior(statistics, one).solved(chosen)[2]
+                )
+        share = np.log((1.0 - NO_MISFIT) / len(MISFITS))
+        return Weighed(
+            tuple(LinePosterior(statistics, replace(scales, misfit=one)) for one in misfits),
+            np.array([np.log(NO_MISFIT), *[share] * len(MISFITS)]),
+        )
+
+    def evidence(self, chosen: Sequence[int]) -> float:
+        """Logarithm of the probability of the readings with these amplitudes."""
+        return float(
+            logsumexp([one.solved(chosen)[2] for one in self.posteriors] + self.log_share)
+        )
+
+    def likeliest(self, chosen: Sequence[int]) -> LinePosterior:
+        """The posterior with the likeliest misfit."""
+        return self.posteriors[int(np.argmax(self._log_joint(chosen)))]
+
+    def _log_joint(self, chosen: Sequence[int]) -> np.ndarray:
+        return np.array([one.solved(chosen)[2] for one in self.posteriors]) + self.log_share
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that the parts share.
+
+    Attributes:
+        effect, parameter, unit: which.
+        value, sd: its amplitude and the standard deviation of it.
+        probability: that one of ``members`` acts, given what was accepted before.
+        members: effects that these readings do not tell from it, itself first.
+        one_part: how many standard deviations it is off zero in one part alone, the median.
+        all_parts: the same in all parts together.
+    """
+
+    effect: str
+    parameter: str
+    unit: str
+    value: float
+    sd: float
+    probability: float
+    members: tuple[str, ...]
+    one_part: float
+    all_parts: float
+
+    @property
+    def sentence(self) -> str:
+        """The cause in a line."""
+        others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
+        size = f'{self.value:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
+        return (
+            f'{self.effect}{others}: {self.parameter} {size}; '
+            f'{self.all_parts:.1f} standard deviations over all parts, {self.one_part:.1f} in one'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures by name."""
+        return asdict(self) | {'members': list(self.members)}
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """What the parts share.
+
+    Attributes:
+        causes: accepted effects, in the order found. chosen: numbers of their amplitudes.
+        posterior: with the likeliest scales beside them.
+    """
+
+    causes: tuple[Cause, ...]
+    posterior: LinePosterior
+    chosen: tuple[int, ...]
 
     @cached_property
-    def _log_det_prior(self) -> float:
-        blocks = (self.sums.between_jobs, self._field)
-        return -sum(float(np.linalg.slogdet(block)[1]) for block in blocks)
+    def _mean(self) -> np.ndarray:
+        return self.posterior.solved(self.chosen)[0]
+
+    @property
+    def amounts(self) -> np.ndarray:
+        """Mean of the chosen amplitudes, in their typical sizes."""
+        return self._mean[self.posterior.statistics.shared :]
+
+    def shared_um(self, part: Measured, place_of: np.ndarray) -> np.ndarray:
+        """(P,) what of a part's residuals is shared [um], for the places of its points."""
+        pattern, misfit = np.split(
+            self._mean[: self.posterior.statistics.shared], [part.by_pattern.shape[1]]
+        )
+        effects = part.by_effect[:, list(self.chosen)] @ self.amounts
+        return part.by_pattern @ pattern + part.predicted_um * misfit[place_of] + effects
 
 
-def pools(sums: Sums) -> tuple[list[Pool], np.ndarray]:
-    """A pool for each misfit that is considered, with the logarithm of its prior share.
+def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Pooled:
+    """Find the effects that the parts share; ``pattern`` is that of the model, of all brushes."""
+    statistics = SufficientStatistics.of(parts, pattern)
+    names = amplitudes()
+    chosen: tuple[int, ...] = ()
+    weighed = Weighed.beside(statistics, chosen)
+    causes: list[Cause] = []
+    while len(causes) < MOST_ACCEPTED:
+        left = [k for k, (e, _) in enumerate(names) if e not in {names[c][0] for c in chosen}]
+        best = max(left, key=lambda k: weighed.evidence((*chosen, k)))
+        beside = Weighed.beside(statistics, (*chosen, best))
+        each = np.array([beside.evidence((*chosen, k)) for k in left])
+        # Half of the belief is that nothing (more) acts; the rest is shared by the effects.
+        log_odds = logsumexp(each) - np.log(len(left)) - weighed.evidence(chosen)
+        probability = float(1.0 / (1.0 + np.exp(-log_odds)))
+        if probability < SURE:
+            break
+        order = np.argsort(-each)
+        near = [left[k] for k in order if each[k] > each[order[0]] - TOGETHER]
+        chosen = (*chosen, near[0])
+        weighed = beside if near[0] == best else Weighed.beside(statistics, chosen)
+        members = tuple(dict.fromkeys(names[k][0] for k in near))
+        posterior = weighed.likeliest(chosen)
+        causes.append(_cause(parts, pattern, posterior, chosen, probability, members))
+    return Pooled(tuple(causes), weighed.likeliest(chosen), chosen)
 
-    Level and noise are set to what makes the readings most likely, by turns.
-    """
-    misfits: list[tuple[float, float] | None] = [None, *MISFITS]
-    scales = Scales(0.02, 1.0, None)
-    for _ in range(2):
-        for tried in (
-            [replace(scales, misfit=misfit) for misfit in misfits],
-            [replace(scales, noise=noise) for noise in NOISES],
-            [replace(scales, level=level) for level in LEVELS],
-        ):
-            scales = max(tried, key=lambda one: Pool(sums, one).solved()[2])
-    found = [Pool(sums, replace(scales, misfit=misfit)) for misfit in misfits]
-    share = np.log((1.0 - NO_MISFIT) / len(MISFITS))
-    return found, np.array([np.log(NO_MISFIT), *[share] * len(MISFITS)])
 
-
-def evidence(found: list[Pool], log_share: np.ndarray, chosen: Sequence[int]) -> float:
-    """Logarithm of the probability of the readings with these amplitudes, misfits weighed."""
-    return float(logsumexp([pool.solved(chosen)[2] for pool in found] + log_share))
-
-
-def likeliest(found: list[Pool], log_share: np.ndarray, chosen: Sequence[int]) -> Pool:
-    """The pool with the likeliest misfit."""
-    values = [pool.solved(chosen)[2] for pool in found] + log_share
-    return found[int(np.argmax(values))]
+def _cause(
+    parts: Sequence[Measured],
+    pattern: PatternVector,
+    posterior: LinePosterior,
+    chosen: tuple[int, ...],
+    probability: float,
+    members: tuple[str, ...],
+) -> Cause:
+    mean, covariance, _ = posterior.solved(chosen)
+    value, sd = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
+    effect, parameter = amplitudes()[chosen[-1]]
+    info = EFFECTS[effect].parameters()[parameter]
+    alone = []
+    for part in parts[:: max(len(parts) // 25, 1)]:
+        one = LinePosterior(SufficientStatistics.of([part], pattern), posterior.scales)
+        variance = one.solved(chosen[-1:])[1][-1, -1]
+        # Without the prior of the amplitude, which is standard normal.
+        alone.append(abs(value) * np.sqrt(max(1.0 / variance - 1.0, 0.0)))
+    return Cause(
+        effect, parameter, info['unit'], info['neutral'] + info['typical'] * value,
+        info['typical'] * sd, probability, members, float(np.median(alone)), abs(value) / sd,
+    )  # fmt: skip

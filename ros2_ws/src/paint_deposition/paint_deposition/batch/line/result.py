@@ -10,14 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from paint_deposition.batch.line.changes import (
+    FEWEST,
+    RUN_LENGTH,
+    Change,
+    Series,
+    changes_of,
+    date,
+    series_of,
+)
+from paint_deposition.batch.line.part import FIGURES
+from paint_deposition.batch.line.pooling import Measured, Pooled, measured_parts, pooled
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.provenance import origin
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.batch.line.causes import Pooled, pooled
-from paint_deposition.batch.line.change_points import Change, changes_of, date
-from paint_deposition.batch.line.measured import Measured, measured_parts
-from paint_deposition.batch.line.part import FIGURES
-from paint_deposition.batch.line.series import FEWEST, RUN_LENGTH, Series, series_of
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -78,10 +84,10 @@ class Line:
     def runs(self) -> list[dict[str, Any]]:
         """The first row of each part without its point, oldest first."""
         names = ['part', 'time_s', 'remark', 'pooled', *(f'film_{name}' for name in FIGURES)]
-        there = [name for name in names if name in self.table.column_names]
-        if 'time_s' not in there:
+        names = [name for name in names if name in self.table.column_names]
+        if 'time_s' not in names:
             return []
-        rows = {row['part']: row for row in self.table.select(there).to_pylist()[::-1]}
+        rows = {row['part']: row for row in self.table.select(names).to_pylist()[::-1]}
         return sorted(
             (row for row in rows.values() if row['time_s'] is not None),
             key=lambda row: row['time_s'],
@@ -92,8 +98,8 @@ class Line:
         """Name of each run that cannot be used, and why."""
         if 'error' not in self.table.column_names:
             return []
-        told = self.table.select(['part', 'error']).to_pylist()
-        return [(row['part'], row['error']) for row in told if row['error']]
+        rows = self.table.select(['part', 'error']).to_pylist()
+        return [(row['part'], row['error']) for row in rows if row['error']]
 
     @cached_property
     def remarks(self) -> list[tuple[str, str]]:
@@ -117,7 +123,7 @@ class Line:
         if self.pooled is None:
             yield 'nothing is pooled: fewer than two parts were measured'
             return
-        scales = self.pooled.pool.scales
+        scales = self.pooled.posterior.scales
         yield (
             f'the level differs from part to part by {100 * scales.level:.1f} %, the gauge '
             f'scatters {scales.noise:.2f} times as stated'
@@ -134,7 +140,7 @@ class Line:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``line.json``."""
         found = self.pooled
-        scales = found and found.pool.scales
+        scales = found and found.posterior.scales
         return {
             'parts': len(self.runs),
             'measured': len(self.parts),

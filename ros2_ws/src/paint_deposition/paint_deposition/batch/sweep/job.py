@@ -8,20 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from paint_deposition.batch.cluster.code import code_digest
-from paint_deposition.batch.cluster.finished import content_digest, digest_of
-from paint_deposition.batch.cluster.run import Case
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ManyError
-from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
-from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.provenance import model_digest
-from paint_deposition.inference.fitting.draws import drawn
+from paint_deposition.batch.cases import Case, code_digest, content_digest, digest_of
 from paint_deposition.batch.sweep.sweep_file import SweepFile
 from paint_deposition.batch.sweep.variations import (
     DRAW,
@@ -33,8 +20,18 @@ from paint_deposition.batch.sweep.variations import (
     variations,
     varied_model,
 )
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError
+from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import ModelFile, read_model_file
+from paint_deposition.files.motion_files import read_motion
+from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.provenance import model_digest
+from paint_deposition.inference.fitting.draws import drawn
 
-Tell = Callable[[str], None]
 NOTHING = 'nothing'
 
 
@@ -62,7 +59,9 @@ class Job:
     _read: dict[Any, Any] = field(default_factory=dict, repr=False)
 
     @staticmethod
-    def of(file: SweepFile, folder: Path, tell: Tell = lambda line: None) -> Job:
+    def of(
+        file: SweepFile, folder: Path, progress: Callable[[str], None] = lambda line: None
+    ) -> Job:
         """Read everything that a sweep names, each file once.
 
         Raises:
@@ -74,14 +73,19 @@ class Job:
         job.values = variations(file, models)
         for number, values in enumerate(job.values):
             if number % 100 == 0:
-                tell(f'preparing case {number + 1} of {len(job.values)}')
+                progress(f'preparing case {number + 1} of {len(job.values)}')
             job.cases.append(job._case(values))
         return job
 
     def _case(self, values: Values) -> Case:
         campaign = self._named('campaign', values)
         if campaign:
-            self._refuse_beside_a_campaign(values)
+            own = ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES)
+            if varied := [name for name in own if name in values]:
+                raise ManyError(
+                    f'{varied[0]} varies, but a campaign has its own parts and motions; leave one '
+                    'out'
+                )
         model = self._model(values)
         if campaign:
             inputs: tuple[str, ...] = (self._campaign(values),)
@@ -102,17 +106,17 @@ class Job:
             self._read[key] = read()
         return self._read[key]
 
-    def _kept(self, key: Any, what: str, path: Path, read: Callable[[], Any]) -> str:
+    def _input(self, key: Any, what: str, path: Path, read: Callable[[], Any]) -> str:
         """The name of an input that is read once from a file."""
 
-        def take() -> str:
+        def named() -> str:
             value = read()
             name = f'{what}-{content_digest(value)}'
             self.inputs[name] = value
             self.files[f'{what} {path.name}'] = path
             return name
 
-        return self._once((what, path, key), take)
+        return self._once((what, path, key), named)
 
     def _named_models(self) -> list[DepositionModel]:
         """All models that the sweep names, those of campaigns included."""
@@ -163,19 +167,18 @@ class Job:
         path = self._named('campaign', values)
         assert path is not None
         pose = values.get('part_pose', self.file.part_pose)
-        read = partial(read_campaign, path, self._say, pose)
-        return self._kept(str(pose), 'campaign', path, read)
+        read = partial(read_campaign, path, part_pose=pose, remark=self._note)
+        return self._input(str(pose), 'campaign', path, read)
 
-    def _say(self, line: str) -> None:
-        if not line.startswith('reading '):
-            self.notes[line] = None
+    def _note(self, kind: str, experiment: str, line: str) -> None:
+        self.notes[f'{experiment}: {line}'] = None
 
     def _of_a_film(self, values: Values) -> tuple[str, str, str]:
         mesh, motion = self._named('mesh', values), self._named('trajectory', values)
         if mesh is None:
             raise ManyError('no mesh is given; give mesh, or campaign')
         file = self.file
-        surface = self._kept(
+        surface = self._input(
             None, 'mesh', mesh,
             lambda: read_mesh(mesh, file.mesh_scale, file.max_edge_length_m, None, file.body),
         )  # fmt: skip
@@ -183,7 +186,7 @@ class Job:
         places = NOTHING
         if file.readings:
             path = self.folder / file.readings
-            places = self._kept(
+            places = self._input(
                 surface, 'readings', path,
                 lambda: read_readings(path, None, surface=self.inputs[surface]),
             )  # fmt: skip
@@ -192,12 +195,12 @@ class Job:
         return surface, recorded, places
 
     def _motion(self, path: Path, values: Values) -> str:
-        told = self.file.model_dump(include=set(MotionSource.model_fields))
-        told |= {'urdf': told['urdf'] and str(self.folder / told['urdf'])}
+        given = self.file.model_dump(include=set(MotionSource.model_fields))
+        given |= {'urdf': given['urdf'] and str(self.folder / given['urdf'])}
         if 'part_pose' in values:
-            told['part_pose'] = values['part_pose']
-        source = MotionSource.model_validate(told)
-        name = self._kept(str(told), 'trajectory', path, lambda: read_motion(path, source))
+            given['part_pose'] = values['part_pose']
+        source = MotionSource.model_validate(given)
+        name = self._input(str(given), 'trajectory', path, lambda: read_motion(path, source))
         for note in (*self.inputs[name].notes, *self.inputs[name].warnings):
             self.notes[note] = None
         return name
@@ -215,7 +218,7 @@ class Job:
         passes = file.passes.model_dump() | {n: values[n] for n in OF_PASSES if n in values}
         if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
             raise ManyError(
-                'passes are planned, but neither their speed nor a target is told; give passes: '
+                'passes are planned, but neither their speed nor a target is given; give passes: '
                 '{speed_m_per_s: ...}, passes: {target_um: ...}, or a trajectory'
             )
         return {
@@ -225,11 +228,3 @@ class Job:
             'tolerance_um': file.tolerance_um,
             'keep_films': file.keep_films,
         }
-
-    @staticmethod
-    def _refuse_beside_a_campaign(values: Values) -> None:
-        for name in ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES):
-            if name in values:
-                raise ManyError(
-                    f'{name} varies, but a campaign tells its own parts and motions; leave one out'
-                )

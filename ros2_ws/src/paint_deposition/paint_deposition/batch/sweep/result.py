@@ -3,24 +3,32 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
-from paint_deposition.batch.cluster.finished import Finished
+from paint_deposition.batch.cases import ResultCache
+from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
+from paint_deposition.batch.sweep.job import Job
+from paint_deposition.batch.sweep.variations import DRAW
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
-from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
-from paint_deposition.batch.sweep.job import Job
-from paint_deposition.batch.sweep.picture import write_sweep_picture
+from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
+from paint_deposition.report.style import ACCENT, INK
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
+# Values that are few enough for a line through their medians.
+FEW_VALUES = 12
+MOST_COLUMNS = 6
+# Narrowest range of a chart, as a share of its values.
+LEAST_SPAN = 0.01
 # What a case says that leaves a thing, or everything, as the sweep's file has it.
 UNCHANGED = 'unchanged'
 # What is judged and drawn, of films and of campaigns, each with its label; less is better.
@@ -45,11 +53,11 @@ class Sweep:
     workers: str
 
     @staticmethod
-    def of(job: Job, finished: Finished, computed: int, workers: str) -> Sweep:
+    def of(job: Job, results: ResultCache, computed: int, workers: str) -> Sweep:
         """Collect the results of a job that is finished."""
         import pyarrow as pa
 
-        figures = finished.table(case.digest for case in job.cases)
+        figures = results.table(case.digest for case in job.cases)
         columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
         for name in dict.fromkeys(name for values in job.values for name in values):
             columns[name] = _column([values.get(name) for values in job.values])
@@ -74,16 +82,16 @@ class Sweep:
     @property
     def errors(self) -> list[tuple[int, str]]:
         """Number of each case without a result, and why."""
-        told = enumerate(self.table['error'].to_pylist(), start=1)
-        return [(number, error) for number, error in told if error]
+        return self._texts('error')
 
     @property
     def warnings(self) -> list[tuple[int, str]]:
         """Number of each case with an odd film, and what is odd about it."""
-        if WARNINGS not in self.table.column_names:
-            return []
-        told = enumerate(self.table[WARNINGS].to_pylist(), start=1)
-        return [(number, line) for number, line in told if line]
+        return self._texts(WARNINGS) if WARNINGS in self.table.column_names else []
+
+    def _texts(self, name: str) -> list[tuple[int, str]]:
+        texts = enumerate(self.table[name].to_pylist(), start=1)
+        return [(number, text) for number, text in texts if text]
 
     @property
     def judged(self) -> str | None:
@@ -114,9 +122,11 @@ class Sweep:
                 low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95))
                 yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
         if self.best is not None:
-            told = self.job.values[self.best]
-            shown = ', '.join(f'{name} {_short(value)}' for name, value in told.items())
-            shown = shown or UNCHANGED
+            values = [
+                f'{name} {f"{value:.6g}" if isinstance(value, float) else value}'
+                for name, value in self.job.values[self.best].items()
+            ]
+            shown = ', '.join(values) or UNCHANGED
             yield f'best by {JUDGED[str(self.judged)]}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:
@@ -153,7 +163,7 @@ def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]
     if drawn and over:
         results = {label: sweep.column(name) for name, label in drawn}
         picture = folder / f'sweep.{pictures}'
-        files.append(write_sweep_picture(picture, over, results, sweep.sentence))
+        files.append(_write_picture(picture, over, results, sweep.sentence))
     return files
 
 
@@ -190,17 +200,17 @@ def _column(values: Sequence[Any]) -> pa.Array:
 
 def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
     """(n,) numbers that varied, or texts: what files are called, which effects act."""
-    told = getattr(sweep.job.file, name, None)
-    given = [values.get(name, told) for values in sweep.job.values]
+    default = getattr(sweep.job.file, name, None)
+    given = [values.get(name, default) for values in sweep.job.values]
     if all(isinstance(value, int | float) for value in given if value is not None):
         return sweep.column(name)
-    return np.array([_words(value) for value in given])
-
-
-def _words(value: list[str] | str | None) -> str:
-    if isinstance(value, list):
-        return '\n'.join(value) or 'none'
-    return value.replace('/', '/\n') if value else UNCHANGED
+    words = [
+        '\n'.join(value) or 'none'
+        if isinstance(value, list)
+        else (value or UNCHANGED).replace('/', '/\n')
+        for value in given
+    ]
+    return np.array(words)
 
 
 def _spread(values: np.ndarray) -> dict[str, float]:
@@ -208,5 +218,35 @@ def _spread(values: np.ndarray) -> dict[str, float]:
     return {'median': middle, 'low_5': low, 'high_95': high}
 
 
-def _short(value: Any) -> str:
-    return f'{value:.6g}' if isinstance(value, float) else str(value)
+def _write_picture(
+    path: Path, varied: Mapping[str, np.ndarray], results: Mapping[str, np.ndarray], title: str
+) -> Path:
+    """Draw each result (n,), a row of charts, over each number or text that varied, a column."""
+    names = list(varied)[:MOST_COLUMNS]
+    figure = new_figure(max(5.5, 3.4 * len(names)), 2.9 * len(results) + 0.4)
+    charts = figure.subplots(len(results), len(names), squeeze=False, sharex='col', sharey='row')
+    for axes, name in zip(charts[-1], names, strict=True):
+        axes.set_xlabel(name)
+    for row, (label, result) in zip(charts, results.items(), strict=True):
+        for axes, name in zip(row, names, strict=True):
+            quiet(axes, axes.get_xlabel(), label if axes is row[0] else '')
+            _draw(axes, varied[name], result, in_order=name != DRAW)
+    figure.suptitle(title, x=0.01, ha='left', fontsize=11, color=INK)
+    return save_picture(figure, path)
+
+
+def _draw(axes: Axes, values: np.ndarray, result: np.ndarray, in_order: bool) -> None:
+    is_text = values.dtype.kind == 'U'
+    there = np.isfinite(result) & (True if is_text else np.isfinite(values))
+    if not there.any():
+        return
+    values, result = values[there], result[there]
+    axes.scatter(values, result, s=14, color=ACCENT, alpha=0.55, linewidths=0)
+    places = np.unique(values)
+    if in_order and not is_text and 1 < len(places) <= FEW_VALUES and len(values) > len(places):
+        medians = [np.median(result[values == place]) for place in places]
+        axes.plot(places, medians, color=ACCENT, linewidth=1.4)
+    # Rounding alone is no result: the chart does not magnify it.
+    middle, span = np.median(result), LEAST_SPAN * np.abs(np.median(result))
+    if np.ptp(result) < span:
+        axes.set_ylim(middle - span, middle + span)

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
 
+from paint_deposition.batch.sweep.sweep_file import MOST_CASES, SweepFile
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -16,7 +17,6 @@ from paint_deposition.errors import ManyError, did_you_mean
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.model.projection import Projection
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
-from paint_deposition.batch.sweep.sweep_file import MOST_CASES, SweepFile
 
 INPUTS = ('mesh', 'trajectory', 'campaign', 'model')
 # Of passes that are planned, and of a recording as it was.
@@ -63,7 +63,8 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
     Raises:
         ManyError: an unknown name, a name in two blocks, or too many cases.
     """
-    names = [list(file.grid), sorted({n for case in file.cases for n in case}), _drawn_names(file)]
+    drawn = list(file.sample.vary) if file.sample else []
+    names = [list(file.grid), sorted({n for case in file.cases for n in case}), drawn]
     seen: set[str] = set()
     known = known_names(models)
     for name in (name for block in names for name in block):
@@ -75,20 +76,13 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
     count = int(np.prod([len(v) for v in file.grid.values()])) * max(len(file.cases), 1) * draws
     if count > MOST_CASES:
         raise ManyError(f'{count} cases are more than {MOST_CASES}; vary less at once')
-    blocks = product(_combined(file.grid), file.cases or [{}], _draws(file))
-    found = [{**grid, **case, **draw} for grid, case, draw in blocks]
+    grid = [dict(zip(file.grid, values, strict=True)) for values in product(*file.grid.values())]
+    blocks = product(grid, file.cases or [{}], _draws(file))
+    found = [{**of_grid, **case, **draw} for of_grid, case, draw in blocks]
     for values in found:
-        _require_sense(values)
+        for name, value in values.items():
+            _require_kind(name, value)
     return found
-
-
-def _combined(grid: Mapping[str, list[Any]]) -> Iterator[Values]:
-    for values in product(*grid.values()):
-        yield dict(zip(grid, values, strict=True))
-
-
-def _drawn_names(file: SweepFile) -> list[str]:
-    return list(file.sample.vary) if file.sample else []
 
 
 def _draws(file: SweepFile) -> list[Values]:
@@ -120,30 +114,27 @@ def _require_known(name: str, known: Sequence[str]) -> None:
         raise ManyError(f'nothing called {name!r} can vary; {remedy}')
 
 
-def _require_sense(values: Values) -> None:
-    """Refuse values of another kind than their name has."""
-    for name, value in values.items():
-        if name in INPUTS:
-            _require(isinstance(value, str), name, value, 'the name of a file')
-        elif name == 'part_pose':
-            numbers = isinstance(value, list) and all(map(_is_number, value))
-            _require(numbers and is_pose(value), name, value, POSE_WORDS)
-        elif name == 'effects':
-            texts = isinstance(value, list) and all(isinstance(one, str) for one in value)
-            _require(texts, name, value, 'a list of effects of the model, [] for none')
-        else:
-            _require(_is_number(value), name, value, 'a number')
-            if name in (*OF_PASSES, 'speed_factor', 'flow_factor'):
-                _require(value > 0.0, name, value, 'a number above 0')
+def _require_kind(name: str, value: Any) -> None:
+    """Refuse a value of another kind than its name has."""
+    many = value if isinstance(value, list) else []
+    if name in INPUTS:
+        holds, expected = isinstance(value, str), 'the name of a file'
+    elif name == 'part_pose':
+        holds, expected = all(map(_is_number, many)) and is_pose(many), POSE_WORDS
+    elif name == 'effects':
+        holds = isinstance(value, list) and all(isinstance(one, str) for one in value)
+        expected = 'a list of effects of the model, [] for none'
+    elif name in (*OF_PASSES, 'speed_factor', 'flow_factor'):
+        holds = _is_number(value) and value > 0.0
+        expected = f'a number{" above 0" if _is_number(value) else ""}'
+    else:
+        holds, expected = _is_number(value), 'a number'
+    if not holds:
+        raise ManyError(f'{name} is {value!r}; expected {expected}')
 
 
 def _is_number(value: Any) -> bool:
     return isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
-
-
-def _require(holds: object, name: str, value: Any, expected: str) -> None:
-    if not holds:
-        raise ManyError(f'{name} is {value!r}; expected {expected}')
 
 
 def varied_model(
@@ -175,22 +166,16 @@ def varied_model(
             section = _changed(getattr(model, owner), field, value, name)
             model = model.model_copy(update={owner: section})
         elif owner.startswith(BRUSH):
-            model = _with_brush(model, int(owner.removeprefix(BRUSH)), field, value, name)
+            number = int(owner.removeprefix(BRUSH))
+            model.with_brush(number)  # which says so where there is none of that number
+            model = model.with_patterns([
+                _changed(b.planar, field, value, name) if b.number == number else b.planar
+                for b in model.brushes
+            ])  # fmt: skip
         else:
             effect = model.effect(owner) or effects[owner]()
             model = model.with_effect(_changed(effect, field, value, name))
     return model
-
-
-def _with_brush(
-    model: DepositionModel, number: int, field: str, value: float, name: str
-) -> DepositionModel:
-    model.with_brush(number)  # which says so where there is none of that number
-    patterns = [
-        _changed(brush.planar, field, value, name) if brush.number == number else brush.planar
-        for brush in model.brushes
-    ]
-    return model.with_patterns(patterns)
 
 
 def _with_effects(model: DepositionModel, wanted: Iterable[str]) -> DepositionModel:

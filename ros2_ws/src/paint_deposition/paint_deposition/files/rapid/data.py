@@ -12,8 +12,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.rapid.syntax import Module
-from paint_deposition.files.rapid.values import Call, Reference
+from paint_deposition.files.rapid.parser import Call, Module, Reference
 
 # Quaternions are written with four digits; further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01

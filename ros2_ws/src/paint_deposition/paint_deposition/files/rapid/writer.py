@@ -53,8 +53,7 @@ def module_text(
     are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
     ends with the gun off. Where passes have flows of their own, the analogue output aoFlow is set
     to them, relative to the calibrated flow, as the gun opens; where a brush has a number, so is
-    the group output goBrush. `read_program` reads it back within
-    0.001 mm.
+    the group output goBrush. `read_program` reads it back within 0.001 mm.
 
     Args:
         moves: in the part's frame.

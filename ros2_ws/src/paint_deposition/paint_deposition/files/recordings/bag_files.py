@@ -20,7 +20,6 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bounded_path import BoundedPath
 from paint_deposition.files.recordings.mcap_recovery import is_unfinished, mcap_files
 
 # The key of a bag's custom data under which a plan says which topic is its trigger.
@@ -75,6 +74,22 @@ class Bag:
         """The topic of that name, given with or without a leading slash."""
         wanted = name.lstrip('/')
         return next((topic for topic in self.topics if topic.name.lstrip('/') == wanted), None)
+
+    def choose(self, name: str, types: Sequence[str], kind: str) -> BagTopic:
+        """The named topic if it is of one of these types.
+
+        Raises:
+            RecordingError: it is not; names those there are.
+        """
+        listed = listed_topics(self.topics_of(*types), kind)
+        topic = self.find(name)
+        if topic is None:
+            raise RecordingError(f'{self.path} has no topic {name}; {listed}')
+        if topic.type not in types:
+            raise RecordingError(
+                f'{topic.name} in {self.path} is {topic.type}, not {" or ".join(types)}; {listed}'
+            )
+        return topic
 
     def type_hash(self, topic: BagTopic) -> str:
         """RIHS01 hash of a topic's type as the bag defines it."""
@@ -137,6 +152,13 @@ class Bag:
         )
 
 
+def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
+    """The topics of a kind in words."""
+    if not topics:
+        return f'it has no {kind} topic'
+    return f'its {kind} topics: {" ".join(topic.name for topic in topics)}'
+
+
 @contextmanager
 def open_bag(path: Path | str) -> Iterator[Bag]:
     """Open a bag for reading.
@@ -147,8 +169,7 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
     path = Path(path)
     _refuse_what_is_no_bag(path)
     with _reading(path):
-        bounded = BoundedPath(path)
-        reader = Ros1Reader(bounded) if path.suffix == '.bag' else Ros2Reader(bounded)
+        reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
         yield Bag(path, reader)
@@ -159,8 +180,8 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 def custom_data(path: Path) -> dict[str, str]:
     """Texts by name that the writer of a rosbag2 folder put into its metadata.yaml."""
     try:
-        told = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
-        return dict(told['rosbag2_bagfile_information'].get('custom_data') or {})
+        metadata = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
+        return dict(metadata['rosbag2_bagfile_information'].get('custom_data') or {})
     except Exception:  # of an older version, damaged, or no bag: whoever reads it says so
         return {}
 
@@ -200,7 +221,7 @@ def _reading(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f'cannot read {path}: {error.strerror or error}') from None
     except Exception as error:
-        reason = ' '.join(str(error).split()).rstrip('.')
+        reason = ' '.join(str(error).split()).rstrip('.') or type(error).__name__
         raise RecordingError(f'{path} is damaged ({reason}){_remedy(path)}') from None
 
 

@@ -13,7 +13,7 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics, open_bag
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import (
@@ -23,8 +23,6 @@ from paint_deposition.files.recordings.message_definitions import (
 )
 from paint_deposition.files.recordings.triggers import (
     BOOL_TYPE,
-    choose_topic,
-    listed_topics,
     read_switching,
     unused_triggers,
 )
@@ -71,22 +69,36 @@ def read_trajectory(
         RecordingError: one line that names the bag, what is wrong and what to do.
     """
     with open_bag(path) as bag:
-        if tf:
-            from paint_deposition.files.recordings.transforms import read_tf_poses
+        return trajectory_of(bag, pose_topic, state_topic, tf, robot)
 
-            trajectory, log_times_ns = read_tf_poses(bag, *tf)
-        elif robot:
-            from paint_deposition.files.recordings.joint_states import read_joint_poses
 
-            trajectory, log_times_ns = read_joint_poses(bag, robot, pose_topic)
-        else:
-            trajectory, log_times_ns = _read_poses(bag, choose_pose_topic(bag, pose_topic))
-        if not state_topic:
-            return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
-        gun = read_switching(bag, state_topic)
-        if gun.by_log_time:
-            offset_ns = float(np.median(log_times_ns - trajectory.stamps_ns))
-            _refuse_other_clock(bag, state_topic, offset_ns * 1e-9)
+def trajectory_of(
+    bag: Bag,
+    pose_topic: str | None = None,
+    state_topic: str | None = None,
+    tf: Sequence[str] | None = None,
+    robot: Robot | None = None,
+) -> Trajectory:
+    """The same of an open bag."""
+    if tf:
+        from paint_deposition.files.recordings.transforms import read_tf_poses
+
+        trajectory, log_times_ns = read_tf_poses(bag, *tf)
+    elif robot:
+        from paint_deposition.files.recordings.joint_states import read_joint_poses
+
+        trajectory, log_times_ns = read_joint_poses(bag, robot, pose_topic)
+    else:
+        trajectory, log_times_ns = _read_poses(bag, choose_pose_topic(bag, pose_topic))
+    if not state_topic:
+        return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
+    gun = read_switching(bag, state_topic)
+    offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
+    if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
+        raise RecordingError(
+            f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
+            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
+        )
     return replace(
         trajectory,
         trigger_stamps_ns=gun.stamps_ns,
@@ -106,7 +118,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
             listed = listed_topics(candidates, 'PoseStamped')
             raise RecordingError(f'{bag.path}: name a pose topic; {listed}{_other_motion(bag)}')
         name = candidates[0].name
-    topic = choose_topic(bag, name, (POSE_TYPE,), 'PoseStamped')
+    topic = bag.choose(name, (POSE_TYPE,), 'PoseStamped')
     if topic.message_count == 0:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
     return topic
@@ -155,14 +167,6 @@ def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
     return trajectory, np.array(log_times, dtype=np.int64)
 
 
-def _refuse_other_clock(bag: Bag, trigger: str, offset_s: float) -> None:
-    if abs(offset_s) > MAX_CLOCK_OFFSET_S:
-        raise RecordingError(
-            f'{trigger} in {bag.path} has no stamps, and the stream of poses was logged '
-            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
-        )
-
-
 def write_pose_bag(
     folder: Path | str,
     trajectory: Trajectory,
@@ -189,8 +193,8 @@ def write_pose_bag(
         )
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    told = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
-    state_type = STATE_TYPE if levels or told.any() else BOOL_TYPE
+    numbers = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
+    state_type = STATE_TYPE if levels or numbers.any() else BOOL_TYPE
     # Behind the time, what comes first of those at one time.
     entries: list[tuple[int, int, Any]] = [
         (time_ns, 0, (*gun, trajectory.set_points_of(row)))

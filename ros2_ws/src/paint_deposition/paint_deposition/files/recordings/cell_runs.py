@@ -23,17 +23,16 @@ FIGURES = (
 
 @dataclass(frozen=True)
 class CellRun:
-    """One coat on one part.
+    """One coat on one part; '' or None is not known.
 
     Attributes:
         run: name of its folder.
         type, serial, coat: of the part, as the cell said.
-        since, until: when the part was in the cell, ISO 8601; '' where not known.
-        gap_s: how long the first poses waited for the part [s]; None where not known.
-        recording: 'complete', 'unfinished' or 'none'.
-        duration_s: of the recording [s]; None where there is no complete one.
-        poses: that were painted; gaps: among them; both None without a film.
-        film: figures of the film by name, see ``FIGURES``; empty without a film.
+        since, until: when the part was in the cell, ISO 8601.
+        gap_s: how long the first poses waited for the part [s].
+        recording: 'complete', 'unfinished' or 'none'. duration_s: of a complete one [s].
+        poses: that were painted. gaps: among them.
+        film: figures of the film by name, see ``FIGURES``.
         atomizers: what each gun laid.
     """
 
@@ -77,21 +76,17 @@ def _run(place: Path) -> CellRun | None:
         return None
     try:
         film = json.loads(film_file.read_text(encoding='utf-8')) if film_file.is_file() else {}
-        bag = (
-            yaml.safe_load(metadata_file.read_text(encoding='utf-8'))
-            if (recorded and metadata_file.is_file())
-            else {}
-        )
+        complete = recorded and metadata_file.is_file()
+        bag = yaml.safe_load(metadata_file.read_text(encoding='utf-8')) if complete else {}
         information = bag.get('rosbag2_bagfile_information', {})
-        told = information.get('custom_data') or {}
-        part = film.get('part') or {}
+        noted = information.get('custom_data') or {}
+        part, poses = film.get('part') or {}, film.get('poses') or {}
         duration = information.get('duration')
-        poses = film.get('poses') or {}
         return CellRun(
             run=place.name,
-            type=str(part.get('type') or told.get('part_type', '')),
-            serial=str(part.get('serial') or told.get('serial', '')),
-            coat=int(part.get('coat') or told.get('coat', 1)),
+            type=str(part.get('type') or noted.get('part_type', '')),
+            serial=str(part.get('serial') or noted.get('serial', '')),
+            coat=int(part.get('coat') or noted.get('coat', 1)),
             since=str(part.get('since', '')),
             until=str(part.get('until', '')),
             gap_s=part.get('gap_s'),

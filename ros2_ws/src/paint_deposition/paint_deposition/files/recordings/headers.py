@@ -14,5 +14,5 @@ def stamp_ns(header: Any) -> int:
 
 def set_points_of(state: Any) -> tuple[float, ...]:
     """The set-points of a state, as those of a trajectory; 0 where it does not tell one."""
-    told = (abs(float(getattr(state, name, 0.0))) for name in SET_POINTS)
-    return tuple(value if math.isfinite(value) else 0.0 for value in told)
+    known = (abs(float(getattr(state, name, 0.0))) for name in SET_POINTS)
+    return tuple(value if math.isfinite(value) else 0.0 for value in known)

@@ -11,10 +11,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.recordings.bag_files import Bag
+from paint_deposition.files.recordings.bag_files import Bag, listed_topics
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-from paint_deposition.files.recordings.triggers import choose_topic, listed_topics
 from paint_deposition.motion.trajectory import Trajectory
 
 USUAL_TIP = 'tool0'
@@ -129,7 +128,7 @@ def read_joint_poses(
             listed = listed_topics(topics, 'JointState')
             raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
         topic_name = topics[0].name
-    topic = choose_topic(bag, topic_name, (JOINT_TYPE,), 'JointState')
+    topic = bag.choose(topic_name, (JOINT_TYPE,), 'JointState')
     rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving}
     seen: set[str] = set()
     for _, log_time_ns, message in bag.decoded([topic.name]):

@@ -6,13 +6,17 @@ import shutil
 import struct
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from io import BytesIO
 from pathlib import Path
 from typing import IO, cast
 
+import lz4.frame
 import yaml
 import zstandard
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError, RecordLengthLimitExceeded
+from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
@@ -21,11 +25,11 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.mcap_cut_chunk import readable_beginning
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
 MAX_CHUNK_BYTES = 256 * 1024 * 1024
+RECORD_HEAD = struct.Struct('<BQ')  # opcode and length
 # What the readers raise on bytes that are not what they should be.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
@@ -193,7 +197,7 @@ def _records(file: Path, stream: mmap.mmap, breaks: list[str]) -> Iterator[McapR
     except DAMAGE as error:
         cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
         stream.seek(record_at)
-        beginning = readable_beginning(stream.read(MAX_CHUNK_BYTES))
+        beginning = _readable_beginning(stream.read(MAX_CHUNK_BYTES))
         if beginning:
             yield beginning
         reason = 'the end is missing' if cut else str(error)
@@ -261,3 +265,34 @@ def _qos(channel: Channel) -> list[Qos]:
         return parse_qos(channel.metadata.get('offered_qos_profiles', ''))
     except (ReaderError, KeyError, TypeError, AttributeError):
         return []  # damaged; players take their default then
+
+
+def _readable_beginning(record: bytes) -> Chunk | None:
+    """An uncompressed chunk of the whole messages in a cut chunk record, None if there are none.
+
+    Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
+    Its checksum covers all of it and cannot be checked any more.
+    """
+    if record[:1] != bytes([Opcode.CHUNK]):
+        return None
+    try:
+        chunk = Chunk.read(ReadDataStream(BytesIO(record[RECORD_HEAD.size :])))
+        data = chunk.data
+        if chunk.compression == 'zstd':
+            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        elif chunk.compression == 'lz4':
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+    except DAMAGE:
+        return None
+    end = 0
+    while end + RECORD_HEAD.size <= len(data):
+        length = RECORD_HEAD.size + RECORD_HEAD.unpack_from(data, end)[1]
+        if end + length > len(data):
+            break
+        end += length
+    whole = data[:end]
+    return (
+        replace(chunk, compression='', data=whole, uncompressed_crc=0, uncompressed_size=end)
+        if whole
+        else None
+    )

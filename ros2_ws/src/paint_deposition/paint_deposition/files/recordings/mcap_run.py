@@ -6,6 +6,7 @@ The folder without `metadata.yaml` is an unfinished run, as it is for rosbag2.
 
 from __future__ import annotations
 
+import json
 import os
 import time
 from collections.abc import Iterator, Mapping, Sequence
@@ -264,12 +265,7 @@ class RunWriter:
         }
 
 
-class _NoAliases(yaml.SafeDumper):
-    """Repeats equal values in full, as rosbag2 does, instead of with anchors."""
-
-    def ignore_aliases(self, _data: object) -> bool:
-        return True
-
-
 def _yaml(value: object) -> str:
-    return yaml.dump(value, Dumper=_NoAliases, sort_keys=False, allow_unicode=True)
+    # Equal values are repeated in full, as rosbag2 does, instead of with anchors.
+    copied = json.loads(json.dumps(value))
+    return yaml.safe_dump(copied, sort_keys=False, allow_unicode=True)

@@ -35,12 +35,9 @@ float64 programmed_speed_m_per_s
 
 @dataclass(frozen=True)
 class Definition:
-    """A message type's definition.
+    """A message type: its .msg text and, behind separators, that of each type it uses.
 
-    Attributes:
-        text: its own .msg text, then that of each type it uses behind a separator (`ros2msg`).
-        type_hash: `RIHS01_...` of REP-2016, '' when unknown.
-        encoding: MCAP schema encoding of the text.
+    ``type_hash`` is `RIHS01_...` of REP-2016, '' when unknown; ``encoding`` that of the schema.
     """
 
     text: str

@@ -46,27 +46,7 @@ class Switching:
 
 def choose_state_topic(bag: Bag, name: str) -> BagTopic:
     """The named topic of a bag, AtomizerState or Bool."""
-    return choose_topic(bag, name, (STATE_TYPE, BOOL_TYPE), 'state')
-
-
-def choose_topic(bag: Bag, name: str, types: tuple[str, ...], kind: str) -> BagTopic:
-    """The named topic of a bag if it is of one of these types; the error lists those there are."""
-    listed = listed_topics(bag.topics_of(*types), kind)
-    topic = bag.find(name)
-    if topic is None:
-        raise RecordingError(f'{bag.path} has no topic {name}; {listed}')
-    if topic.type not in types:
-        raise RecordingError(
-            f'{topic.name} in {bag.path} is {topic.type}, not {" or ".join(types)}; {listed}'
-        )
-    return topic
-
-
-def listed_topics(candidates: list[BagTopic], kind: str) -> str:
-    """The topics of a kind in words."""
-    if not candidates:
-        return f'it has no {kind} topic'
-    return f'its {kind} topics: {" ".join(topic.name for topic in candidates)}'
+    return bag.choose(name, (STATE_TYPE, BOOL_TYPE), 'state')
 
 
 def unused_triggers(bag: Bag) -> tuple[str, ...]:
@@ -125,7 +105,7 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     States recorded before they had a brush are of the only one.
     """
     changes: list[tuple[int, float, int, tuple[float, ...]]] = []
-    told: dict[str, list[float]] = {}
+    settings: dict[str, list[float]] = {}
     without_flow = 0
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
@@ -145,16 +125,16 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
         for name in SETTINGS:
             value = getattr(message, name, np.nan)
             if message.spraying and np.isfinite(value):
-                told.setdefault(name, []).append(value)
+                settings.setdefault(name, []).append(value)
     changes.sort(key=lambda change: change[0])
-    set_points = np.array([told for *_, told in changes])
+    set_points = np.array([points for *_, points in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return Switching(
         np.array([stamp for stamp, *_ in changes], dtype=np.int64),
         np.array([flow for _, flow, *_ in changes], dtype=float),
         numbered([brush for _, _, brush, _ in changes]),
         set_points if set_points.any() else np.empty((0, 4)),
-        {name: float(np.median(values)) for name, values in told.items()},
+        {name: float(np.median(values)) for name, values in settings.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),
     )

@@ -1,1 +1,1 @@
-"""Tables as gauges, measuring robots and spreadsheets write them, brought to one form."""
+"""Tables of readings, points and poses, as gauges, robots and spreadsheets write them."""

@@ -1,25 +1,30 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
+from __future__ import annotations
+
 import csv
 import re
-from collections.abc import Iterator
+import zipfile
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
 
-from paint_deposition.errors import ReadingsError
+from paint_deposition.errors import PaintError
 from paint_deposition.files.parquet import MAGIC, require_libraries
-from paint_deposition.files.tables.far_cells import MOST_CELLS, refuse_far_cells
-from paint_deposition.files.text import decoded
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
 
 SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', '|': 'bars'}
-# Columns of a printed list stand apart by blanks; headings of two words by one only.
+# Columns of a printed list stand apart by two blanks where headings have one.
 BLANKS = (re.compile(r'\s{2,}|\t'), re.compile(r'\s+'))
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-EXPECTED = 'give gauge readings as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
+ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
+# A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
+MOST_CELLS = 10_000_000
+XLSX_CELL = re.compile(rb'<c\s[^>]*?\br=["\']([A-Za-z]{1,3})(\d{1,7})')
+EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -37,98 +42,128 @@ class Sheet:
     form: str
 
     @staticmethod
-    def of(numbered: Iterator[tuple[int, list[Cell]]], form: str) -> 'Sheet':
+    def of(numbered: Iterable[tuple[int, list[Cell]]], form: str) -> Sheet:
         """The rows that are not blank."""
         kept = [(line, row) for line, row in numbered if any(cell != '' for cell in row)]
         return Sheet([row for _, row in kept], [line for line, _ in kept], form)
 
 
-def sheets_of(path: Path) -> list[Sheet]:
-    """The sheets of a workbook, or a text file once for each separator that it may have.
+def read_sheets(path: Path, refusal: type[PaintError]) -> list[list[Sheet]]:
+    """The ways to read a file, the likelier ones first.
+
+    Each is a list of sheets: those of a workbook; or a text once for each separator that is in
+    it, and then once for each kind of blanks between columns.
 
     Raises:
-        ReadingsError: the file cannot be read, or is neither text nor workbook.
+        PaintError: of the class given; the file is neither text nor workbook.
     """
     try:
         content = path.read_bytes()
     except FileNotFoundError:
-        raise ReadingsError(f'{path}: no such file; {EXPECTED}') from None
+        raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
-        raise ReadingsError(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
-    if content.startswith(WORKBOOKS):
-        return _sheets_of_workbook(path, content)
-    if content.startswith(MAGIC):
-        return [_sheet_of_parquet(path, content)]
-    found = decoded(content)
-    if found is None:
-        raise ReadingsError(f'{path}: cannot be read as text; {EXPECTED}')
-    text, encoding = found
-    split = [
-        Sheet.of(_separated(path, text, separator), f'{name}, {encoding}')
-        for separator, name in SEPARATORS.items()
-        if separator in text
-    ]
-    lines = text.splitlines()
-    blanks = [
-        Sheet.of(enumerate((list(pattern.split(line.strip())) for line in lines), 1), form)
-        for pattern in BLANKS
+        raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
+    try:
+        if content.startswith(WORKBOOKS):
+            return [_sheets_of_workbook(content)]
+        if content.startswith(MAGIC):
+            require_libraries(str(path))
+            return [[_sheet_of_parquet(content)]]
+        text, encoding = _decoded(content)
+        separated = [
+            Sheet.of(_separated(text, mark), f'{name}, {encoding}')
+            for mark, name in SEPARATORS.items()
+            if mark in text
+        ]
+    except ValueError as error:
+        reason = ' '.join(str(error).split())
+        raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
+    lines = [line.strip() for line in text.splitlines()]
+    by_blanks = [
+        Sheet.of(enumerate((list[Cell](blank.split(line)) for line in lines), 1), form)
+        for blank in BLANKS
         for form in [f'blanks, {encoding}']
     ]
-    return split + blanks
+    return [separated, by_blanks]
 
 
-def _separated(path: Path, text: str, separator: str) -> Iterator[tuple[int, list[Cell]]]:
+def text_of(cell: Cell) -> str:
+    """A cell as text; a whole number of a workbook without its point."""
+    return f'{cell:.15g}' if isinstance(cell, float) else cell
+
+
+def _decoded(content: bytes) -> tuple[str, str]:
+    """The text and the encoding's name: by its byte order mark, else UTF-8, else cp1252."""
+    marked = [codec for mark, codec in ENCODINGS.items() if content.startswith(mark)]
+    for codec in marked or ('utf-8', 'cp1252'):
+        try:
+            text = content.decode(codec)
+        except UnicodeDecodeError:
+            continue
+        if '\0' not in text:
+            name = codec.removesuffix('-sig')
+            return text, name.upper() if name.startswith('utf') else name
+    raise ValueError('text')
+
+
+def _separated(text: str, separator: str) -> Iterator[tuple[int, list[Cell]]]:
     reader = csv.reader(StringIO(text, newline=''), delimiter=separator)
     try:
         for row in reader:
             yield reader.line_num, [_in_one_line(cell) for cell in row]
     except csv.Error as error:
-        reason = f'{path}: line {reader.line_num}: cannot be read as CSV text ({error})'
-        raise ReadingsError(reason) from None
+        raise ValueError(f'CSV text (line {reader.line_num}: {error})') from None
 
 
-def _sheets_of_workbook(path: Path, content: bytes) -> list[Sheet]:
+def _sheets_of_workbook(content: bytes) -> list[Sheet]:
     from python_calamine import CalamineError, CalamineWorkbook
 
-    refuse_far_cells(path, content)
     try:
+        _refuse_far_cells(content)
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
-        tables = {
-            name: workbook.get_sheet_by_name(name).to_python(skip_empty_area=False)
+        return [
+            Sheet.of(
+                enumerate(([_cell(value) for value in row] for row in sheet.to_python(False)), 1),
+                f"sheet '{name}'",
+            )
             for name in workbook.sheet_names
-        }
-    except CalamineError as error:
-        reason = ' '.join(str(error).split())
-        raise ReadingsError(f'{path}: cannot be read as a workbook ({reason})') from None
-    return [
-        Sheet.of(
-            enumerate(([_cell(value) for value in row] for row in rows), 1), f"sheet '{name}'"
-        )
-        for name, rows in tables.items()
-    ]
+            for sheet in [workbook.get_sheet_by_name(name)]
+        ]
+    except (CalamineError, zipfile.BadZipFile) as error:
+        raise ValueError(f'a workbook ({error})') from None
 
 
-def _sheet_of_parquet(path: Path, content: bytes) -> Sheet:
-    require_libraries(str(path))
+def _refuse_far_cells(content: bytes) -> None:
+    """Refuse an .xlsx with a stray cell so far away that its sheet would fill the memory."""
+    if not zipfile.is_zipfile(BytesIO(content)):
+        return
+    with zipfile.ZipFile(BytesIO(content)) as package:
+        for name in package.namelist():
+            if not (name.startswith('xl/') and name.endswith('.xml')):
+                continue
+            places = set(XLSX_CELL.findall(package.read(name)))
+            width = max((sum(26**k * (c & 31) for k, c in enumerate(letters[::-1]))
+                         for letters, _ in places), default=0)  # fmt: skip
+            if width * max((int(row) for _, row in places), default=0) > MOST_CELLS:
+                raise ValueError('a workbook (delete what lies far outside the table)')
+
+
+def _sheet_of_parquet(content: bytes) -> Sheet:
     import pyarrow as pa
     import pyarrow.parquet as pq
 
     try:
         file = pq.ParquetFile(BytesIO(content))
         # A few bytes may claim any number of rows.
-        cells = file.metadata.num_rows * file.metadata.num_columns
-        if cells > MOST_CELLS:
-            raise ReadingsError(
-                f'{path}: tells of {cells} values, more than {MOST_CELLS}; give fewer readings'
-            )
+        if file.metadata.num_rows * file.metadata.num_columns > MOST_CELLS:
+            raise ValueError(f'more than {MOST_CELLS} values')
         table = file.read()
         columns = [
             ['' if value is None or value != value else _cell(value) for value in column]
             for column in (column.to_pylist() for column in table.columns)
         ]
     except (pa.ArrowException, ValueError, OSError) as error:  # of texts that are none, too
-        reason = ' '.join(str(error).split())
-        raise ReadingsError(f'{path}: cannot be read as Parquet ({reason})') from None
+        raise ValueError(f'Parquet ({error})') from None
     rows = [list(table.column_names), *map(list, zip(*columns, strict=True))]
     return Sheet.of(enumerate(rows, 1), 'Parquet')
 
@@ -141,8 +176,3 @@ def _cell(value: object) -> Cell:
 
 def _in_one_line(text: str) -> str:
     return ' '.join(text.strip().splitlines())
-
-
-def text_of(cell: Cell) -> str:
-    """A cell as text; a whole number of a workbook without its point."""
-    return f'{cell:.15g}' if isinstance(cell, float) else cell

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.inference.comparison.rank_correlation import rank_correlation
-from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.comparison.rank_correlation import rank_correlation
+from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.geometry import geometry_by_experiment
 from paint_deposition.inference.readings.residuals import Residuals

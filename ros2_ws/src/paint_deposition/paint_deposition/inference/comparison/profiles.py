@@ -12,11 +12,11 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
+from paint_deposition.inference.readings.rows_and_columns import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
-from paint_deposition.inference.readings.rows_and_columns import FEWEST_ON_A_LINE, passes_are_level
 
 # Model lines are drawn through points this close along the surface [m].
 LINE_STEP_M = 0.01

@@ -12,6 +12,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
@@ -21,9 +24,6 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     footprint_kinds,
     map_bases,
 )
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.smooth_fields import field_over_values, fields_over_parts
 from paint_deposition.inference.fitting.study import Study

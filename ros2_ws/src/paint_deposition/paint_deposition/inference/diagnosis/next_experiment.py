@@ -11,13 +11,13 @@ from itertools import permutations
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.proposals import Place, Spray, chance_of_settling
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
 from paint_deposition.inference.diagnosis.separation import Imitation, Predicted, imitate
 from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
 from paint_deposition.inference.diagnosis.standing import KEY, Stand, spots, suits
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.one_thread import on_one_thread
 from paint_deposition.inference.fitting.study import Study

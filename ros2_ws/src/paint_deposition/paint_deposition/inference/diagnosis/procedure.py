@@ -14,6 +14,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.cross_validation import Stage, nested_rmse_um
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.learning import choose_laws
@@ -21,10 +23,8 @@ from paint_deposition.inference.diagnosis.model_space import PRIOR, SURE, Group,
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Significance level of the test that something is missing.

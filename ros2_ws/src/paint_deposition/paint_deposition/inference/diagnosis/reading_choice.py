@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged
-from paint_deposition.inference.diagnosis.testability import power_along
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged
+from paint_deposition.inference.diagnosis.testability import power_along
+from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.face_places import from_edges_m
 from paint_deposition.part.gauge_places import FOOT_M, can_stand, grid_places, spread_places
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.outliers import ASSUMED_FREEDOM, ENOUGH_REPEATS
 
 DEFAULT_POINTS, DEFAULT_REPEATS = 60, 8
 # With fewer points than this the pattern's parameters alone take up all that is read.

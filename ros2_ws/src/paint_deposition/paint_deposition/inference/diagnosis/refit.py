@@ -6,6 +6,10 @@ from types import MappingProxyType
 import numpy as np
 from scipy.special import expit, logsumexp
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.errors import ModelError
 from paint_deposition.inference.diagnosis.cross_validation import left_out
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
@@ -25,12 +29,8 @@ from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.errors import ModelError
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.one_thread import on_one_thread
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.residuals import root_mean_square
 

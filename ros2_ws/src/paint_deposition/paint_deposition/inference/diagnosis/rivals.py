@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
     FIELD_SHARE,
@@ -19,8 +21,6 @@ from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, s
 from paint_deposition.inference.diagnosis.separation import Predicted
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.fitting.study import Study

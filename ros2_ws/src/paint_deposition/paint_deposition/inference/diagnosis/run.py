@@ -10,6 +10,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import fdtr
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, Explanation, explanations, law_errors
 from paint_deposition.inference.diagnosis.mixture import Mixture
@@ -25,16 +28,13 @@ from paint_deposition.inference.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
 from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 STARTS = 10

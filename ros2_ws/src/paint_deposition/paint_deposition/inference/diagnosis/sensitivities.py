@@ -6,6 +6,7 @@ from itertools import product
 import numpy as np
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
 
@@ -69,6 +70,30 @@ def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     ]
 
 
+def mark_um(
+    forward: Forward, model: DepositionModel, effect: Effect, name: str, predicted_um: np.ndarray
+) -> np.ndarray:
+    """(P,) change of the predicted readings by an amplitude, in its typical size [um].
+
+    Args:
+        forward: predicts the points.
+        model: where to linearise.
+        effect: as it is there, in the model or neutral.
+        name: of the amplitude; a bound beside it makes the difference one-sided.
+        predicted_um: (P,) by the model with the effect.
+    """
+    info = type(effect).parameters()[name]
+    here, step = getattr(effect, name), STEP * info['typical']
+    ends = [value for value in (here - step, here + step) if info['low'] <= value <= info['high']]
+    moved = [
+        forward.predict_um(model.with_effect(effect.model_copy(update={name: value})))
+        for value in ends
+    ]
+    if len(ends) == 2:
+        return (moved[1] - moved[0]) / (2.0 * STEP)
+    return (moved[0] - predicted_um) / (STEP if ends[0] > here else -STEP)
+
+
 def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray) -> Sensitivity:
     """Differentiate the prediction by the effect's amplitudes at the fitted model.
 
@@ -83,20 +108,8 @@ def sensitivity(forward: Forward, fit: Fit, effect: Effect, sigma_um: np.ndarray
     columns, lows, highs = [], [], []
     base = forward.predict_um(fit.model.with_effect(effect))
     for name in names:
-        here, typical = getattr(effect, name), info[name]['typical']
-        low, high = info[name]['low'], info[name]['high']
-        neutral = info[name]['neutral']
-        step = STEP * typical
-        ends = [value for value in (here - step, here + step) if low <= value <= high]
-        moved = [
-            forward.predict_um(fit.model.with_effect(effect.model_copy(update={name: value})))
-            for value in ends
-        ]
-        if len(ends) == 2:
-            slope = (moved[1] - moved[0]) / (2.0 * STEP)
-        else:
-            slope = (moved[0] - base) / (STEP if ends[0] > here else -STEP)
-        columns.append(slope / sigma_um)
-        lows.append((low - neutral) / typical)
-        highs.append((high - neutral) / typical)
+        neutral, typical = info[name]['neutral'], info[name]['typical']
+        columns.append(mark_um(forward, fit.model, effect, name, base) / sigma_um)
+        lows.append((info[name]['low'] - neutral) / typical)
+        highs.append((info[name]['high'] - neutral) / typical)
     return Sensitivity(effect, names, np.column_stack(columns), np.array(lows), np.array(highs))

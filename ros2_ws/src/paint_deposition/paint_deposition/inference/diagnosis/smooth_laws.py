@@ -17,8 +17,8 @@ from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weigh
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
 from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.inference.readings.covariates import Rays
+from paint_deposition.model.pattern import PlanarPattern
 
 # Knots of a curve; time is resolved more finely, as pumps pulsate.
 KNOTS, TIME_KNOTS = 12, 40

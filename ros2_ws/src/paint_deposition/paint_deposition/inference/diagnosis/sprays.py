@@ -7,9 +7,9 @@ from itertools import combinations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis
-from paint_deposition.inference.readings.campaign import Experiment
 
 # How far the gun is moved to or from the part [m], and how near to it that may bring it.
 STANDOFF_STEP_M, NEAREST_M = 0.06, 0.12

@@ -9,9 +9,9 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.inference.readings.campaign import Experiment
 
 KEY = 'standing'
 # A shorter opening of the gun is mostly its trigger's; a longer one no spot needs [s].

@@ -6,22 +6,26 @@ from functools import cached_property
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import explanations
 from paint_deposition.inference.diagnosis.model_space import ModelSpace
-from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, neutral_shapes, sensitivity
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
-from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis.sensitivities import (
+    Sensitivity,
+    neutral_shapes,
+    sensitivity,
+)
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.surface import Surface
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.surface import Surface
 
 
 @dataclass(frozen=True)

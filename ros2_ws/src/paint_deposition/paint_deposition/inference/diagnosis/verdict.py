@@ -7,18 +7,18 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Literal
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.cross_validation import hold_out
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
-from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 if TYPE_CHECKING:

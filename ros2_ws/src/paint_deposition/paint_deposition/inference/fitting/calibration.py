@@ -13,13 +13,17 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.film.paint_used import impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.fitting.brush_figures import brush_figures
 from paint_deposition.inference.fitting.campaign_brushes import with_brushes_of
 from paint_deposition.inference.fitting.collapse_fit import CollapseFit, fit_collapse
-from paint_deposition.inference.fitting.estimates import Correlation, Estimate, correlations, estimates
+from paint_deposition.inference.fitting.estimates import (
+    Correlation,
+    Estimate,
+    correlations,
+    estimates,
+)
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.one_thread import on_one_thread
 from paint_deposition.inference.fitting.panel_reach import shifts, short_reaches
@@ -27,7 +31,7 @@ from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.sifting import sifted
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.model.uniformity import sigma_n_closed_form
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.geometry import geometry_by_experiment
 from paint_deposition.inference.readings.panel import Panel
@@ -38,6 +42,7 @@ from paint_deposition.inference.readings.plausibility import (
     check_units_beside,
 )
 from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.model.uniformity import sigma_n_closed_form
 
 STARTS = 8
 # Residuals beyond this many standard deviations are named in a warning.

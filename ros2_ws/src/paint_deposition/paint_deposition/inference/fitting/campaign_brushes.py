@@ -4,9 +4,9 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.brush import Brush, SetPoints, listed
 from paint_deposition.motion.trigger import ONLY_BRUSH
-from paint_deposition.inference.readings.campaign import Campaign
 
 # What recordings tell of the process beside the flow, which they tell relative to the brush's.
 RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import least_squares
 
-from paint_deposition.model.collapse import ThreeGaussianCollapse
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.model.collapse import ThreeGaussianCollapse
 
 # Starts of the search: offset radii and standard deviations in units of the panel's scale.
 RADII = (0.2, 0.35, 0.5)

@@ -6,8 +6,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.posterior import Posterior
 
 # Values of a learned curve so many knots apart are hardly off together.
 KNOTS_TOGETHER = 2.0

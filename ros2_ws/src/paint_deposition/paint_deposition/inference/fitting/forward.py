@@ -13,10 +13,10 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, shown_um
 from paint_deposition.film.layout import term_weights
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES
 from paint_deposition.model.pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
 
 # Where effects act before the film has arrived: what they change, must be integrated again.
 LAWS = ('flux_factor', 'pattern_scale')

@@ -12,9 +12,9 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN, PatternVector
 from paint_deposition.inference.fitting.prior import Prior
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
 
 # The range that is physical for a shape parameter is this many standard deviations of its prior.

@@ -4,10 +4,10 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Settings that differ by a larger share than this are others.

@@ -7,13 +7,13 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.one_thread import on_one_thread
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.slips import FEWEST, Slip, slips
 from paint_deposition.inference.fitting.smooth_misfit import Misfit
 from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study, Texture
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
 # Starts of the fit beside which readings are judged.

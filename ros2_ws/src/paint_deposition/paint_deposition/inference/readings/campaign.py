@@ -7,13 +7,13 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 from paint_deposition.inference.readings.off_surface import lie_on_a_spot, off_surface_hint
 from paint_deposition.inference.readings.outliers import left_out_lines
 from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.inference.readings.rows_and_columns import columns_or_rows
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
 
 # Readings further from the surface, or facing more away from it, do not belong to the part.
 MAX_DISTANCE_M = 0.02

@@ -11,10 +11,13 @@ from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
 from visualization_msgs.msg import Marker, MarkerArray
 
-from paint_deposition.inference.comparison.residual_field import reached, spreading
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
+from paint_deposition.inference.comparison.residual_field import reached, spreading
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.gauge_noise import gauge_noise
+from paint_deposition.inference.readings.residuals import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
@@ -26,9 +29,6 @@ from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.gauge_noise import gauge_noise
-from paint_deposition.inference.readings.residuals import Residuals
 
 # The automatic scale ends at this share of the thickest reading.
 SHARE_OF_READING = 0.25

@@ -13,10 +13,8 @@ from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
-from paint_deposition.motion.intervals import Intervals
-from paint_deposition.motion.jumps import Jumps
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
-from paint_deposition.motion.speed_now import SpeedNow
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.tf_queue import NoTransform, TfQueue

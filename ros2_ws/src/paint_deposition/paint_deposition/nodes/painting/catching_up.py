@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime.messages import of_gun
 

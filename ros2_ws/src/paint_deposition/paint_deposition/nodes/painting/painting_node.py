@@ -14,7 +14,7 @@ from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.between_brushes import require_its_brush
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
-from paint_deposition.motion.motion_log import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting import early
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.catching_up import CatchingUp

@@ -12,8 +12,8 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import DEFAULT_LIMIT_POSES
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.motion.pose_stream import DEFAULT_LIMIT_POSES
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (

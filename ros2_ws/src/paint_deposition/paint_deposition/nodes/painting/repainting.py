@@ -9,7 +9,7 @@ from concurrent.futures import Future
 
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.motion_log import MotionLog, PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, TriggerChange
 
 # So few poses are left to the thread that paints on: it must not be held up.
 REST_POSES = 250

@@ -88,7 +88,7 @@ def _work(task: Task, sender: Connection) -> None:
     """In the process: send each step, and at last the result or why there is none."""
     # Pictures and fits take seconds to load, which a node that only plans need not wait for.
     from paint_deposition.api.inference import diagnose
-    from paint_deposition.api.writing import write
+    from paint_deposition.report.writers.write import write
     from paint_deposition.files.campaign_file import read_campaign
     from paint_deposition.files.model_file import read_model_file
 

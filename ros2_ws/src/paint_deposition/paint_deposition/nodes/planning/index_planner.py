@@ -29,10 +29,9 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     thickness,
 )
-from paint_deposition.planning.index_request import FASTEST_M_PER_S, Request
 from paint_deposition.planning.plan import Plan, plan
-from paint_deposition.planning.plan_request import DEFAULT_SMOOTHING_RADIUS_M, PlanRequest
 from paint_deposition.planning.recommendation import Recommendation, recommend
+from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest, PlanRequest
 
 SPACING_M = 0.02
 
@@ -81,7 +80,7 @@ PLANNER = dict(
             0.0, 'Distance between planned passes; 0: the most even [m]', (0.0, 10.0)
         ),
         smoothing_radius_m=NodeParameter(
-            DEFAULT_SMOOTHING_RADIUS_M,
+            PlanRequest.model_fields['smoothing_radius_m'].default,
             'What is finer than this on the part is not followed [m]',
             (0.005, 2.0),
         ),
@@ -144,9 +143,9 @@ class IndexPlanner(PaintNode):
         brush = self.values['brush']
         return self._model.with_brush(brush) if brush else self._model
 
-    def _asked_for(self, request: RecommendIndex.Request) -> Request:
+    def _asked_for(self, request: RecommendIndex.Request) -> IndexRequest:
         # In requests and parameters 0 stands for none.
-        return Request(
+        return IndexRequest(
             speed_m_per_s=request.speed_m_per_s or None,
             target_um=request.target_um or None,
             index_min_m=request.index_min_m or None,

@@ -1,9 +1,9 @@
-"""The result of `improve`: a programme timed anew, with its film before and after."""
+"""The result of `improve`: a programme with other speeds, and its film before and after."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,25 +14,35 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.improvement.changes import PassChange, changes
-from paint_deposition.planning.improvement.improve import Retiming
-from paint_deposition.planning.improvement.limits import Limits, Wish
-from paint_deposition.planning.trade_off import Point
+from paint_deposition.planning.films import evenness
+from paint_deposition.planning.improvement.programme import Programme, speed_along
+from paint_deposition.planning.improvement.retiming import Retiming
+from paint_deposition.planning.plan import TradeOffPoint
+from paint_deposition.planning.requests import ImproveRequest
 
 DEFAULT_TOLERANCE = 0.1
 # Bag and robot program lay the same film to this share of the peak.
 ALIKE = 2e-3
+# A mean film further from the target than this share is warned of.
+OFF_TARGET = 0.02
+# Speeds that differ by less are given as one; so many stretches at most.
+SAME_SPEED, MOST_STRETCHES = 0.06, 6
+# The new speed is sampled so often along a pass.
+SAMPLES = 60
+# Smaller shifts of a trigger are left out of the sentence [m].
+LEAST_SHIFT_M = 0.002
+LEAST_PASS_M = 0.05
 
 
 @dataclass(frozen=True)
 class LaidFilm:
-    """A film on the judged part, and what it took.
+    """A film on the target region, and what it took.
 
     Attributes:
         film_um: (V,) at the vertices of the surface.
         mean_um, sigma_n: mean, and standard deviation over it, weighted by area.
         min_um, max_um: least and greatest.
-        within: share of the judged area within the tolerance of the target.
+        within: share of the area within the tolerance of the target.
         paint_cm3: sprayed, as solids that a part which catches everything would get.
         on_part_cm3: of it on the whole part.
         spraying_s, cycle_s: time with the gun open, and from the first pose to the last.
@@ -53,23 +63,20 @@ class LaidFilm:
     def of(
         film_um: np.ndarray,
         surface: Surface,
-        judged: np.ndarray,
+        target_region: np.ndarray,
         band_um: tuple[float, float],
         emitted_cm3: float,
-        path: SprayPath,
-        cycle_s: float,
+        trajectory: Trajectory,
     ) -> 'LaidFilm':
-        """Sum a film up; ``judged`` (V,) bool, ``band_um`` its least and greatest good film."""
-        film, area = film_um[judged], surface.vertex_areas_m2[judged]
-        weight = area / area.sum()
-        mean = float(weight @ film)
-        sigma = math.sqrt(float(weight @ (film - mean) ** 2)) / mean if mean > 0.0 else math.nan
+        """Sum a film up; ``target_region`` (V,) bool, ``band_um`` least and greatest good film."""
+        film, area = film_um[target_region], surface.vertex_areas_m2[target_region]
+        path, _ = spray_path(trajectory)
         good = (film >= band_um[0]) & (film <= band_um[1])
         return LaidFilm(
-            film_um, mean, sigma, float(film.min()), float(film.max()),
-            float(weight[good].sum()), emitted_cm3,
+            film_um, *evenness(film, area), float(film.min()), float(film.max()),
+            float((area / area.sum())[good].sum()), emitted_cm3,
             float(surface.vertex_areas_m2 @ film_um),
-            float(path.dwell_s[path.flow > 0.0].sum()), cycle_s,
+            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
         )  # fmt: skip
 
     def figures(self) -> dict[str, float]:
@@ -78,12 +85,75 @@ class LaidFilm:
 
 
 @dataclass(frozen=True)
-class Improvement:
-    """A programme timed anew for a more even film.
+class Stretch:
+    """A part of a pass with a mean speed before and after.
 
     Attributes:
-        surface: the part. judged: (V,) bool, the side whose film counts.
-        model: what the gun sprays. limits, wish: as asked for.
+        begin_m, end_m: coordinates along the axis of the part that the pass follows.
+        before_m_per_s, after_m_per_s: mean speeds; before is NaN where the gun was closed.
+    """
+
+    begin_m: float
+    end_m: float
+    before_m_per_s: float
+    after_m_per_s: float
+
+
+@dataclass(frozen=True)
+class PassChange:
+    """What changes in a pass, in the robot's terms.
+
+    Attributes:
+        number: of the pass, from 1. axis: 'x', 'y' or 'z', which it follows most.
+        stretches: in running order.
+        opens_earlier_m, closes_later_m: along the path; negative is the other way; 0 where the
+            pass does not begin or end with the gun.
+        opens_earlier_s, closes_later_s: the same at the speed of the new programme.
+        flow: relative to the calibrated one, before and after.
+    """
+
+    number: int
+    axis: str
+    stretches: tuple[Stretch, ...]
+    opens_earlier_m: float
+    closes_later_m: float
+    opens_earlier_s: float
+    closes_later_s: float
+    flow: tuple[float, float]
+
+    @property
+    def sentence(self) -> str:
+        """The change in a line."""
+        said = [
+            f'{stretch.before_m_per_s:.3f} to {stretch.after_m_per_s:.3f} m/s between '
+            f'{self.axis} = {stretch.begin_m:.2f} and {stretch.end_m:.2f} m'
+            for stretch in self.stretches
+        ]
+        for verb, metres, seconds, sides in (
+            ('opens', self.opens_earlier_m, self.opens_earlier_s, ('earlier', 'later')),
+            ('closes', self.closes_later_m, self.closes_later_s, ('later', 'earlier')),
+        ):
+            if abs(metres) >= LEAST_SHIFT_M:
+                side = sides[metres < 0.0]
+                said.append(
+                    f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
+                )
+        if abs(self.flow[1] - self.flow[0]) > 5e-4:
+            said.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
+        return f'pass {self.number}: ' + '; '.join(said)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures by name, with the sentence."""
+        return {**asdict(self), 'sentence': self.sentence}
+
+
+@dataclass(frozen=True)
+class Improvement:
+    """A programme with other speeds, flows and triggers for a more even film.
+
+    Attributes:
+        surface: the part. target_region: (V,) bool, the side whose film counts.
+        model: what the gun sprays. request: what was wanted and allowed.
         given: the motion as it was; trajectory: the improved one as its bag was read back.
         moves: the improved one as moves of a robot program.
         retiming: how it was found.
@@ -96,10 +166,9 @@ class Improvement:
     """
 
     surface: Surface
-    judged: np.ndarray
+    target_region: np.ndarray
     model: DepositionModel
-    limits: Limits
-    wish: Wish
+    request: ImproveRequest
     given: Trajectory
     trajectory: Trajectory
     moves: Sequence[Move]
@@ -118,7 +187,7 @@ class Improvement:
     @property
     def tolerance(self) -> float:
         """Relative difference from the target that counts as good."""
-        return self.wish.tolerance or DEFAULT_TOLERANCE
+        return self.request.tolerance or DEFAULT_TOLERANCE
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
@@ -133,14 +202,28 @@ class Improvement:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
-        if self.program_difference <= ALIKE:
-            return self.odd
-        return (
-            *self.odd,
-            f'the film of the robot program differs from that of the bag by '
-            f'{100 * self.program_difference:.2f} % of the peak: its moves are long against the '
-            'changes of speed; allow shorter ones (move_min_m, settings_per_s) or more smoothness',
-        )
+        found = list(self.odd)
+        off = self.after.mean_um / self.target_um - 1.0
+        if abs(off) > OFF_TARGET:
+            remedy = (
+                'a greater speed (speed_max_m_per_s) or a lower flow (flow)'
+                if off > 0.0
+                else 'a lower speed (speed_min_m_per_s) or a greater flow (flow)'
+            )
+            found.append(
+                f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
+                f'{100 * self.before.within:.0f} to {100 * self.after.within:.0f} % of the area '
+                f'lie within the tolerance: {" and ".join(self.retiming.binding) or "the path"} '
+                f'leaves no other; allow {remedy}'
+            )
+        if self.program_difference > ALIKE:
+            found.append(
+                f'the film of the robot program differs from that of the bag by '
+                f'{100 * self.program_difference:.2f} % of the peak: its moves are long against '
+                'the changes of speed; allow shorter ones (move_min_m, settings_per_s) or more '
+                'smoothness'
+            )
+        return tuple(found)
 
     @property
     def sentence(self) -> str:
@@ -154,30 +237,33 @@ class Improvement:
         )
 
     @property
-    def points(self) -> tuple[Point, Point]:
+    def points(self) -> tuple[TradeOffPoint, TradeOffPoint]:
         """The programme as given and as improved, in a trade-off."""
-        passes = len(self.changes)
         before, after = (
-            Point(
-                self.wish.paint_weight, laid.sigma_n, laid.mean_um, laid.paint_cm3, laid.cycle_s,
-                passes,
+            TradeOffPoint(
+                self.request.paint_weight, laid.sigma_n, laid.mean_um, laid.paint_cm3,
+                laid.cycle_s, len(self.changes),
             )
             for laid in (self.before, self.after)
         )  # fmt: skip
         return before, after
 
     @property
+    def sigma_n_of_path(self) -> float:
+        """The most even film of any speeds along this path."""
+        return min(self.retiming.sigma_n_of_path, self.after.sigma_n)
+
+    @property
     def limit_sentences(self) -> tuple[str, ...]:
-        """Which limits hold the film back, a line each."""
-        after = self.after.sigma_n
+        """Which limits keep the film from being more even, a line each."""
         found = [
-            f'held back by {held.name}: sigma_n {100 * held.sigma_n:.1f} % without it'
-            for held in self.retiming.held_back
+            f'held back by {limit.name}: sigma_n {100 * limit.sigma_n:.1f} % without it'
+            for limit in self.retiming.binding_limits
         ]
-        path = min(self.retiming.sigma_n_of_path, after)
         found.append(
-            f'no speeds at all along this path come below sigma_n {100 * path:.1f} %: '
-            'beyond that other passes are needed'
+            'along this path, without limits and without weights for paint, time and smoothness, '
+            f'sigma_n comes down to {100 * self.sigma_n_of_path:.1f} %: beyond that other passes '
+            'are needed'
         )
         return tuple(found)
 
@@ -191,19 +277,76 @@ class Improvement:
             for name, value in self.before.figures().items()
         }
         interval = self.sigma_n_interval
+        region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
             **both,
             'target_um': self.target_um,
             'tolerance': self.tolerance,
-            'judged_area_m2': float(self.surface.vertex_areas_m2[self.judged].sum()),
+            'target_region_m2': region,
             'area_m2': self.surface.area_m2,
             'sigma_n_interval': interval and {'before': interval[0], 'after': interval[1]},
-            'sigma_n_of_path': min(self.retiming.sigma_n_of_path, self.after.sigma_n),
-            'held_back': [asdict(held) for held in self.retiming.held_back],
+            'sigma_n_of_path': self.sigma_n_of_path,
+            'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
             'program_difference': self.program_difference,
             'passes': [change.to_dict() for change in self.changes],
-            'limits': asdict(self.limits),
-            'wish': asdict(self.wish),
+            'request': self.request.model_dump(),
             'sentence': self.sentence,
             'warnings': list(self.warnings),
         }
+
+
+def changes(given: Programme, improved: Programme) -> tuple[PassChange, ...]:
+    """The changes of all passes; a pass is a straight stretch with the gun open."""
+    path, _ = spray_path(given.trajectory())
+    begins = 1 + np.flatnonzero(np.diff(path.stroke))
+    turns = given.travel_at_m(path.stamp_ns[begins]) - path.from_turn_m[begins]
+    found: list[PassChange] = []
+    for before, after in zip(given.openings, improved.openings, strict=True):
+        inside = turns[(turns > after.on_m + LEAST_PASS_M) & (turns < after.off_m - LEAST_PASS_M)]
+        ends = [after.on_m, *inside.tolist(), after.off_m]
+        for first, last in pairwise(ends):
+            axis, stretches = _stretches(given, improved, first, last)
+            earlier = before.on_m - after.on_m if first == after.on_m else 0.0
+            later = after.off_m - before.off_m if last == after.off_m else 0.0
+            found.append(
+                PassChange(
+                    len(found) + 1, axis, stretches, earlier, later,
+                    earlier / stretches[0].after_m_per_s, later / stretches[-1].after_m_per_s,
+                    (before.flow, after.flow),
+                )
+            )  # fmt: skip
+    return tuple(found)
+
+
+def _stretches(
+    given: Programme, improved: Programme, first_m: float, last_m: float
+) -> tuple[str, tuple[Stretch, ...]]:
+    """The pass between two places of the path, in stretches of about even new speed."""
+    places = np.linspace(first_m, last_m, SAMPLES + 1)
+    ends = places[_cuts(1.0 / speed_along(improved, places))]
+    at = given.positions_at_m(ends)
+    axis = int(np.abs(at[-1] - at[0]).argmax())
+    speeds = zip(speed_along(given, ends), speed_along(improved, ends), strict=True)
+    return 'xyz'[axis], tuple(
+        Stretch(*pair, *map(float, both))
+        for pair, both in zip(pairwise(at[:, axis].tolist()), speeds, strict=True)
+    )
+
+
+def _cuts(slowness: np.ndarray) -> list[int]:
+    """Where stretches of about even slowness begin and end: neighbours merged in turn."""
+    ends = list(range(len(slowness) + 1))
+
+    def cost(a: int, b: int) -> float:
+        inside = slowness[a:b] / slowness.mean()
+        return float(np.sum((inside - inside.mean()) ** 2))
+
+    while len(ends) > 2:
+        triples = zip(ends[:-2], ends[1:-1], ends[2:], strict=True)
+        rises = [cost(a, c) - cost(a, b) - cost(b, c) for a, b, c in triples]
+        least = int(np.argmin(rises))
+        uneven = rises[least] > SAME_SPEED**2 * (ends[least + 2] - ends[least])
+        if uneven and len(ends) - 1 <= MOST_STRETCHES:
+            break
+        del ends[least + 1]
+    return ends

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse import csr_matrix
 
-from paint_deposition.planning.improvement.limits import Limits
 from paint_deposition.planning.improvement.programme import STANDING_M, Opening, Programme
+from paint_deposition.planning.requests import Limits
 
-# Half the length over which bends of the path and its programmed speed are told [m].
+# Half the length over which bends of the path and its programmed speed are measured [m].
 BEND_M = 0.02
 # Where the gun is closed, a place much slower than its opening sets how fast that can be. Speeds
-# are told over so much travel to both sides: poses of recordings jitter [m].
+# are taken over so much travel to both sides: poses of recordings jitter [m].
 MUCH_SLOWER, ABOUT_AS_SLOW = 0.8, 1.05
 STEADY_M = 0.01
 
@@ -96,28 +96,27 @@ class Nodes:
         return sums[cell] + values[cell] * on + 0.5 * rise * on**2
 
 
-def timed_anew(
-    programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Limits
-) -> Programme:
+def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Limits) -> Programme:
     """The programme at slowness (n,) [s/m] where the gun is open.
 
     Elsewhere it keeps its speed, but for what it takes to reach the speed at which the gun opens
     and to leave that at which it closes.
     """
-    ends = np.array([[o.on_m, o.off_m] for o in programme.openings])
+    ends = programme.ends_m
     whole = programme.with_poses_at(ends.ravel())
     begin, end = whole.travel_m[:-1], whole.travel_m[1:]
     middle, length = 0.5 * (begin + end), end - begin
     moving = length > STANDING_M
     square = np.where(moving, length / whole.duration_s, 0.0) ** 2
     duration = whole.duration_s.copy()
-    for number, (on, off) in enumerate(ends):
+    for number, (own_ends, around) in enumerate(zip(ends, programme.around_m, strict=True)):
         rows = nodes.rows(number)
-        for at, place, side in ((on, rows.start, -1.0), (off, rows.stop - 1, 1.0)):
+        places = (rows.start, rows.stop - 1)
+        for at, far, place, side in zip(own_ends, around, places, (-1.0, 1.0), strict=True):
             away = side * (middle - at)
             reach = 2.0 * limits.acceleration_m_per_s2 * away
             own = slowness[place] ** -2
-            beside = (away > 0.0) & _before_next(middle, ends, number, side)
+            beside = (away > 0.0) & (away < side * (far - at))
             programmed = square[beside][np.abs(away[beside]).argmin()] if beside.any() else own
             # The programme's own way to a slower opening serves for any that is no faster.
             least = np.maximum(own - reach[beside], 0.0) if own > programmed else 0.0
@@ -130,13 +129,6 @@ def timed_anew(
             number, slowness, begin[inside]
         )
     return replace(whole, duration_s=duration).without_standstill()
-
-
-def _before_next(middle_m: np.ndarray, ends_m: np.ndarray, number: int, side: float) -> np.ndarray:
-    """Where the path is between an opening and the next one on a side of it."""
-    if side < 0.0:
-        return middle_m > (ends_m[number - 1, 1] if number else -np.inf)
-    return middle_m < (ends_m[number + 1, 0] if number + 1 < len(ends_m) else np.inf)
 
 
 @dataclass(frozen=True)
@@ -168,12 +160,9 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
     named = np.full(len(nodes), ROBOT, dtype=object)
     bent = np.maximum(allowed, programmed) < greatest
     greatest[bent], named[bent] = np.maximum(allowed, programmed)[bent], BEND
-    ends = np.array([[o.on_m, o.off_m] for o in nodes.openings])
-    for number, (on, off) in enumerate(ends):
+    for number, ends in enumerate(zip(programme.ends_m, programme.around_m, strict=True)):
         rows = nodes.rows(number)
-        before = ends[number - 1, 1] if number else 0.0
-        after = ends[number + 1, 0] if number + 1 < len(ends) else length
-        for end, far, node in ((on, before, rows.start), (off, after, rows.stop - 1)):
+        for end, far, node in zip(*ends, (rows.start, rows.stop - 1), strict=True):
             fastest = _fastest_m_per_s(programme, end, far, limits)
             if fastest < greatest[node]:
                 greatest[node], named[node] = fastest, LEAD

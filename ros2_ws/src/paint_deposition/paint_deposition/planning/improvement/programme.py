@@ -1,17 +1,20 @@
-"""A given motion as a path and the openings of the gun along it, to be timed anew."""
+"""A given motion as a path and the openings of the gun along it, to be retimed; its moves."""
 
+from bisect import bisect_right
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
-from paint_deposition.motion.motion_log import PoseBatch
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
-from paint_deposition.motion.screening import PoseScreen
+from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
+from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.planning.requests import ImproveRequest
 
 # Intervals that travel less have no speed: the gun waits or turns.
 STANDING_M = 1e-6
@@ -19,8 +22,14 @@ STANDING_M = 1e-6
 LEAST_STEP_S = 1e-5
 # Stamps begin here: in ROS a stamp of 0 is none.
 BEGIN_NS = 1_000_000_000
-# A measured flow that varies by less within an opening is taken as its mean.
-STEADY_FLOW = 0.02
+# Moves are straight: the path leaves them by no more than this [m]. A turn of the tool counts by
+# what it does at this lever, the distance of a surface.
+TOLERANCE_M, LEVER_M = 0.0005, 0.3
+# A program's speeds are written in steps of this [m/s].
+SPEED_STEP_M_PER_S = 1e-5
+SLOWEST_M_PER_S = 1e-3
+# The speed is sampled so often along an opening.
+STEPS = 400
 
 
 @dataclass(frozen=True)
@@ -113,13 +122,16 @@ class Programme:
         return np.stack(columns, axis=1)
 
     @property
-    def speed_m_per_s(self) -> np.ndarray:
-        """(N - 1,) speed of the TCP from each pose to the next."""
-        return np.diff(self.travel_m) / self.duration_s
+    def ends_m(self) -> np.ndarray:
+        """(k, 2) travel at which each opening begins and ends [m]."""
+        return np.array([[opening.on_m, opening.off_m] for opening in self.openings])
 
-    def with_openings(self, openings: tuple[Opening, ...]) -> 'Programme':
-        """The same path with the gun open elsewhere."""
-        return replace(self, openings=openings)
+    @property
+    def around_m(self) -> np.ndarray:
+        """(k, 2) where the closed path before each opening begins, and that after it ends [m]."""
+        ends = self.ends_m
+        before, after = np.append(0.0, ends[:-1, 1]), np.append(ends[1:, 0], self.travel_m[-1])
+        return np.stack([before, after], axis=1)
 
     def with_poses_at(self, travel_m: np.ndarray) -> 'Programme':
         """The same motion with poses at these lengths of travel too."""
@@ -160,7 +172,7 @@ class Programme:
 
     def trajectory(self) -> Trajectory:
         """The timed motion; the gun opens and closes at poses."""
-        whole = self.with_poses_at(np.array([[o.on_m, o.off_m] for o in self.openings]).ravel())
+        whole = self.with_poses_at(self.ends_m.ravel())
         clock = whole.clock_s
         stamps = BEGIN_NS + np.round(clock * 1e9).astype(np.int64)
         triggers, flows, brushes = [], [], []
@@ -190,39 +202,110 @@ def speed_along(programme: Programme, travel_m: np.ndarray) -> np.ndarray:
 def _openings(
     trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_gap_ns: int
 ) -> tuple[Opening, ...]:
-    """Where the gun is open on the way; gaps between poses close it."""
-    changes = {stamp: (flow, brush) for stamp, flow, brush in trajectory.triggers}
-    if not changes:
-        changes = {int(stamps_ns[0]): (1.0, ONLY_BRUSH)}
+    """Where the gun is open on the way; gaps between poses close it.
+
+    Flows that change while it is open are taken as their mean over time.
+    """
     first, last = int(stamps_ns[0]), int(stamps_ns[-1])
+    changes = {stamp: (flow, brush) for stamp, flow, brush in trajectory.triggers}
+    changes = changes or {first: (1.0, ONLY_BRUSH)}
     times = sorted(changes)
-    ends = [*times[1:], last]
-    spans: list[tuple[int, int, float, int]] = [
-        (max(begin, first), min(end, last), *changes[begin])
-        for begin, end in zip(times, ends, strict=True)
-        if changes[begin][0] > 0.0 and min(end, last) > max(begin, first)
-    ]
     gaps = np.flatnonzero(np.diff(stamps_ns) > max_gap_ns)
-    for gap in gaps.tolist():
-        a, b = int(stamps_ns[gap]), int(stamps_ns[gap + 1])
-        spans = [
-            piece
-            for begin, end, flow, brush in spans
-            for piece in ((begin, min(end, a), flow, brush), (max(begin, b), end, flow, brush))
-            if piece[1] > piece[0]
-        ]
-    merged: list[list[tuple[int, int, float, int]]] = []
-    for span in spans:
-        goes_on = merged and merged[-1][-1][1] == span[0] and merged[-1][-1][3] == span[3]
-        if goes_on:
-            merged[-1].append(span)
+    begins, ends = stamps_ns[gaps].tolist(), stamps_ns[gaps + 1].tolist()
+    edges = sorted({first, last, *begins, *ends, *(t for t in times if first < t < last)})
+    spans: list[list[tuple[int, int, float, int]]] = []
+    for begin, end in pairwise(edges):
+        known, gap = bisect_right(times, begin) - 1, bisect_right(begins, begin) - 1
+        flow, brush = changes[times[known]] if known >= 0 else (0.0, ONLY_BRUSH)
+        if flow <= 0.0 or (gap >= 0 and begin < ends[gap]):
+            continue
+        piece = (begin, end, flow, brush)
+        if spans and spans[-1][-1][1] == begin and spans[-1][-1][3] == brush:
+            spans[-1].append(piece)
         else:
-            merged.append([span])
+            spans.append([piece])
     openings = []
-    for pieces in merged:
-        at = np.interp([pieces[0][0], pieces[-1][1]], stamps_ns, travel_m)
+    for pieces in spans:
+        on, off = np.interp([pieces[0][0], pieces[-1][1]], stamps_ns, travel_m).tolist()
         seconds = np.array([end - begin for begin, end, *_ in pieces], float)
         flow = float(np.average([flow for *_, flow, _ in pieces], weights=seconds))
-        if at[1] - at[0] > STANDING_M:
-            openings.append(Opening(float(at[0]), float(at[1]), flow, pieces[0][3]))
+        if off - on > STANDING_M:
+            openings.append(Opening(on, off, flow, pieces[0][3]))
     return tuple(openings)
+
+
+def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
+    """Straight moves along a programme, from its first pose on.
+
+    While the gun sprays, each move takes as long as the programme; else it has the programme's
+    greatest speed on the way, so that the robot can reach the speed at which the gun opens.
+    """
+    ends = programme.ends_m
+    stops = np.concatenate([_stops(programme, k, request) for k in range(len(ends))])
+    whole = programme.with_poses_at(stops)
+    clock = whole.clock_s
+    rows = _rows_to_stop_at(whole, stops)
+    speed = np.append(np.diff(whole.travel_m) / whole.duration_s, 0.0)
+    moves: list[Move] = []
+    for before, row in zip([rows[0], *rows[:-1]], rows, strict=True):
+        length = float(np.linalg.norm(whole.positions_m[row] - whole.positions_m[before]))
+        turns = Rotation.from_quat(whole.quaternions_xyzw[[before, row]])
+        turned = (turns[0].inv() * turns[1]).magnitude() > 1e-6
+        if moves and length < STANDING_M and not turned:
+            continue
+        middle = 0.5 * (whole.travel_m[before] + whole.travel_m[row])
+        number = int(np.searchsorted(ends[:, 0], middle, side='right')) - 1
+        spraying = bool(moves) and number >= 0 and middle < ends[number, 1]
+        if spraying:
+            pace = length / (clock[row] - clock[before])
+        else:
+            pace = float(speed[before : max(row, before + 1)].max())
+        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, SLOWEST_M_PER_S)
+        pose = whole.positions_m[row], whole.quaternions_xyzw[row]
+        opening = programme.openings[max(number, 0)]
+        flow = opening.flow if spraying else 1.0
+        moves.append(Move(*pose, pace, spraying, flow=flow, brush=opening.brush))
+    return moves
+
+
+def _stops(programme: Programme, number: int, request: ImproveRequest) -> np.ndarray:
+    """Where moves begin and end in an opening: not too close in length, nor in time."""
+    opening = programme.openings[number]
+    places = np.linspace(opening.on_m, opening.off_m, STEPS + 1)
+    speed = speed_along(programme, places)
+    least = np.maximum(request.move_min_m, speed / request.settings_per_s)
+    moves = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])
+    return np.interp(np.linspace(0.0, moves[-1], max(2, int(moves[-1]) + 1)), moves, places)
+
+
+def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
+    """Poses at the stops, and those without which straight moves would leave the path."""
+    wanted = np.zeros(len(whole.travel_m), dtype=bool)
+    wanted[[0, -1]] = True
+    nearest = np.searchsorted(whole.travel_m, stops_m - STANDING_M)
+    wanted[np.minimum(nearest, len(wanted) - 1)] = True
+    axes = Rotation.from_quat(whole.quaternions_xyzw).as_matrix()
+    followed = np.concatenate(
+        [whole.positions_m, LEVER_M * axes[:, :, 0], LEVER_M * axes[:, :, 2]], axis=1
+    )
+    anchors = np.flatnonzero(wanted)
+    spans = list(zip(anchors[:-1].tolist(), anchors[1:].tolist(), strict=True))
+    while spans:
+        first, last = spans.pop()
+        if last - first < 2:
+            continue
+        between = followed[first + 1 : last]
+        off = _distances(between, followed[first], followed[last])
+        if off.max() > TOLERANCE_M:
+            middle = first + 1 + int(off.argmax())
+            wanted[middle] = True
+            spans += [(first, middle), (middle, last)]
+    return np.flatnonzero(wanted)
+
+
+def _distances(points: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
+    """(N,) distances of points (N, D) from a line segment."""
+    way = end - begin
+    square = float(way @ way)
+    share = np.clip((points - begin) @ way / square, 0.0, 1.0) if square > 0.0 else 0.0
+    return np.linalg.norm(points - begin - np.multiply.outer(share, way), axis=-1)

@@ -7,15 +7,15 @@ tangent keeps to the limit.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 
 import clarabel
 import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix, csr_matrix, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.improvement.limits import Limits, Wish
 from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes, SpeedBounds
+from paint_deposition.planning.requests import ImproveRequest
 
 # The density moves by less than this share at the end; so often at most.
 SETTLED, ROUNDS = 3e-3, 8
@@ -24,10 +24,12 @@ BOUND_WEIGHT = 100.0
 # Weight that holds the mean of the best known film at the target. How far the levels of other
 # models lie from it is left alone: even films would be given up for it.
 LEVEL_WEIGHT = 30.0
-# Smoothness is told by changes of slowness over this length [m].
+# Smoothness is that of slowness over this length [m].
 SLOPE_M = 0.1
-# A constraint that costs more than this, in units of sigma_n squared, holds the film back.
-PULLS = 1e-6
+# A constraint that costs more than this, in units of sigma_n squared, binds.
+BINDS = 1e-6
+# Film outside the tolerance counts so much more.
+BEYOND_TOLERANCE = 3.0
 WORDS = {
     ROBOT: 'the greatest speed',
     BEND: 'the speed in bends',
@@ -54,12 +56,12 @@ class Density:
 
     Attributes:
         density: (n,) of the paint [s/m]. flow: (m,) of each opening.
-        pulling: names of the limits that hold it back.
+        binding: names of the limits that bind.
     """
 
     density: np.ndarray
     flow: np.ndarray
-    pulling: tuple[str, ...] = ()
+    binding: tuple[str, ...] = ()
 
     def slowness(self, nodes: Nodes) -> np.ndarray:
         """(n,) seconds per metre."""
@@ -75,7 +77,7 @@ class Problem:
             each node [um].
         target_um: film wanted.
         nodes, bounds: of the path.
-        limits, wish: of the user.
+        request: of the user.
         given_s: paint of the programme [s at the calibrated flow].
         open_ends: (n,) bool, nodes at which the gun may as well be closed.
         without: names of limits that are left out.
@@ -85,26 +87,26 @@ class Problem:
     target_um: float
     nodes: Nodes
     bounds: SpeedBounds
-    limits: Limits
-    wish: Wish
+    request: ImproveRequest
     given_s: float
     open_ends: np.ndarray
-    without: frozenset[str] = field(default_factory=frozenset)
+    without: frozenset[str] = frozenset()
 
     @property
     def size(self) -> int:
         """Number of unknowns: densities, and a flow for each opening."""
         return len(self.nodes) + len(self.nodes.openings)
 
-    @property
-    def followed_pairs(self) -> np.ndarray:
-        """(k,) nodes from which the gun sprays on to the next one for certain."""
-        pairs = self.nodes.paired
-        return pairs[~self.open_ends[pairs] & ~self.open_ends[pairs + 1]]
-
-    def errors(self, density: np.ndarray) -> list[np.ndarray]:
-        """Per draw (V,) film / target - 1."""
-        return [density @ films / self.target_um - 1.0 for films in self.films]
+    def relaxed(self) -> 'Problem':
+        """For evenness alone, by any densities of paint."""
+        weights = dict.fromkeys(('paint_weight', 'time_weight', 'smoothness'), 0.0)
+        bounds = dict.fromkeys(('tolerance', 'film_min_um', 'film_max_um'))
+        return replace(
+            self,
+            request=self.request.model_copy(update=weights | bounds),
+            open_ends=np.ones(len(self.nodes), dtype=bool),
+            without=frozenset(WORDS) - {'flow'},
+        )
 
 
 def solved(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
@@ -134,25 +136,26 @@ def _step(problem: Problem, now: Density) -> Density:
     # A multiplier times a density is what its limit costs, in the units of the objective.
     costs = multipliers * float(values[:count].mean())
     names = np.repeat([rows.name for rows in constraints], [len(r.limit) for r in constraints])
-    pulling = list(dict.fromkeys(names[costs > PULLS].tolist()))
+    binding = [name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in WORDS]
     flow = values[count:]
-    if not problem.limits.flow_is_free:
+    if not problem.request.flow_is_free:
         flow = np.array([opening.flow for opening in problem.nodes.openings])
-        pulling = [name for name in pulling if name != 'flow']
-    return Density(np.maximum(values[:count], 0.0), flow, tuple(pulling))
+        binding = [name for name in binding if name != 'flow']
+    return Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
 
 
 def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
-    nodes, wish, count = problem.nodes, problem.wish, len(problem.nodes)
+    nodes, request, count = problem.nodes, problem.request, len(problem.nodes)
     matrix = np.zeros((problem.size, problem.size))
     linear = np.zeros(problem.size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
     level = problem.films[0].mean(axis=1) / problem.target_um
     matrix[:count, :count] += 2.0 * LEVEL_WEIGHT * np.outer(level, level)
     linear[:count] -= 2.0 * LEVEL_WEIGHT * level
-    for films, error in zip(problem.films, problem.errors(now.density), strict=True):
+    for films in problem.films:
         scaled = films / problem.target_um
+        error = now.density @ films / problem.target_um - 1.0
         uneven = scaled - scaled.mean(axis=1, keepdims=True)
         matrix[:count, :count] += share * uneven @ uneven.T
         for beyond, edge, weight in _hinges(problem, error):
@@ -160,16 +163,16 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
             matrix[:count, :count] += share * weight * some @ some.T
             linear[:count] -= share * weight * (1.0 + edge) * some.sum(axis=1)
     weights = nodes.weights_m
-    linear[:count] += wish.paint_weight * weights / problem.given_s
+    linear[:count] += request.paint_weight * weights / problem.given_s
     flow = now.flow[nodes.opening]
-    linear[:count] += wish.time_weight * weights / (flow * problem.given_s)
+    linear[:count] += request.time_weight * weights / (flow * problem.given_s)
     seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
-    linear[count:] -= wish.time_weight * seconds / (now.flow * problem.given_s)
+    linear[count:] -= request.time_weight * seconds / (now.flow * problem.given_s)
     pairs = nodes.paired
     mean = float(weights @ now.density / weights.sum())
-    slope = _differences(pairs, problem.size).toarray() / mean
+    slope = _linear('', problem.size, [(pairs + 1, 1.0), (pairs, -1.0)]).matrix.toarray() / mean
     slope *= (SLOPE_M / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
-    matrix += 2.0 * wish.smoothness / len(pairs) * slope.T @ slope
+    matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film tells, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
     matrix[np.arange(count, problem.size), np.arange(count, problem.size)] += 1e-4
@@ -179,24 +182,21 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
 
 def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float, float]]:
     """Points beyond an edge of the film / target - 1, that edge, and what they count more."""
-    wish, limits = problem.wish, problem.limits
-    found = []
-    if wish.tolerance is not None:
-        found += [
-            (error > wish.tolerance, wish.tolerance, wish.beyond_tolerance),
-            (error < -wish.tolerance, -wish.tolerance, wish.beyond_tolerance),
-        ]
-    if limits.film_min_um is not None:
-        edge = limits.film_min_um / problem.target_um - 1.0
-        found.append((error < edge, edge, BOUND_WEIGHT))
-    if limits.film_max_um is not None:
-        edge = limits.film_max_um / problem.target_um - 1.0
-        found.append((error > edge, edge, BOUND_WEIGHT))
+    request, target = problem.request, problem.target_um
+    sides = []
+    if request.tolerance is not None:
+        off = request.tolerance
+        sides += [(1.0, off, BEYOND_TOLERANCE), (-1.0, -off, BEYOND_TOLERANCE)]
+    if request.film_min_um is not None:
+        sides.append((-1.0, request.film_min_um / target - 1.0, BOUND_WEIGHT))
+    if request.film_max_um is not None:
+        sides.append((1.0, request.film_max_um / target - 1.0, BOUND_WEIGHT))
+    found = [(side * (error - edge) > 0.0, edge, weight) for side, edge, weight in sides]
     return [hinge for hinge in found if hinge[0].any()]
 
 
 def _constraints(problem: Problem, now: Density) -> list[Rows]:
-    nodes, limits, count, size = problem.nodes, problem.limits, len(problem.nodes), problem.size
+    nodes, limits, count, size = problem.nodes, problem.request, len(problem.nodes), problem.size
     every = np.arange(count)
     of_opening = count + nodes.opening
     greatest = problem.bounds.greatest_m_per_s
@@ -207,7 +207,9 @@ def _constraints(problem: Problem, now: Density) -> list[Rows]:
         rows.append(_linear(name, size, [(some, -1.0), (of_opening[some], 1.0 / greatest[some])]))
     rows.append(_linear('slowest', size, [(every, 1.0), (of_opening, -1.0 / least)]))
     rows.append(_linear('positive', size, [(every[problem.open_ends], -1.0)]))
-    pairs = problem.followed_pairs
+    # Nodes from which the gun sprays on to the next one for certain.
+    pairs = nodes.paired
+    pairs = pairs[~problem.open_ends[pairs] & ~problem.open_ends[pairs + 1]]
     step = nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]
     flow = now.flow[nodes.opening[pairs]]
     for node in (pairs, pairs + 1):
@@ -235,8 +237,8 @@ def _constraints(problem: Problem, now: Density) -> list[Rows]:
     ]  # fmt: skip
     flows = count + np.arange(len(nodes.openings))
     given = np.array([opening.flow for opening in nodes.openings])
-    rows.append(_linear('flow', size, [(flows, 1.0)], limits.flow_max * given))
-    rows.append(_linear('flow', size, [(flows, -1.0)], -limits.flow_min * given))
+    rows.append(_linear('flow', size, [(flows, 1.0)], limits.flow[1] * given))
+    rows.append(_linear('flow', size, [(flows, -1.0)], -limits.flow[0] * given))
     return [row for row in rows if len(row.limit) and row.name not in problem.without]
 
 
@@ -253,10 +255,6 @@ def _linear(
     value = np.concatenate([np.broadcast_to(v, count) for _, v in terms])
     matrix = coo_matrix((value, (index, column)), shape=(count, size)).tocsr()
     return Rows(name, matrix, np.zeros(count) if limit is None else limit)
-
-
-def _differences(pairs: np.ndarray, size: int) -> csr_matrix:
-    return _linear('', size, [(pairs + 1, 1.0), (pairs, -1.0)]).matrix
 
 
 def _minimised(

@@ -6,13 +6,13 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
 from paint_deposition.report.words import (
-    apart_words,
     capital,
     effect_name,
     is_learned,
     joined,
     micrometres,
     percent_words,
+    separation_words,
 )
 
 # What in the cell is worth a look where an effect is more than physics.
@@ -148,7 +148,7 @@ def to_do(data: ReportData) -> str:
     _, sprays = data.proposals
     if not sprays:
         return 'Take more readings, and repeats at some points.'
-    return f'Spray {sprays[0].what}: {apart_words(sprays[0])}.'
+    return f'Spray {sprays[0].what}: {separation_words(sprays[0])}.'
 
 
 def to_use(data: ReportData, named: list[dict]) -> str:

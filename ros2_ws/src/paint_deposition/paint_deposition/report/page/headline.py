@@ -223,9 +223,11 @@ def _compared(data: ReportData) -> Headline:
 def _side_by_side(data: ReportData) -> Headline:
     errors = [comparison.points.rmse_um for comparison in data.comparisons]
     best = data.names[int(np.argmin(errors))]
-    told = joined([f'{n} {micrometres(e)}' for n, e in zip(data.names, errors, strict=True)])
+    errors_of_each = joined(
+        [f'{n} {micrometres(e)}' for n, e in zip(data.names, errors, strict=True)]
+    )
     facts = (
-        ('How far off', f'RMSE of {told}; the gauge alone gives '
+        ('How far off', f'RMSE of {errors_of_each}; the gauge alone gives '
                         f'{micrometres(data.study.noise_floor_um)}.'),
         ('What to do', f'Take {best}, unless it was fitted to these very readings and the others '
                        'were not.'),
@@ -239,8 +241,8 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
     if data.names:
-        named = zip(data.names, data.comparisons, strict=True)
-        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in named] + [floor]
+        models = zip(data.names, data.comparisons, strict=True)
+        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in models] + [floor]
     if diagnosis is None:
         rmse_um = data.comparisons[-1].points.rmse_um
         return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]
@@ -251,13 +253,13 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
         for label, errors in (('fitted points', fitted), ('points left out', left_out))
     ]
     found.append(floor)
-    told = [
+    named = [
         c
         for c in diagnosis.classes
         if not is_learned(c.best)
         and (c.best in diagnosis.accepted or diagnosis.verdict == 'undecided')
     ]
-    for best in told[:1]:
+    for best in named[:1]:
         remark = 'probability' + (', with its like' if len(best.members) > 1 else '')
         found.append((effect_name(best.best), '', percent(best.probability), remark))
     return found

@@ -74,7 +74,7 @@ def figure(
     """Charts that the page lays out beside and below each other, as its width allows.
 
     Args:
-        name: of the element that asks for them.
+        name: of the element that shows them.
         charts: of ``chart``.
         legend: of all of them: (words, colour, 'line', 'bold', 'dots', 'dashes', 'dot' or 'ring').
     """

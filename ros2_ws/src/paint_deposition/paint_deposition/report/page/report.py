@@ -10,29 +10,29 @@ from typing import Any
 import numpy as np
 
 from paint_deposition import __version__
-from paint_deposition.inference.diagnosis.verdict import percent
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.version import git_version
 from paint_deposition.film.statistics import CPK_MEANS
+from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page import figures as charts
-from paint_deposition.report.page import tables
-from paint_deposition.report.page.film import film_rows, point_rows, points_csv, shares_in_words
+from paint_deposition.report.page import charts, tables
+from paint_deposition.report.page.charts import profile_figure
 from paint_deposition.report.page.headline import headline, key_figures
-from paint_deposition.report.page.learned import learned_figure
-from paint_deposition.report.page.learned_maps import footprint_figure, map_figure
-from paint_deposition.report.page.profiles import profile_figure
+from paint_deposition.report.page.learned import footprint_figure, learned_figure, map_figure
 from paint_deposition.report.page.scene import places_scene, scene_data, section_layout
+from paint_deposition.report.page.tables import film_rows, point_rows, points_csv, shares_in_words
 
 TEMPLATES = Path(__file__).parent / 'templates'
 SCRIPTS = ('report.js', 'part.js')
 SPRAYS_SHOWN = 5
 
 
-def write_report(path: str | Path, data: ReportData) -> None:
+def write_report(path: Path, data: ReportData) -> Path:
     """Write the report as one HTML file, whole or not at all."""
     write_text(path, report_html(data))
+    return path
 
 
 def report_html(data: ReportData) -> str:
@@ -50,7 +50,7 @@ def report_html(data: ReportData) -> str:
         'whole': lambda value: words.minus(f'{value:.0f}'),
         'p': words.p_words,
         'percent': percent,
-        'sureness': words.sureness,
+        'probability': words.probability_words,
         'in_print': words.in_print,
         'effect': words.effect_name,
         'capital': words.capital,
@@ -73,7 +73,7 @@ def report_html(data: ReportData) -> str:
     figures = [figure for figure in drawn if figure]
     content = {
         'scenes': [scene_data(data, k) for k in numbers],
-        'first': _most_telling(data),
+        'first': _largest_change(data),
         'places': [places_scene(data, k) for k in numbers],
         'figures': figures,
         'section': section_layout(),
@@ -89,22 +89,20 @@ def report_html(data: ReportData) -> str:
         cpk=CPK_MEANS,
         points=points,
         points_csv=points_csv(points).replace('<', ' '),
-        painted=tables.painted_lines(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
         pattern=tables.pattern_rows(data),
-        learned=tables.learned_rows(data),
+        learned=[words.learned_range(e) for e in data.model.effects if isinstance(e, LearnedLaw)],
         left_out=data.study.left_out,
         noise=tables.noise_rows(data),
-        levels=tables.level_rows(data),
+        levels=data.diagnosis.random_effects if data.diagnosis else (),
         shift=data.diagnosis and data.diagnosis.pattern_shift,
         blind=tables.blind_rows(data),
-        models=tables.model_rows(data),
         misfits=tables.misfit_rows(data),
         places=places,
         sprays=sprays[:SPRAYS_SHOWN],
-        separates=words.capital(words.competing(sprays[0])) if sprays else '',
+        separates=words.capital(words.competing_explanations(sprays[0])) if sprays else '',
         provenance=_provenance(),
         lined=all(len(p.line_m) for p in data.profiles),
         figures=[figure['name'] for figure in figures],
@@ -115,7 +113,7 @@ def report_html(data: ReportData) -> str:
     )
 
 
-def _most_telling(data: ReportData) -> int:
+def _largest_change(data: ReportData) -> int:
     """The experiment on which the model gained most, or is furthest off: it is shown first."""
     squares = data.residuals_um[0] ** 2
     if data.improved:

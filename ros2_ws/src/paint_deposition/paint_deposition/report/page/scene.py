@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from paint_deposition.film.colour_scales import round_up
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import spread_over_surface
-from paint_deposition.film.colour_scales import round_up
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.axes import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
-from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import FILM_COLOURS, RESIDUAL_COLOURS, axis, base_layout
 from paint_deposition.report.pictures.view import View

@@ -1,6 +1,8 @@
 """Rows of the report's tables."""
 
+import csv
 from dataclasses import astuple
+from io import StringIO
 from itertools import product
 from typing import Any
 
@@ -8,15 +10,17 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.film.statistics import film_statistics
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.report.data import ReportData
+from paint_deposition.report.style import TWO_SIDED_95
 from paint_deposition.report.words import (
     SYMBOLS,
     effect_meaning,
     effect_name,
     in_unit,
-    learned_range,
     learned_words,
     micrometres,
     number,
@@ -25,44 +29,33 @@ from paint_deposition.report.words import (
 
 # A value below this share of its interval is printed as none.
 NEGLIGIBLE = 1e-4
-
-
-def painted_lines(data: ReportData) -> list[str]:
-    """How the gun ran over each part and what is odd about it, a line each."""
-    lines = []
-    for name, geometry in data.comparisons[-1].geometry.items():
-        lines.append(f'{name}: {geometry.sentence}')
-        lines += [f'{name}: {warning}' for warning in geometry.warnings]
-    return lines
+LOW, IN, HIGH = 'low', 'in', 'high'
 
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
     """Candidate causes with the effects they are confounded with, and parameters."""
     if data.diagnosis is None:
         return []
-    rows = []
-    for found in data.diagnosis.classes:
-        effect = data.effect_class(found.best)
-        rows.append(
-            {
-                'id': found.best,
-                'found': found,
-                'name': effect_name(found.best),
-                'like': [m for m in found.members if m != found.best],
-                'others': [effect_name(m) for m in found.members if m != found.best],
-                'accepted': found.best in data.diagnosis.accepted,
-                'meaning': effect_meaning(effect),
-                'signature': effect.signature if effect else '',
-                'parameters': [
-                    *(
-                        _parameter(effect, name, *astuple(value))
-                        for name, value in found.parameters.items()
-                    ),
-                    *_learned(data.model.effect(found.best)),
-                ],
-            }
-        )
-    return rows
+    return [_class_row(data, data.diagnosis, found) for found in data.diagnosis.classes]
+
+
+def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> dict[str, Any]:
+    effect = data.effect_class(found.best)
+    like = [member for member in found.members if member != found.best]
+    parameters = [
+        _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
+    ]
+    return {
+        'id': found.best,
+        'found': found,
+        'name': effect_name(found.best),
+        'like': like,
+        'others': [effect_name(member) for member in like],
+        'accepted': found.best in diagnosis.accepted,
+        'meaning': effect_meaning(effect),
+        'signature': effect.signature if effect else '',
+        'parameters': parameters + _learned(data.model.effect(found.best)),
+    }
 
 
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
@@ -102,11 +95,6 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     return rows
 
 
-def learned_rows(data: ReportData) -> list[str]:
-    """Where each learned law of the best model holds."""
-    return [learned_range(law) for law in data.model.effects if isinstance(law, LearnedLaw)]
-
-
 def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
     """What the readings scatter by: what, how much, and how that is known."""
     noise, texture = data.study.noise, data.study.texture
@@ -117,21 +105,6 @@ def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
             ('noise of the gauge, one reading', micrometres(noise.typical_um), noise.source),
             ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
         )
-    ]
-
-
-def level_rows(data: ReportData) -> list[dict[str, Any]]:
-    """By how much parts and gauge sessions differ."""
-    amounts = data.diagnosis.random_effects if data.diagnosis else ()
-    return [
-        {
-            'what': f'{amount.kind} of {amount.of}',
-            'value': f'{amount.value:+.2f}',
-            'sd': f'{amount.sd:.2f}',
-            'unit': amount.unit,
-            'notable': amount.is_notable,
-        }
-        for amount in amounts
     ]
 
 
@@ -188,20 +161,6 @@ def _size(value: float | None, unit: str) -> str:
     return f'{size} {shown_unit}'.strip()
 
 
-def model_rows(data: ReportData) -> list[dict[str, Any]]:
-    """Models side by side: error and bias of each on every part."""
-    return [
-        {
-            'name': name,
-            'effects': ', '.join(effect_name(e.id) for e in c.model.effects) or 'none',
-            'all': c.points,
-            'parts': [m.residuals for m in c.misfits if m.kind == 'experiment'],
-            'regions': len(c.regions),
-        }
-        for name, c in zip(data.names, data.comparisons, strict=False)
-    ]
-
-
 def misfit_rows(data: ReportData) -> list[dict[str, Any]]:
     """Experiments, their groups and passes: bias and RMSE before and after."""
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
@@ -209,3 +168,85 @@ def misfit_rows(data: ReportData) -> list[dict[str, Any]]:
         {'before': m, 'after': later.get((m.experiment, m.kind, m.label), m)}
         for m in data.comparisons[0].misfits
     ]
+
+
+def film_rows(data: ReportData) -> list[dict[str, Any]]:
+    """For each part its readings, and its film as the best model predicts it."""
+    rows = []
+    for k, experiment in enumerate(data.experiments):
+        measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
+        film = film_statistics(
+            painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
+            target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
+        )  # fmt: skip
+        rows.append(
+            {
+                'name': experiment.name,
+                'measured': measured,
+                'bands': band_shares(data, measured),
+                'areas': {
+                    LOW: film.below_target, IN: film.within_target, HIGH: film.above_target
+                },
+                'film': film,
+            }
+        )  # fmt: skip
+    return rows
+
+
+def band_shares(data: ReportData, film_um: np.ndarray) -> dict[str, float]:
+    """Shares of films (N,) that are low, in and high; empty without a target."""
+    if data.target_um is None:
+        return {}
+    bands = [band_of(data, value) for value in film_um]
+    return {name: bands.count(name) / len(bands) for name in (LOW, IN, HIGH)}
+
+
+def band_of(data: ReportData, film_um: float) -> str:
+    """Where a film is beside the target band; '' without a target."""
+    if data.target_um is None or data.tolerance_um is None:
+        return ''
+    off = film_um - data.target_um
+    return IN if abs(off) <= data.tolerance_um else LOW if off < 0.0 else HIGH
+
+
+def shares_in_words(shares: dict[str, float]) -> str:
+    """'20 % low, 75 % in, 5 % high'."""
+    return ', '.join(f'{100 * share:.0f} % {name}' for name, share in shares.items())
+
+
+def point_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Each measured point: where, measured, predicted, deviation, and whether that is right.
+
+    The model is right where the deviation is within what gauge and texture scatter by in 95 % of
+    readings; the film is right in the target band.
+    """
+    found = data.comparisons[-1].points
+    rows: list[dict[str, Any]] = []
+    for k, experiment in enumerate(data.experiments):
+        first = data.rows_of(k).start
+        labels, groups = experiment.readings.point[experiment.means.first], experiment.groups
+        for p, position in enumerate(experiment.measured_points.positions_m):
+            row = first + p
+            residual, scatter = found.residual_um[row], TWO_SIDED_95 * found.sigma_um[row]
+            rows.append(
+                {
+                    'part': experiment.name, 'point': str(labels[p]), 'group': str(groups[p]),
+                    'x_mm': 1e3 * position[0], 'y_mm': 1e3 * position[1],
+                    'z_mm': 1e3 * position[2],
+                    'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
+                    'deviation_um': residual, 'scatter_um': scatter,
+                    'model': 'OK' if abs(residual) <= scatter else 'off',
+                    'film': band_of(data, found.measured_um[row]),
+                }
+            )  # fmt: skip
+    return rows
+
+
+def points_csv(rows: list[dict[str, Any]]) -> str:
+    """The same as a table for a spreadsheet."""
+    text = StringIO()
+    table = csv.writer(text, lineterminator='\n')
+    table.writerow(rows[0])
+    for row in rows:
+        table.writerow(v if isinstance(v, str) else f'{v:.3f}' for v in row.values())
+    return text.getvalue()

@@ -14,11 +14,9 @@ from matplotlib.patches import Patch
 from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import DOWN
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
-from paint_deposition.report.pictures.part import PartPicture
-from paint_deposition.report.pictures.tool_path import draw_tool_path
+from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
 # The part's share of the picture, and the room around it for axes, title and legend [in].
@@ -27,12 +25,6 @@ LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.9, 2.95, 0.6, 0.75
 LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.3, 0.24, 4.0
 LINE_IN, INSET_IN = 0.24, (2.1, 1.35)
 BINS = 40
-
-
-def warm_up() -> None:
-    """Load the compiled code, which takes longer than drawing, before there is a film."""
-    corner = Surface(np.eye(3), np.array([[0, 1, 2]]), np.eye(3), np.ones(3), np.array(DOWN))
-    PartPicture.of(corner)
 
 
 def write_film_picture(path: str | Path, *drawn: Any) -> Path:

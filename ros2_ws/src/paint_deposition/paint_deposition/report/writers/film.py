@@ -1,7 +1,6 @@
-"""A finished film on disk, for node and command: painted mesh, table and figures."""
+"""A finished film on disk: painted mesh, table, figures and picture."""
 
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +8,51 @@ import numpy as np
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import replacing
+from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.parquet import write_parquet
 from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.writers.write import with_provenance, writable, written
 
 CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
-CSV_ROW = '%.9g,%.9g,%.9g,%.9g\n'
-CSV_ROWS = 4096
+
+
+@written.register
+def _write_simulation(
+    result: Film,
+    folder: Path,
+    made_from: Mapping[str, Any] | None = None,
+    pictures: str = 'png',
+    parquet: bool = False,
+) -> list[Path]:
+    from paint_deposition.report.pictures.film import write_film_picture
+
+    models = {gun.name or 'model': gun.model for gun in result.guns}
+    motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
+    found = {what: file for what, file in motions.items() if Path(file).exists()}
+    about = with_provenance(result.to_dict() | dict(made_from or {}), models, found)
+    files = write_film(
+        folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
+    )
+    if parquet:
+        table = folder / 'film.parquet'
+        files.append(write_film_table(table, result.surface, result.film_um))
+    if result.readings is not None and result.predicted_um is not None:
+        files.append(folder / 'predicted.csv')
+        write_predictions(files[-1], result.readings, result.predicted_um)
+    mesh, motion, model = (
+        Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')
+    )
+    picture = write_film_picture(
+        folder / f'film.{pictures}', result.surface, result.film_um, result.path,
+        result.statistics, f'Film on {mesh or "the part"}',
+        f'{motion}, {model or "default model"}',
+    )  # fmt: skip
+    return [*files, picture]
 
 
 def write_film(
@@ -59,8 +93,9 @@ def write_film(
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
+        rows = np.column_stack([surface.vertices_m, film_um])
         with replacing(paths[1]) as temporary:
-            _write_rows(temporary, np.column_stack([surface.vertices_m, film_um]))
+            np.savetxt(temporary, rows, '%.9g', ',', header=CSV_HEADER, comments='')
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
 
@@ -73,28 +108,8 @@ def write_film_table(path: Path, surface: Surface, film_um: np.ndarray) -> Path:
     """
     import pyarrow as pa
 
-    named = zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True)
-    normals = zip(('nx', 'ny', 'nz'), surface.normals.T, strict=True)
-    columns = {**dict(named), 'thickness_um': film_um, **dict(normals)}
-    columns['area_m2'] = surface.vertex_areas_m2
-    return write_parquet(path, pa.table(columns))
-
-
-def _write_rows(path: Path, rows: np.ndarray) -> None:
-    """As ``np.savetxt`` does, three times as fast: many rows are formatted at once."""
-    with path.open('w', encoding='ascii', newline='\n') as file:
-        file.write(f'{CSV_HEADER}\n')
-        for first in range(0, len(rows), CSV_ROWS):
-            some = rows[first : first + CSV_ROWS]
-            file.write(CSV_ROW * len(some) % tuple(some.ravel().tolist()))
-
-
-@contextmanager
-def writable(folder: Path) -> Iterator[None]:
-    """Give PaintError for what keeps files from being written to a folder."""
-    try:
-        yield
-    except OSError as error:
-        raise PaintError(
-            f'{error.filename or folder}: {error.strerror}; choose a folder that can be written'
-        ) from None
+    positions = dict(zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True))
+    normals = dict(zip(('nx', 'ny', 'nz'), surface.normals.T, strict=True))
+    film = {'thickness_um': film_um}
+    area = {'area_m2': surface.vertex_areas_m2}
+    return write_parquet(path, pa.table(positions | film | normals | area))

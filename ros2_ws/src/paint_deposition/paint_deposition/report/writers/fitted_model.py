@@ -6,18 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
-from paint_deposition.inference.posterior import Posterior
+from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.posterior import Posterior
 
 # So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
 DIGITS = 8

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.rapid.writer import gauge_module_text
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.part.axes import across_axis
-from paint_deposition.report.writers.film import writable
+from paint_deposition.report.writers.write import writable
 
 COLUMNS = (
     'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',

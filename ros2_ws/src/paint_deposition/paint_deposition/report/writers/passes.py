@@ -1,24 +1,33 @@
-"""Passes on disk: a bag, a table and a robot program that lay the same film, and the model."""
+"""Plans and improved programmes on disk: bag, table and robot program, figures, and the film."""
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import Any
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
+from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.planned_model import DIGEST, MODEL_FILE
+from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.part_plan import PartPlan
+from paint_deposition.planning.plan import Plan, TradeOffPoint
+from paint_deposition.report.writers.film import write_film
+from paint_deposition.report.writers.write import writable
 
 BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
 COLUMNS = (
@@ -62,6 +71,82 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     write_text(folder / PROGRAM, module)
     write_model(folder / MODEL_FILE, passes.model)
     return [BAG, TABLE, PROGRAM, MODEL_FILE]
+
+
+def write_plan(
+    folder: str | Path,
+    plan: Plan | PartPlan,
+    surface: Surface,
+    details: Mapping[str, Any] | None = None,
+    part: tuple[str, Rigid] | None = None,
+) -> list[Path]:
+    """Write ``plan.json``, bag, ``passes.csv``, ``passes.mod``, ``model.yaml`` and the film.
+
+    An older plan in the folder is replaced.
+
+    Args:
+        folder: where to; made if it is not there.
+        details: more to say in plan.json, such as the files used.
+        part: the robot's frame and the pose of the part in it; bag and table have their poses
+            in that frame then, and the module defines its work object so.
+
+    Returns:
+        The paths written.
+
+    Raises:
+        PaintError: the folder cannot be written, or holds another folder of the bag's name.
+    """
+    folder = Path(folder)
+    with writable(folder):
+        names = write_passes(
+            folder, Passes(plan.trajectory, plan.moves, plan.model, 'Planned', part)
+        )
+        told = {**plan.to_dict(), DIGEST: model_digest(plan.model), **(details or {})}
+        write_json(folder / PLAN_FILE, told)
+    film = write_film(folder, surface, plan.film_um, plan.statistics, overwrite=True)
+    names = [PLAN_FILE, *names, *(file.name for file in film)]
+    return [folder / name for name in names]
+
+
+def write_improvement(
+    folder: str | Path,
+    result: Improvement,
+    details: Mapping[str, Any] | None = None,
+    part: tuple[str, Rigid] | None = None,
+) -> list[Path]:
+    """Write ``improvement.json``, bag, ``passes.csv``, ``passes.mod``, model and film.
+
+    Args:
+        folder: where to; made if it is not there.
+        details: more to say in the figures, such as the files used.
+        part: the robot's frame and the pose of the part in it, as for a plan.
+
+    Returns:
+        The paths written.
+
+    Raises:
+        PaintError: the folder cannot be written, or holds another folder of the bag's name.
+    """
+    folder = Path(folder)
+    passes = Passes(result.trajectory, result.moves, result.model, 'Improved', part)
+    with writable(folder):
+        names = write_passes(folder, passes)
+        told = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
+        write_json(folder / IMPROVEMENT_FILE, told)
+    off = result.tolerance * result.target_um
+    statistics = film_statistics(
+        result.after.film_um, result.surface.vertex_areas_m2, result.after.paint_cm3,
+        target_um=result.target_um, target_tolerance_um=off,
+    )  # fmt: skip
+    film = write_film(folder, result.surface, result.after.film_um, statistics, overwrite=True)
+    return [folder / name for name in (IMPROVEMENT_FILE, *names)] + film
+
+
+def write_trade_off_table(path: str | Path, points: Sequence[TradeOffPoint]) -> Path:
+    """One row a weight."""
+    rows = [[f'{value:.6g}' for value in astuple(point)] for point in points]
+    write_table(path, [[item.name for item in fields(TradeOffPoint)], *rows])
+    return Path(path)
 
 
 def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:

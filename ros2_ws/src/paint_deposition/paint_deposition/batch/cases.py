@@ -1,0 +1,134 @@
+"""Cases of a sweep or a line: what each is computed from, and a cache of their results on disk.
+
+The cache is our own: joblib's keeps pickles under a digest of the function's text alone, while
+these are Parquet tables that a user opens, found again only by the same code of the whole package.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pickle
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import paint_deposition
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.user_effects import effect_of
+from paint_deposition.files.json_files import json_text
+from paint_deposition.files.parquet import write_parquet
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+FOLDER = 'finished'
+Columns = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One piece of work.
+
+    Attributes:
+        digest: of all that it is computed from; the same digest is never computed twice.
+        given: what is its own, small.
+        inputs: names of what it shares with others, such as a part or a motion.
+        about: columns of its row that are known without computing it.
+    """
+
+    digest: str
+    given: Any
+    inputs: tuple[str, ...] = ()
+    about: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class ResultCache:
+    """A folder of results, a Parquet file for each case: a run that was cut off is resumed.
+
+    Attributes:
+        folder: of the files, which appear whole.
+        failures: columns of cases that could not be computed; the next run tries them again.
+    """
+
+    folder: Path
+    failures: dict[str, Columns] = field(default_factory=dict)
+
+    def has(self, digest: str) -> bool:
+        """Whether a case is there."""
+        return self._path(digest).is_file()
+
+    def add(self, digest: str, columns: Columns) -> None:
+        """Keep the result of a case: equally long columns by name."""
+        import pyarrow as pa
+
+        write_parquet(self._path(digest), pa.table(dict(columns)))
+
+    def table(self, digests: Iterable[str]) -> pa.Table:
+        """These cases, one after the other; columns that a case has not are empty in its rows."""
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        parts = [
+            pa.table(dict(self.failures[digest]))
+            if digest in self.failures
+            else pq.read_table(self._path(digest))
+            for digest in digests
+        ]
+        return pa.concat_tables(parts, promote_options='permissive')
+
+    def _path(self, digest: str) -> Path:
+        return self.folder / f'{digest}.parquet'
+
+
+def digest_of(*values: Any) -> str:
+    """32 hexadecimal digits of SHA-256 for values that JSON can hold."""
+    return hashlib.sha256(json_text({'values': values}).encode()).hexdigest()[:32]
+
+
+def content_digest(value: Any) -> str:
+    """The same for an input as it is in memory, such as a surface or a motion."""
+    return hashlib.sha256(_pickled(_ByValue, value)).hexdigest()[:32]
+
+
+@cache
+def code_digest() -> str:
+    """The same for the package's version and all its sources."""
+    package = Path(paint_deposition.__file__).parent
+    digest = hashlib.sha256(paint_deposition.__version__.encode())
+    for file in sorted(package.rglob('*.py')):
+        digest.update(str(file.relative_to(package)).encode())
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:32]
+
+
+def packed(value: Any) -> bytes:
+    """Bytes that ``pickle.loads`` opens in another process; a user's own effects are run there."""
+    return _pickled(_Packer, value)
+
+
+class _Packer(pickle.Pickler):
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, type) and issubclass(value, Effect) and value.file is not None:
+            return effect_of, (value.file, value.file_content)
+        return NotImplemented
+
+
+class _ByValue(_Packer):
+    """Of arrays their values count, not how they lie in memory."""
+
+    def reducer_override(self, value: Any) -> Any:
+        if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+            return np.ndarray, (value.dtype.str, value.shape, value.tobytes())
+        return super().reducer_override(value)
+
+
+def _pickled(pickler: type[_Packer], value: Any) -> bytes:
+    content = io.BytesIO()
+    pickler(content, protocol=5).dump(value)
+    return content.getvalue()

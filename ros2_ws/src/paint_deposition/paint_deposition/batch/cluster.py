@@ -1,0 +1,254 @@
+"""Cases computed by workers: processes of this machine, or those of a Dask scheduler.
+
+Each result is kept as soon as it is there, so that a run that is cut off is resumed.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import pickle
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError
+from contextlib import contextmanager, suppress
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import paint_deposition
+from paint_deposition.batch.cases import Case, Columns, ResultCache, packed
+from paint_deposition.errors import ManyError
+
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
+# One thread a process: the cases are what runs side by side.
+ONE_THREAD = dict.fromkeys(
+    ('NUMBA_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'), '1'
+)
+CONNECT_S = 30
+# Inputs that a worker keeps open.
+OPENED = 8
+# How often results are looked for, and workers; and for how long there may be none.
+RESULTS_S, WORKERS_S, PATIENCE_S = 0.02, 3.0, 60.0
+RESUME = 'finished cases are kept, run the same command again'
+
+
+def compute(
+    scheduler: str | None,
+    count: int | None,
+    work: Callable[..., Columns],
+    cases: Sequence[Case],
+    inputs: Mapping[str, Any],
+    results: ResultCache,
+    progress: Callable[..., None],
+) -> tuple[int, str]:
+    """Start workers if a case is left, compute it, and stop them.
+
+    Args:
+        scheduler, count: of ``workers``.
+        work, cases, inputs, results, progress: of ``run``.
+
+    Returns:
+        How many cases were computed, and the workers in words, '' where none was needed.
+    """
+    if all(results.has(case.digest) for case in cases):
+        return 0, ''
+    progress('starting the workers')
+    with workers(scheduler, count) as client:
+        described = _in_words(client)  # before any of them may end
+        return run(client, work, cases, inputs, results, progress), described
+
+
+@contextmanager
+def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[Client]:
+    """Connect to a scheduler, or start as many processes here; they end with the block.
+
+    Args:
+        scheduler: address as `dask scheduler` prints it, 'tcp://10.0.0.5:8786'; None starts a
+            scheduler and workers on this machine.
+        count: of the processes on this machine; default: one a core that this process may use.
+
+    Raises:
+        ManyError: no scheduler answers, it has no worker, or a worker has another version.
+    """
+    import dask
+    from distributed import Client, LocalCluster
+    from distributed.utils import silence_logging_cmgr
+
+    # Inputs travel with the tasks that hold them, see ``run``; they are large on purpose.
+    settings = {
+        'distributed.admin.large-graph-warning-threshold': '10GB',
+        'distributed.comm.timeouts.connect': f'{CONNECT_S}s',
+        'distributed.nanny.pre-spawn-environ': ONE_THREAD,
+    }
+    with dask.config.set(settings):
+        if scheduler is None:
+            with (
+                LocalCluster(
+                    n_workers=count or len(os.sched_getaffinity(0)), threads_per_worker=1,
+                    processes=True, dashboard_address='127.0.0.1:0', silence_logs=logging.CRITICAL,
+                ) as cluster,
+                Client(cluster) as client,
+            ):  # fmt: skip
+                yield client
+            return
+        try:
+            client = Client(scheduler, timeout=f'{CONNECT_S}s')
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ManyError(
+                f'no scheduler answers at {scheduler} ({type(error).__name__}); start one with '
+                '`dask scheduler`, and workers with `dask worker ADDRESS --nthreads 1`'
+            ) from None
+        # A lost connection becomes an error of one line in ``run``.
+        with silence_logging_cmgr(logging.CRITICAL), client:
+            _require_same_version(client, scheduler)
+            yield client
+
+
+def require_alone(scheduler: str | None, count: int | None) -> None:
+    """Refuse a number of processes beside a scheduler, which has its own.
+
+    Raises:
+        ManyError: both are given.
+    """
+    if scheduler is not None and count is not None:
+        raise ManyError('--workers is for this machine; leave it out beside --scheduler')
+
+
+def _in_words(client: Client) -> str:
+    """'4 worker processes of 3.9 GiB at tcp://127.0.0.1:40001'."""
+    info = client.scheduler_info(n_workers=-1)
+    memory = [worker['memory_limit'] for worker in info['workers'].values()]
+    each = f'{min(memory) / 2**30:.1f} GiB' if all(memory) else 'unlimited memory'
+    plural = '' if len(memory) == 1 else 'es'
+    return f'{len(memory)} worker process{plural} of {each} at {info["address"]}'
+
+
+def _require_same_version(client: Client, scheduler: str) -> None:
+    """Films are the same on all workers only if all run the same code."""
+    versions = client.run(lambda: paint_deposition.__version__)
+    if not versions:
+        raise ManyError(
+            f'the scheduler at {scheduler} has no worker; start some with '
+            f'`dask worker {scheduler} --nthreads 1`'
+        )
+    for worker, version in versions.items():
+        if version != paint_deposition.__version__:
+            raise ManyError(
+                f'worker {worker} has paint_deposition {version}, this is '
+                f'{paint_deposition.__version__}; install the same everywhere'
+            )
+
+
+def run(
+    client: Client,
+    work: Callable[..., Columns],
+    cases: Sequence[Case],
+    inputs: Mapping[str, Any],
+    results: ResultCache,
+    progress: Callable[[str, float], None],
+) -> int:
+    """Compute the cases that are not finished yet, and return how many those were.
+
+    An input is sent once. It travels as the result of a task of its own: the scheduler can make
+    it anew when the only worker that holds it dies, and workers hand it to each other. Cases of a
+    worker that dies are run again by another one. A case that ends its worker again and again, or
+    fails in a way that is not foreseen, has the reason in its column ``error`` and is tried again
+    by the next run.
+
+    Args:
+        client: of ``workers``.
+        work: a function of a module: (given, *inputs of the case) -> equally long columns.
+        cases: in any order; of several with one digest, one is run.
+        inputs: by name.
+        results: where they are kept.
+        progress: called with what is being done and the share of it that is done.
+
+    Raises:
+        ManyError: the scheduler, or all workers, are lost.
+    """
+    left = {case.digest: case for case in cases if not results.has(case.digest)}
+    # As bytes: Dask neither walks through the arrays nor copies them for each worker.
+    sent = {
+        name: client.submit(bytes, packed(inputs[name]), key=f'input-{name}', pure=False)
+        for name in {name for case in left.values() for name in case.inputs}
+    }
+    futures: dict[Future, Case] = {
+        client.submit(
+            _unpacked, work, packed(case.given), *(sent[name] for name in case.inputs),
+            key=f'case-{case.digest}', pure=False, retries=1,
+        ): case
+        for case in left.values()
+    }  # fmt: skip
+    done = len(cases) - len(left)
+    progress(f'{done} of {len(cases)} cases', done / max(len(cases), 1))
+    for future in _as_done(client, list(futures)):
+        case = futures.pop(future)
+        columns, failure = _result(future)
+        if failure is None:
+            results.add(case.digest, columns)
+        else:
+            results.failures[case.digest] = {**case.about, 'error': [failure]}
+        future.release()
+        done += 1
+        progress(f'{done} of {len(cases)} cases', done / len(cases))
+    return len(left)
+
+
+@lru_cache(maxsize=OPENED)
+def _opened(content: bytes) -> Any:
+    """An input as it was. What it keeps for itself, a search tree say, serves the next case."""
+    return pickle.loads(content)
+
+
+def _unpacked(work: Callable[..., Columns], given: bytes, *inputs: bytes) -> Columns:
+    """Run one case in a worker."""
+    return work(pickle.loads(given), *map(_opened, inputs))
+
+
+def _as_done(client: Client, futures: Sequence[Future]) -> Iterator[Future]:
+    """The futures in the order in which they are done.
+
+    Raises:
+        ManyError: there has been no worker for a while.
+    """
+    from distributed import as_completed
+
+    coming = as_completed(futures)
+    looked_s = there_s = time.monotonic()
+    while not coming.is_empty():
+        if coming.has_ready():
+            yield next(coming)
+            continue
+        time.sleep(RESULTS_S)
+        now_s = time.monotonic()
+        if now_s < looked_s + WORKERS_S:
+            continue
+        looked_s = now_s
+        with suppress(OSError):  # the scheduler is lost: the futures will say so
+            if client.scheduler_info(n_workers=-1)['workers']:
+                there_s = now_s
+        if now_s > there_s + PATIENCE_S:
+            raise ManyError(f'no worker has been there for {PATIENCE_S:.0f} s; {RESUME}')
+
+
+def _result(future: Future) -> tuple[Columns, str | None]:
+    """The columns of a case, or why there are none.
+
+    Raises:
+        ManyError: the scheduler is lost.
+    """
+    from distributed.scheduler import KilledWorker
+
+    try:
+        return future.result(), None
+    except CancelledError:
+        raise ManyError(f'the scheduler is lost; {RESUME}') from None
+    except KilledWorker as error:
+        return {}, (
+            f'not computed: {error.allowed_failures + 1} workers ended while they computed it; '
+            'give workers more memory, or run fewer of them with --workers'
+        )
+    except Exception as error:
+        return {}, f'not computed: {type(error).__name__}: {" ".join(str(error).split())}'

@@ -1,1 +1,0 @@
-"""Many cases at once: processes on this machine, or workers of a Dask scheduler."""

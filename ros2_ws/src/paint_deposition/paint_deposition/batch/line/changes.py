@@ -1,0 +1,324 @@
+"""What each part says by itself, part after part, and when that changed: steps and drifts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from datetime import datetime, timezone
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from scipy.ndimage import median_filter
+from scipy.stats import chi2, norm
+
+from paint_deposition.batch.line.control_charts import Charts, charts, robust_deviation
+from paint_deposition.batch.line.pooling import Measured, Pooled, amplitudes, places
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.report.words import unit_words
+
+# Fewer parts make no chart.
+FEWEST = 8
+# The first third of the parts, but no more than these, give the charts' centre.
+MOST_BASELINE = 100
+# All charts together raise one false alarm in so many parts; level, misfit and effects share it.
+RUN_LENGTH = 1000.0
+CHARTS, SHARES = 3, 3
+# An amplitude that one part knows no better than to so many typical sizes is not charted.
+VAGUE = 5.0
+# Series that are correlated by more than this are one.
+CORRELATED = 0.9
+# The chi-square of a part counts as no more standard deviations than this.
+FURTHEST = 8.0
+# A segment has at least so many parts.
+SHORTEST = 3
+# One part is no further from its neighbours: a single bad part is no change [standard deviations].
+MOST_OF_ONE = 4.0
+NEIGHBOURS = 5
+# A change may have been wherever the squared error is larger by no more (95 %, two parameters).
+LIKELY = 5.99
+SECONDS_A_DAY = 86400.0
+
+
+@dataclass(frozen=True)
+class Series:
+    """A quantity of n parts.
+
+    Attributes:
+        name: 'level', 'misfit', or an effect's 'id.parameter'.
+        unit: of values. members: series that are alike, itself first.
+        values, sd: (n,) and what one part's readings leave open, standard deviations.
+        baseline: so many first parts give the centre.
+        run_length: of each of its charts.
+    """
+
+    name: str
+    unit: str
+    members: tuple[str, ...]
+    values: np.ndarray
+    sd: np.ndarray
+    baseline: int
+    run_length: float
+
+    @cached_property
+    def centre(self) -> float:
+        """Mean over the baseline, each part by its weight."""
+        weight = self.deviation[: self.baseline] ** -2.0
+        return float(weight @ self.values[: self.baseline] / weight.sum())
+
+    @cached_property
+    def deviation(self) -> np.ndarray:
+        """(n,) standard deviation from part to part: by the gauge, and by the parts themselves."""
+        own = max(robust_deviation(self.values) ** 2 - float(np.median(self.sd**2)), 0.0)
+        return np.sqrt(own + self.sd**2)
+
+    @cached_property
+    def standard(self) -> np.ndarray:
+        """(n,) deviations from the centre in standard deviations."""
+        return (self.values - self.centre) / self.deviation
+
+    @cached_property
+    def charts(self) -> Charts:
+        """Shewhart, EWMA and CUSUM."""
+        return charts(self.standard, self.run_length)
+
+
+def baseline_of(count: int) -> int:
+    """How many first parts give the centre."""
+    return int(np.clip(count // 3, min(FEWEST // 2, count), MOST_BASELINE))
+
+
+def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
+    """The level, the misfit, then every amplitude that one part shows; oldest part first."""
+    noise = pooled.posterior.scales.noise
+    rows = [
+        _of_part(part, part.residual_um - pooled.shared_um(part, place_of), noise)
+        for part, place_of in zip(parts, places(parts)[1], strict=True)
+    ]
+    level, level_sd, misfit, amounts, amounts_sd = map(np.array, zip(*rows, strict=True))
+    names = amplitudes()
+    # An accepted effect is charted as a whole.
+    amounts[:, list(pooled.chosen)] += pooled.amounts
+    known = [
+        k for k in range(len(names))
+        if np.isfinite(amounts[:, k]).all() and np.median(amounts_sd[:, k]) < VAGUE
+    ]  # fmt: skip
+    groups = _grouped(known, amounts / np.where(amounts_sd > 0.0, amounts_sd, 1.0), pooled.chosen)
+    base, spending = baseline_of(len(parts)), RUN_LENGTH * CHARTS * SHARES
+    found = [
+        Series('level', '%', ('level',), 100.0 * level, 100.0 * level_sd, base, spending),
+        Series('misfit', 'standard deviations', ('misfit',), misfit, np.ones(len(parts)), base,
+               spending),
+    ]  # fmt: skip
+    for group in groups:
+        effect, parameter = names[group[0]]
+        info = EFFECTS[effect].parameters()[parameter]
+        members = tuple('.'.join(names[k]) for k in group)
+        found.append(Series(
+            members[0], info['unit'], members,
+            info['neutral'] + info['typical'] * amounts[:, group[0]],
+            info['typical'] * amounts_sd[:, group[0]], base, spending * len(groups),
+        ))  # fmt: skip
+    return found
+
+
+def _of_part(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
+    """Level with its deviation; misfit; amplitudes with theirs, whatever the level is."""
+    sigma = noise * part.sigma_um
+    film, left = part.predicted_um / sigma, left_um / sigma
+    marks = part.by_effect / sigma[:, np.newaxis]
+    square = film @ film
+    level = film @ left / square
+    rest = left - level * film
+    freedom = max(len(part) - 1, 1)
+    # The tail that is smaller is taken, so that neither end is rounded to 0.
+    above, below = chi2.logsf(rest @ rest, freedom), chi2.logcdf(rest @ rest, freedom)
+    misfit = _quantile(above, below)
+    own = marks - np.outer(film, film @ marks / square)
+    squares = np.einsum('pa,pa->a', own, own)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        return level, square**-0.5, misfit, own.T @ rest / squares, squares**-0.5
+
+
+def _quantile(log_above: float, log_below: float) -> float:
+    value = norm.isf(np.exp(log_above)) if log_above < log_below else norm.ppf(np.exp(log_below))
+    return float(np.clip(value, -FURTHEST, FURTHEST))
+
+
+def _grouped(known: Sequence[int], standard: np.ndarray, first: Sequence[int]) -> list[list[int]]:
+    """Amplitudes whose series are alike, in groups; accepted ones lead theirs."""
+    groups: list[list[int]] = []
+    for k in sorted(known, key=lambda one: one not in first):
+        for group in groups:
+            if abs(np.corrcoef(standard[:, group[0]], standard[:, k])[0, 1]) > CORRELATED:
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+@dataclass(frozen=True)
+class Change:
+    """One change of a series.
+
+    Attributes:
+        series, unit, members: of what. kind: 'step' or 'drift'.
+        part: row of the first part after it. time_s: of that part; earliest_s, latest_s: within
+            which it lies with 95 %.
+        before, after: means (of a drift: at its beginning and at the end). sd: of their
+            difference. per_day: of a drift, else None.
+        strength: the difference in standard deviations of it.
+        also: weaker series that changed with it; their amplitudes share its mark on the film.
+    """
+
+    series: str
+    unit: str
+    members: tuple[str, ...]
+    kind: str
+    part: int
+    time_s: float
+    earliest_s: float
+    latest_s: float
+    before: float
+    after: float
+    sd: float
+    per_day: float | None
+    strength: float
+    also: tuple[str, ...] = ()
+
+    @property
+    def sentence(self) -> str:
+        """The change in a line."""
+        if self.series == 'level':
+            what = 'the film level (K1, or the gain of the gauge)'
+        elif self.series == 'misfit':
+            what = 'the misfit of the film'
+        else:
+            others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
+            what = f'{self.series}{others}'
+        way = 'rose' if self.after > self.before else 'fell'
+        size = (
+            f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
+        )
+        ends = date(self.earliest_s), date(self.latest_s)
+        within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
+        charts = 'another chart' if len(self.also) == 1 else f'{len(self.also)} other charts'
+        others = f'; {charts} changed with it' if self.also else ''
+        if self.kind == 'drift':
+            return f'{what} {way} since {date(self.time_s)} by {size} in all{within}{others}'
+        return f'{what} {way} by {size} on {date(self.time_s)}{within}{others}'
+
+    def to_dict(self) -> dict[str, Any]:
+        """All figures by name, with dates."""
+        named = {key: getattr(self, key) for key in self.__dataclass_fields__}
+        dates = {name: date(named.pop(f'{name}_s')) for name in ('time', 'earliest', 'latest')}
+        lists = {'members': list(self.members), 'also': list(self.also)}
+        return named | dates | lists | {'sentence': self.sentence}
+
+
+def date(time_s: float) -> str:
+    """'2026-11-12 07:30', UTC."""
+    return datetime.fromtimestamp(time_s, timezone.utc).strftime('%Y-%m-%d %H:%M')
+
+
+def changes_of(series: Sequence[Series], times_s: np.ndarray) -> list[Change]:
+    """All changes, oldest first; those that come with a stronger one are named by it.
+
+    A change has to lower the squared error by twice the logarithm of the parts, which pays for
+    looking at all places (BIC), and of the series, which pays for looking at all of them.
+    """
+    penalty = 2.0 * np.log(len(times_s)) + 2.0 * np.log(len(series))
+    found = [change for one in series for change in _of_series(one, times_s, penalty)]
+    return sorted(_merge_concurrent(found), key=lambda change: change.time_s)
+
+
+def _merge_concurrent(found: Sequence[Change]) -> list[Change]:
+    """Changes at the same time as one, the strongest leading: effects share marks on the film.
+
+    The misfit leads only where nothing else changed, for it has no name.
+    """
+    leaders: list[Change] = []
+    for change in sorted(found, key=lambda one: (one.series == 'misfit', -one.strength)):
+        for row, leader in enumerate(leaders):
+            ends = leader.latest_s if leader.kind == 'step' else np.inf
+            if change.latest_s >= leader.earliest_s and change.earliest_s <= ends:
+                also = tuple(dict.fromkeys((*leader.also, change.series)))
+                leaders[row] = replace(leader, also=also)
+                break
+        else:
+            leaders.append(change)
+    return leaders
+
+
+def _of_series(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
+    from ruptures import KernelCPD
+
+    values = _clip_spikes(series.standard)
+    if len(values) < 2 * SHORTEST:
+        return []
+    ends = KernelCPD(kernel='linear', min_size=SHORTEST).fit(values).predict(pen=penalty)
+    starts = [0, *ends[:-1]]
+    steps_cost = sum(_scatter(values[a:b]) for a, b in zip(starts, ends, strict=True))
+    steps_cost += penalty * (len(ends) - 1)
+    errors = _drift_errors(values, times_s)
+    if errors.min() + penalty < min(steps_cost, _scatter(values)):
+        return [_as_drift(series, times_s, errors)]
+    return [
+        _as_step(series, values, times_s, starts[k - 1], starts[k], ends[k])
+        for k in range(1, len(starts))
+    ]
+
+
+def _scatter(values: np.ndarray) -> float:
+    return float(np.sum((values - values.mean()) ** 2))
+
+
+def _clip_spikes(values: np.ndarray) -> np.ndarray:
+    """The values with single ones kept near their neighbours."""
+    middle = median_filter(values, NEIGHBOURS, mode='nearest')
+    return np.clip(values, middle - MOST_OF_ONE, middle + MOST_OF_ONE)
+
+
+def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+    """(n - SHORTEST,) least squared error of a line that leaves the level at each part."""
+    began = times_s[: len(times_s) - SHORTEST]
+    since = np.maximum(times_s[:, np.newaxis] - began, 0.0)
+    since -= since.mean(axis=0)
+    left = values - values.mean()
+    return left @ left - (left @ since) ** 2 / np.sum(since**2, axis=0)
+
+
+def _as_drift(series: Series, times_s: np.ndarray, errors: np.ndarray) -> Change:
+    row = int(np.argmin(errors))
+    weight = 1.0 / series.deviation
+    since = np.maximum(times_s - times_s[row], 0.0) / SECONDS_A_DAY
+    scaled = np.column_stack([np.ones(len(since)), since]) * weight[:, np.newaxis]
+    (level, slope), *_ = np.linalg.lstsq(scaled, series.values * weight, rcond=None)
+    sd = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
+    days = float(since[-1])
+    likely = np.flatnonzero(errors <= errors.min() + LIKELY)
+    return Change(
+        series.name, series.unit, series.members, 'drift', row, float(times_s[row]),
+        float(times_s[likely[0]]), float(times_s[likely[-1]]), float(level),
+        float(level + slope * days), sd * days, float(slope), float(abs(slope) / sd),
+    )  # fmt: skip
+
+
+def _as_step(
+    series: Series, values: np.ndarray, times_s: np.ndarray, first: int, row: int, end: int
+) -> Change:
+    weight = series.deviation**-2.0
+    before, after = (
+        float(np.average(series.values[a:b], weights=weight[a:b]))
+        for a, b in ((first, row), (row, end))
+    )
+    sd = float(np.sqrt(1.0 / weight[first:row].sum() + 1.0 / weight[row:end].sum()))
+    splits = np.arange(first + 1, end)
+    errors = np.array([_scatter(values[first:k]) + _scatter(values[k:end]) for k in splits])
+    likely = splits[errors <= errors.min() + LIKELY]
+    return Change(
+        series.name, series.unit, series.members, 'step', row, float(times_s[row]),
+        float(times_s[likely[0]]), float(times_s[likely[-1]]), before, after, sd, None,
+        abs(after - before) / sd,
+    )  # fmt: skip

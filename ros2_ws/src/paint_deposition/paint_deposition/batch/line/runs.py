@@ -1,0 +1,214 @@
+"""A folder of runs over days: what all have in common, the runs in it, and each as a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
+
+from pydantic import Field
+
+from paint_deposition.batch.cases import Case, code_digest, digest_of
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ManyError, PaintError
+from paint_deposition.files.model_file import read_model
+from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.provenance import model_digest, sha256
+from paint_deposition.files.refusals import checked
+from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
+
+NAME, CAMPAIGN = 'line.yaml', 'campaign.yaml'
+BAGS = ('.bag', '.mcap')
+# Keys of a campaign that name files.
+FILES = {'mesh', 'trajectory', 'measurements', 'points', 'urdf'}
+TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
+
+
+class LineFile(MotionSource, extra='forbid'):
+    """What all runs of a line share; paths are relative to the folder."""
+
+    mesh: Text = Field(description='the name of a mesh file')
+    model: Text = Field(description='the name of a model file, calibrated for this line')
+    points: Text | None = Field(None, description='the name of a file of measuring points')
+    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
+    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
+    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
+        None, description='[x, y, z], the direction of gravity in the mesh frame'
+    )
+    max_edge_length_m: Number = Field(0.02, gt=0.0, description='longest edge of the mesh [m]')
+    max_pose_gap_s: Number = Field(
+        DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
+    )
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of the line.
+
+    Attributes:
+        name: of its folder or file.
+        path: a recording, or a campaign file.
+        readings: a file of gauge readings on the part, or None.
+        problem: why it cannot be used, '' if it can.
+        remark: why its readings are not used, '' if they are.
+    """
+
+    name: str
+    path: Path
+    readings: Path | None = None
+    problem: str = ''
+    remark: str = ''
+
+    @property
+    def is_campaign(self) -> bool:
+        """Whether it is a campaign's file."""
+        return self.path.name == CAMPAIGN
+
+
+def read_line(folder: Path) -> LineFile:
+    """Read what the runs of a folder share.
+
+    Raises:
+        ManyError: naming the file, the key at fault and the remedy.
+    """
+    path = folder / NAME
+    if not path.is_file():
+        raise ManyError(
+            f'{folder}: has no {NAME}; write one that names the mesh and the model of the line'
+        )
+    content = read_yaml(path, 'line', ManyError)
+    if not isinstance(content, dict):
+        raise ManyError(f'{path}: is not a line; expected the keys mesh and model')
+    file = checked(LineFile, f'{path}: line', content, ManyError)
+    return file.model_copy(update={'urdf': file.urdf and str(folder / file.urdf)})
+
+
+def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[str]]:
+    """The runs of a folder, by name, and names of files like readings that belong to none.
+
+    A run is a recording (a folder of rosbag2, a .bag or a .mcap) with its readings, if any, beside
+    it under the same name; or a folder with a campaign.yaml.
+
+    Args:
+        folder: of the line.
+        shared: files in it that are no readings, such as measuring points.
+
+    Raises:
+        ManyError: there is no run.
+    """
+    recordings: dict[str, list[Path]] = {}
+    readings: dict[str, list[Path]] = {}
+    for path in sorted(set(folder.iterdir()) - set(shared)):
+        if path.name.startswith('.'):
+            continue
+        if path.is_dir() and (path / CAMPAIGN).is_file():
+            recordings.setdefault(path.name, []).append(path / CAMPAIGN)
+        elif path.is_dir() and _is_bag(path):
+            recordings.setdefault(path.name, []).append(path)
+        elif path.suffix.lower() in BAGS:
+            recordings.setdefault(path.stem, []).append(path)
+        elif path.suffix.lower() in TABLES:
+            readings.setdefault(path.stem, []).append(path)
+    runs = [
+        _run(name, paths, [] if paths[0].name == CAMPAIGN else readings.pop(name, []))
+        for name, paths in recordings.items()
+    ]
+    if not runs:
+        raise ManyError(
+            f'{folder}: holds no run; put recordings there (a rosbag2 folder, .bag or .mcap) and '
+            'their readings beside them, under the same name'
+        )
+    return runs, [path.name for paths in readings.values() for path in paths]
+
+
+def _is_bag(folder: Path) -> bool:
+    """Whether it holds a bag, one that was cut off and has no metadata included."""
+    return any(
+        ((folder / 'metadata.yaml').is_file(), *folder.glob('*.mcap'), *folder.glob('*.db3'))
+    )
+
+
+def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
+    """The run of a name; what cannot be told apart is not guessed."""
+    if len(recordings) > 1:
+        problem = f'two recordings have its name, {_names(recordings)}; rename one'
+        return Run(name, recordings[0], problem=problem)
+    if len(readings) > 1:
+        remark = f'two files of readings have its name, {_names(readings)}; keep one'
+        return Run(name, recordings[0], remark=remark)
+    return Run(name, recordings[0], readings[0] if readings else None)
+
+
+def _names(paths: list[Path]) -> str:
+    """Of recordings and readings that stand beside each other in the folder of the line."""
+    return ' and '.join(p.parent.name if p.name == CAMPAIGN else p.name for p in paths)
+
+
+def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, list[str]]:
+    """A case for each run of a folder; what it is computed from is in its digest.
+
+    Returns:
+        The cases, the line's file, its model, and names of files that belong to no run.
+
+    Raises:
+        PaintError: a file of the line that cannot be used.
+    """
+    folder = folder.resolve()
+    file = read_line(folder)
+    model = read_model(folder / file.model)
+    files = shared_files(folder, file)
+    digests = {what: sha256(path) for what, path in files.items()}
+    own = [effect.file_content.decode() for effect in model.effects]
+    shared = [code_digest(), file.model_dump(), model_digest(model), own, *digests.values()]
+    given = {'file': file, 'folder': str(folder), 'model': model, 'mesh': digests['mesh']}
+    runs, strays = runs_in(folder, files.values())
+    cases = [
+        Case(
+            digest_of(*shared, run.name, run.problem, run.remark, *_contents(run)),
+            given | {'run': run},
+            about={'part': [run.name]},
+        )
+        for run in runs
+    ]
+    return cases, file, model, strays
+
+
+def shared_files(folder: Path, file: LineFile) -> dict[str, Path]:
+    """Files that all runs share, by what they are; those that define the model left out."""
+    named = {'mesh': file.mesh, 'points': file.points, 'urdf': file.urdf}
+    return {what: folder / name for what, name in named.items() if name}
+
+
+def _contents(run: Run) -> list[str]:
+    """Digests of its files; in place of one that cannot be read stands why."""
+    paths = [run.path, run.readings]
+    if run.is_campaign:
+        paths = [run.path.parent, *_named_by_campaign(run.path)]
+    return [_digest(path) for path in paths if path]
+
+
+def _digest(path: Path) -> str:
+    try:
+        return sha256(path)
+    except PaintError as error:
+        return str(error)
+
+
+def _named_by_campaign(path: Path) -> list[Path]:
+    """Files that a campaign names, wherever they lie; none if it cannot be read."""
+    try:
+        waiting: list[Any] = [read_yaml(path, 'campaign', ManyError)]
+    except PaintError:
+        return []
+    found = []
+    while waiting:
+        value = waiting.pop()
+        if isinstance(value, dict):
+            named = {key: name for key, name in value.items() if key in FILES}
+            found += [path.parent / name for name in named.values() if isinstance(name, str)]
+            waiting += value.values()
+        elif isinstance(value, list):
+            waiting += value
+    return sorted(found)

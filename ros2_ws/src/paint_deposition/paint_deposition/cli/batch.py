@@ -1,0 +1,165 @@
+"""The commands `sweep`, many variations of one job, and `line`, many parts over days."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import click
+
+from paint_deposition.cli.options import (
+    FILE,
+    FOLDER,
+    JSON,
+    PICTURES,
+    file_lines,
+    output_option,
+    say_all,
+)
+from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import results_in
+from paint_deposition.errors import ManyError
+from paint_deposition.files.parquet import MANY, require_libraries
+
+SCHEDULER = click.option(
+    '--scheduler', metavar='ADDRESS',
+    help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
+    'machine.',
+)  # fmt: skip
+WORKERS = click.option(
+    '--workers', 'count', type=click.IntRange(min=1),
+    help='Processes on this machine, of one thread each; default: one a core.',
+)  # fmt: skip
+
+MOST_WARNINGS = 5
+
+
+@click.command('sweep')
+@click.argument('sweep', type=FILE)
+@output_option('cases.parquet, sweep.json and sweep.png')
+@SCHEDULER
+@WORKERS
+@PICTURES
+@JSON
+def sweep_command(
+    sweep: Path,
+    output: Path,
+    scheduler: str | None,
+    count: int | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    """Compute the variations that SWEEP, a YAML file, describes.
+
+    Each case is what `simulate` computes, or `compare` for a campaign. Finished cases are kept in
+    the folder `finished` of the output: a run that was cut off computes the rest only, and so does
+    a sweep with more cases.
+    """
+    require_libraries('paint sweep', MANY)
+    from paint_deposition.batch.cases import FOLDER as FINISHED
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
+    from paint_deposition.batch.sweep.case import computed
+    from paint_deposition.batch.sweep.job import Job
+    from paint_deposition.batch.sweep.result import Sweep, write_sweep
+    from paint_deposition.batch.sweep.sweep_file import read_sweep
+
+    require_alone(scheduler, count)
+    with Progress('sweep') as show:
+        show('reading')
+        job = Job.of(read_sweep(sweep), sweep.parent, show)
+        finished = ResultCache(output / FINISHED)
+        say_all('note', job.notes)
+        done, workers = compute(scheduler, count, computed, job.cases, job.inputs, finished, show)
+        workers = workers or 'none: every case had been finished'
+        say_all('note', [f'workers: {workers}'])
+        show('writing and drawing')
+        found = Sweep.of(job, finished, done, workers)
+        if len(found.errors) == len(job.cases):
+            number, error = found.errors[0]
+            raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
+        with results_in(output) as folder:
+            files = [output / file.name for file in write_sweep(found, folder, pictures)]
+    odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
+    _say_warnings(odd, output / 'cases.parquet')
+    _say_results(output / 'sweep.json', as_json, [*found.lines, *file_lines(files)])
+
+
+@click.command('line')
+@click.argument('folder', type=FOLDER)
+@output_option('points.parquet, parts.parquet, line.json, line.png and report.html')
+@SCHEDULER
+@WORKERS
+@PICTURES
+@JSON
+def line_command(
+    folder: Path,
+    output: Path,
+    scheduler: str | None,
+    count: int | None,
+    pictures: str,
+    as_json: bool,
+) -> None:
+    """Simulate and compare all runs in FOLDER, and show what they share and what changes.
+
+    FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
+    parts that were measured, under the names of their recordings. Finished runs are kept in the
+    folder `finished` of the output: the next time only new runs are computed.
+    """
+    require_libraries('paint line', MANY)
+    from paint_deposition.batch.cases import FOLDER as FINISHED
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.cluster import compute, require_alone
+    from paint_deposition.batch.line.output import write_line
+    from paint_deposition.batch.line.part import computed
+    from paint_deposition.batch.line.result import Line
+    from paint_deposition.batch.line.runs import line_cases, shared_files
+
+    require_alone(scheduler, count)
+    with Progress('line') as show:
+        show('reading')
+        cases, file, model, strays = line_cases(folder)
+        finished, digests = ResultCache(output / FINISHED), [case.digest for case in cases]
+        done, workers = compute(scheduler, count, computed, cases, {}, finished, show)
+        workers = workers or 'none: every run had been finished'
+        say_all('note', [f'workers: {workers}'])
+        show('pooling')
+        table = finished.table(digests)
+        found = Line(folder, model, shared_files(folder, file), table, done, workers, strays)
+        if not found.runs:
+            name, error = found.errors[0]
+            raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
+        with results_in(output) as results:
+            files = [output / file.name for file in write_line(found, results, pictures)]
+    _say_warnings([*found.errors, *found.remarks], output / 'line.json')
+    if strays:
+        more = f' and {len(strays) - MOST_WARNINGS} more' if len(strays) > MOST_WARNINGS else ''
+        named = ', '.join(strays[:MOST_WARNINGS])
+        say_all('warning', [f'no recording has the name of {named}{more}; left out'])
+    _say_results(output / 'line.json', as_json, [*found.lines, *file_lines(files)])
+
+
+def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
+    """Print some of many warnings on stderr, each reason once, and where the others are.
+
+    Args:
+        warnings: name of a case or part, and what is odd about it.
+        file: that has them all.
+    """
+    named: dict[str, list[str]] = {}
+    for name, reason in warnings:
+        named.setdefault(reason, []).append(name)
+    lines = [
+        f'{first}{f" and {len(others)} more" if others else ""}: {reason}'
+        for reason, (first, *others) in named.items()
+    ]
+    say_all('warning', lines[:MOST_WARNINGS])
+    if len(lines) > MOST_WARNINGS:
+        say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
+
+
+def _say_results(figures: Path, as_json: bool, lines: Iterable[str]) -> None:
+    if as_json:
+        click.echo(figures.read_text(encoding='utf-8'), nl=False)
+    else:
+        click.echo('\n'.join(lines))

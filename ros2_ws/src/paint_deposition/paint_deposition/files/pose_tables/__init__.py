@@ -1,1 +1,0 @@
-"""Tables of poses, as robots, loggers and the project's own plans write them."""

@@ -1,0 +1,146 @@
+"""The film on a part, with all that it was computed from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
+from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.part.surface import Surface
+
+if TYPE_CHECKING:
+    from paint_deposition.inference.readings.readings import Readings
+
+
+@dataclass(frozen=True)
+class GunFilm:
+    """What one of the guns on a part did.
+
+    Attributes:
+        name: of the gun, '' for the only one.
+        trajectory: its motion as recorded; path: the same cut into sub-steps; counts: its poses.
+        model: its deposition model.
+        geometry: how it ran over the part.
+        painted_volume_cm3: solids that it laid on the part, before effects on the film [cm3].
+        emitted_volume_cm3: solids that a part which catches everything would get of it [cm3].
+    """
+
+    name: str
+    trajectory: Trajectory
+    path: SprayPath
+    counts: PoseCounts
+    model: DepositionModel
+    geometry: SprayGeometry
+    painted_volume_cm3: float
+    emitted_volume_cm3: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures by name."""
+        return {
+            'name': self.name,
+            'trajectory': self.trajectory.source,
+            'effects': [effect.id for effect in self.model.effects],
+            'spraying_time_s': self.path.spraying_time_s,
+            'painted_volume_cm3': self.painted_volume_cm3,
+            'emitted_volume_cm3': self.emitted_volume_cm3,
+            'poses': self.counts.to_dict(),
+            'geometry': self.geometry.to_dict(),
+        }
+
+
+@dataclass(frozen=True)
+class Film:
+    """The film on a part, with all that it was computed from.
+
+    Attributes:
+        surface: the part, its outward side turned to the gun.
+        guns: what laid the film, one as a rule.
+        film_um: (V,) film at the vertices of the surface [um].
+        statistics: of the film, weighted by area.
+        readings: places where the gauge should be predicted, or None.
+        predicted_um: (N,) what the gauge should show at each of them [um], or None.
+        paint: that was sprayed.
+    """
+
+    surface: Surface
+    guns: tuple[GunFilm, ...]
+    film_um: np.ndarray
+    statistics: FilmStatistics
+    readings: Readings | None = None
+    predicted_um: np.ndarray | None = None
+    paint: PaintUsed = NO_PAINT
+
+    def __repr__(self) -> str:
+        s = self.statistics
+        return (
+            f'Film({s.mean_um:.1f} ± {s.std_dev_um:.1f} µm at {len(self.film_um)} vertices, '
+            f'{100 * s.coverage:.0f} % of {s.area_m2:.2f} m² painted)'
+        )
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """The motion of the first gun, as recorded."""
+        return self.guns[0].trajectory
+
+    @property
+    def model(self) -> DepositionModel:
+        """The deposition model of the first gun."""
+        return self.guns[0].model
+
+    @property
+    def path(self) -> SprayPath:
+        """The motion of all guns, cut into sub-steps."""
+        return SprayPath.of_guns([gun.path for gun in self.guns])
+
+    @property
+    def counts(self) -> PoseCounts:
+        """What became of the poses of all guns."""
+        return PoseCounts.of_guns([gun.counts for gun in self.guns])
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on the mesh and the recordings for the user."""
+        return (*self.surface.notes, *self._of_each(lambda gun: gun.trajectory.notes))
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is odd in the geometry, each with its likely cause."""
+        spraying_s = sum(gun.path.spraying_time_s for gun in self.guns)
+        bare = (
+            f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
+            f'sprays {spraying_s:.3g} s only'
+        )
+        odd = self._of_each(lambda gun: gun.geometry.warnings)
+        odd = odd or ((bare,) if self.statistics.coverage == 0.0 else ())
+        return (*odd, *self._of_each(lambda gun: impossible_brushes(gun.model)))
+
+    def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
+        return tuple(
+            f'{gun.name}: {line}' if gun.name else line for gun in self.guns for line in lines(gun)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the film and of how it was painted, as in ``stats.json``.
+
+        The geometry is that of the first gun; `atomizers` has each.
+        """
+        return self.statistics.to_dict() | {
+            'frame_id': self.trajectory.frame_id,
+            'down': self.surface.down.tolist(),
+            'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
+            'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
+            'paint': paint_figures(self),
+            'poses': self.counts.to_dict(),
+            'geometry': self.guns[0].geometry.to_dict(),
+            'atomizers': [gun.to_dict() for gun in self.guns],
+            'notes': list(self.notes),
+            'warnings': list(self.warnings),
+        }

@@ -1,0 +1,149 @@
+"""Passes: the stretches along one line of the part on which the gun sprays.
+
+A pass continues over openings and closings of the gun along its line; links between passes are no
+passes. The state machine runs over the sub-steps in order and its state is carried from call to
+call. Each sub-step raises these events in the order of the table.
+
+=======  ======================================  =======  ====================================
+state    event                                   next     what happens
+=======  ======================================  =======  ====================================
+runs     a gap                                   ended *
+runs     a heading step that leaves the mean     ended *
+runs     another heading step, the gun was open  runs     the mean takes it in
+runs     the gun opens on another track          ended *
+awaited  the gun is open, no heading is known    awaited  the number is 0
+awaited  the gun is open                         runs     the number is 0; the heading is the
+                                                          pass's mean
+ended    the gun is open on the line of the      runs     the number goes up; the heading is the
+         last pass, either way                            pass's mean
+ended    the gun is open off that line: a link   ended
+=======  ======================================  =======  ====================================
+
+``*`` Pass 0 is awaited once more if it ends after less than 40 mm: the gun opened at a turn that
+shows only now, and the heading was that of the approach.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.motion.strokes import (
+    HEADING_STEP_M,
+    LATEST_NOTICE_M,
+    carry,
+    cosine,
+    dot,
+    leaves,
+    take_in,
+)
+
+# A pass lies within 45 degrees of the heading of the last one, either way; others are links.
+COS_PASS = math.sqrt(0.5)
+# A gun that opens more than 30 degrees off the line on which it closed is on another track.
+COS_TRACK = math.sqrt(0.75)
+
+AWAITED, RUNS, ENDED = 0, 1, 2
+PASS_STATE = np.dtype(
+    [
+        ('number', 'i8'),
+        ('state', 'i8'),
+        ('length_m', 'f8'),
+        ('flow', 'f8'),
+        ('position', 'f8', 3),
+        ('normal', 'f8', 3),
+        ('mean', 'f8', 3),
+        ('carried', 'f8', 3),
+        ('closed_at', 'f8', 3),
+    ]
+)
+
+
+def first_pass(flow_before: float) -> np.ndarray:
+    """State before the first sub-step: (1,) record, from the flow that was on until then."""
+    state = np.zeros(1, PASS_STATE)
+    state['number'] = -1
+    state['flow'] = flow_before
+    return state
+
+
+@njit
+def _continue(state, heading, step, after_gap):
+    """Follow a pass that runs to here, or end it."""
+    if after_gap or (step > 0.0 and leaves(heading, state.mean, state.carried)):
+        _end(state)
+    elif step > 0.0 and state.flow > 0.0:
+        state.length_m += step
+        take_in(heading, step, state.length_m, state.mean, state.carried)
+
+
+@njit
+def _end(state):
+    state.state = ENDED
+    if state.number == 0 and state.length_m < LATEST_NOTICE_M:
+        state.state = AWAITED
+        for k in range(3):
+            state.mean[k] = state.carried[k] = 0.0
+
+
+@njit
+def _spray(state, heading):
+    """Begin a pass here, where the gun is open, if none runs and this is no link."""
+    if state.state == RUNS and state.flow == 0.0 and _on_another_track(state):
+        _end(state)
+    if state.state == RUNS:
+        return
+    if dot(heading, heading) == 0.0:
+        state.number = max(state.number, 0)
+        return
+    along = max(abs(cosine(heading, state.mean)), abs(cosine(heading, state.carried)))
+    if state.state == AWAITED or along > COS_PASS:
+        state.number = 0 if state.state == AWAITED else state.number + 1
+        state.state = RUNS
+        state.length_m = 0.0
+        take_in(heading, 1.0, 1.0, state.mean, state.carried)
+
+
+@njit
+def _on_another_track(state):
+    """Whether the gun has left the line on which it closed, seen along the tool axis."""
+    between = state.position - state.closed_at
+    between -= dot(between, state.normal) * state.normal
+    if dot(between, between) < HEADING_STEP_M**2:
+        return False
+    return cosine(between, state.carried) < COS_TRACK
+
+
+@njit(cache=True)
+@named_for_its_code
+def follow_passes(states, position, normal, heading, step, flow, after_gap):
+    """Number the spraying passes.
+
+    Args:
+        states: (1,) record of dtype PASS_STATE, updated in place.
+        position, normal: (M, 3) TCP [m] and tool axis z.
+        heading, step: (M, 3) and (M,) from ``follow_strokes``.
+        flow: (M,) relative to the calibrated flow; 0 is gun off.
+        after_gap: (M,) bool, whether poses are missing before the sub-step.
+
+    Returns:
+        (M,) int64 number of the pass that runs or ran last, -1 before the gun first opened.
+    """
+    spray_pass = np.empty(len(flow), np.int64)
+    state = states[0]
+    for i in range(len(flow)):
+        carry(state.carried, state.normal, normal[i])
+        for k in range(3):
+            state.normal[k] = normal[i, k]
+            if state.flow > 0.0:
+                state.closed_at[k] = state.position[k]
+            state.position[k] = position[i, k]
+        if state.state == RUNS:
+            _continue(state, heading[i], step[i], after_gap[i])
+        if after_gap[i]:
+            state.flow = 0.0
+        if flow[i] > 0.0:
+            _spray(state, heading[i])
+        spray_pass[i], state.flow = state.number, flow[i]
+    return spray_pass

@@ -1,0 +1,222 @@
+"""A stream of poses and trigger changes: which can be followed, and a log to follow it again."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from paint_deposition.motion.trajectory import PoseCounts
+from paint_deposition.motion.trigger import ONLY_BRUSH
+
+# Two hours at 250 Hz, 64 bytes a pose.
+DEFAULT_LIMIT_POSES = 2_000_000
+BLOCK_POSES = 4096
+# So few at once that other threads have their turn in between.
+BATCH_POSES = 256
+
+
+@dataclass(frozen=True)
+class TriggerChange:
+    """The flow (relative; 0 is gun off) from a time on, and the number of the brush.
+
+    ``set_points`` are a row of those of a trajectory, or none.
+    """
+
+    stamp_ns: int
+    flow: float
+    brush: int = ONLY_BRUSH
+    set_points: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class PoseBatch:
+    """Poses that were taken together: (N,) int64, (N, 3) [m], (N, 4) scalar last."""
+
+    stamps_ns: np.ndarray
+    positions_m: np.ndarray
+    quaternions_xyzw: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    def select(self, rows: slice | list[int] | np.ndarray) -> 'PoseBatch':
+        """The chosen rows."""
+        chosen = rows if isinstance(rows, slice) else np.asarray(rows, dtype=np.int64)
+        return PoseBatch(*(column[chosen] for column in vars(self).values()))
+
+    def finite_axes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (M, 3) [m] and tool z (M, 3) of the poses that are finite."""
+        finite = np.isfinite(self.quaternions_xyzw).all(axis=1)
+        finite &= np.isfinite(self.positions_m).all(axis=1)
+        x, y, z, w = self.quaternions_xyzw[finite].T
+        axes = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
+        return self.positions_m[finite], np.stack(axes, axis=1)
+
+    @staticmethod
+    def joined(batches: list['PoseBatch']) -> 'PoseBatch':
+        """At least one batch, one after the other."""
+        columns = zip(*(vars(batch).values() for batch in batches), strict=True)
+        return PoseBatch(*map(np.concatenate, columns))
+
+
+class MotionLog:
+    """Poses as received and trigger changes in the order in which they came.
+
+    One thread may write while others read what is there already. Memory is bounded: beyond
+    ``limit_poses`` the log closes, is no longer ``complete`` and forgets what it has.
+
+    Attributes:
+        poses, changes: how many came.
+    """
+
+    def __init__(self, limit_poses: int = DEFAULT_LIMIT_POSES) -> None:
+        self.limit_poses = limit_poses
+        self.poses = 0
+        self.complete = True
+        self._blocks: list[PoseBatch] = []
+        # With the number of poses that came before.
+        self._changes: list[tuple[int, TriggerChange]] = []
+
+    @property
+    def changes(self) -> int:
+        return len(self._changes)
+
+    def add(self, event: TriggerChange | PoseBatch) -> None:
+        """Note what came."""
+        if not self.complete:
+            return
+        if isinstance(event, TriggerChange):
+            self._changes.append((self.poses, event))
+            return
+        if self.poses + len(event) > self.limit_poses:
+            self.complete = False
+            self._blocks, self._changes = [], []
+        else:
+            self._pack(event)
+        self.poses += len(event)
+
+    def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
+        """What came until now, after so many poses and changes."""
+        blocks, end = self._blocks, self.poses
+        if not self.complete:
+            return
+        for before, change in self._changes[changes:]:
+            if before > end:
+                break
+            yield from _rows(blocks, poses, before)
+            yield change
+            poses = before
+        yield from _rows(blocks, poses, end)
+
+    def first_poses(self, count: int) -> PoseBatch | None:
+        """The first poses that are kept, ``count`` if there are so many."""
+        batches = list(_rows(self._blocks, 0, min(count, self.poses if self.complete else 0)))
+        return PoseBatch.joined(batches) if batches else None
+
+    def _pack(self, batch: PoseBatch) -> None:
+        taken = 0
+        while taken < len(batch):
+            row = (self.poses + taken) % BLOCK_POSES
+            if row == 0:
+                shapes = ((BLOCK_POSES,), (BLOCK_POSES, 3), (BLOCK_POSES, 4))
+                kinds = (np.int64, np.float64, np.float64)
+                self._blocks.append(PoseBatch(*map(np.empty, shapes, kinds)))
+            count = min(BLOCK_POSES - row, len(batch) - taken)
+            part = batch.select(slice(taken, taken + count))
+            columns = zip(vars(self._blocks[-1]).values(), vars(part).values(), strict=True)
+            for kept, new in columns:
+                kept[row : row + count] = new
+            taken += count
+
+
+def _rows(blocks: list[PoseBatch], start: int, stop: int) -> Iterator[PoseBatch]:
+    """The poses of this range."""
+    while start < stop:
+        block, row = divmod(start, BLOCK_POSES)
+        end = min(row + BATCH_POSES, row + stop - start, BLOCK_POSES)
+        yield blocks[block].select(slice(row, end))
+        start += end - row
+
+
+# RAPID writes quaternions with four digits; further off is damage, not rounding.
+QUATERNION_TOLERANCE = 0.01
+# A number beyond this is damage too, and its square must be one in single precision [m].
+FARTHEST_M = 1e6
+# So many poses in order, over more than a gap, are no stragglers: the stream was restarted.
+FEWEST_OF_A_RESTART = 3
+
+
+class PoseScreen:
+    """Drops and counts poses with a repeated or backward stamp, a non-finite number or a
+    quaternion that is no rotation; notices gaps and restarted streams.
+
+    Poses with stamps before the newest one wait. A few of them are stragglers and are dropped
+    when the stream continues; a run of them that is longer than a gap is the stream restarted,
+    and none of it is lost. A time longer than ``max_gap_ns`` between two poses is a gap.
+    """
+
+    def __init__(self, max_gap_ns: int) -> None:
+        self.max_gap_ns = max_gap_ns
+        self.counts = PoseCounts()
+        self.newest_ns: int | None = None
+        self._behind = PoseBatch(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+    def take(self, poses: PoseBatch) -> list[PoseBatch]:
+        """Screen poses.
+
+        Returns:
+            What to follow, stamps strictly increasing and quaternions of unit length. The first
+            batch continues those before; each further one is a restarted stream.
+        """
+        poses = PoseBatch.joined([self._behind, self._rotations(poses)])
+        streams: list[list[int]] = [[]]
+        behind: list[int] = []
+        stamps = poses.stamps_ns.tolist()
+        for row, stamp in enumerate(stamps):
+            if self.newest_ns is None or stamp > self.newest_ns:
+                self.counts.backward_stamps += len(behind)
+                behind = []
+                self._step_to(stamp)
+                streams[-1].append(row)
+            elif stamp == self.newest_ns or (behind and stamp == stamps[behind[-1]]):
+                self.counts.repeated_stamps += 1
+            elif behind and stamp < stamps[behind[-1]]:
+                self.counts.backward_stamps += len(behind)
+                behind = [row]
+            else:
+                behind.append(row)
+                lasting = stamp - stamps[behind[0]] > self.max_gap_ns
+                if lasting and len(behind) >= FEWEST_OF_A_RESTART:
+                    self.counts.restarts += 1
+                    self.newest_ns = None
+                    for waited in behind:
+                        self._step_to(stamps[waited])
+                    streams.append(behind)
+                    behind = []
+        self._behind = poses.select(behind)
+        return [poses.select(rows) for rows in streams]
+
+    def finish(self) -> None:
+        """The stream has ended: what still waits is dropped."""
+        self.counts.backward_stamps += len(self._behind)
+        self._behind = self._behind.select([])
+
+    def _rotations(self, poses: PoseBatch) -> PoseBatch:
+        quaternions = poses.quaternions_xyzw
+        placed = (np.abs(poses.positions_m) <= FARTHEST_M).all(axis=1)
+        finite = placed & np.isfinite(quaternions).all(axis=1)
+        norms = np.sqrt((quaternions**2).sum(axis=1))
+        unit = np.abs(norms - 1.0) <= QUATERNION_TOLERANCE
+        self.counts.received += len(poses)
+        self.counts.not_finite += int(np.count_nonzero(~finite))
+        self.counts.not_unit_quaternions += int(np.count_nonzero(finite & ~unit))
+        good = finite & unit
+        rotations = quaternions[good] / norms[good, np.newaxis]
+        return PoseBatch(poses.stamps_ns[good], poses.positions_m[good], rotations)
+
+    def _step_to(self, stamp_ns: int) -> None:
+        if self.newest_ns is not None and stamp_ns - self.newest_ns > self.max_gap_ns:
+            self.counts.gaps += 1
+            gap_ns = stamp_ns - self.newest_ns
+            self.counts.longest_gap_ns = max(self.counts.longest_gap_ns, gap_ns)
+        self.newest_ns = stamp_ns

@@ -1,0 +1,234 @@
+"""Strokes: the straight or gently curved stretches between the turns of the tool path.
+
+The state machine runs over the sub-steps in order. Its state is carried from call to call, so that
+a live stream and an offline run number their strokes alike. A turn is a heading more than 60
+degrees off the stroke's mean. The mean is kept twice, in space and as the tool carries it along
+when it is tilted, and a path leaves it only where it leaves both: neither a gun that follows a
+curved part turns, nor one that is tilted on a straight path.
+
+=======  =====================================  =======  =====================================
+state    event                                  next     what happens
+=======  =====================================  =======  =====================================
+new      first sub-step, or a gap before it     new      the stroke's number goes up; the turn
+                                                         is here
+new      less than a heading step since then    new
+new      a heading step                         runs     it is the stroke's mean heading
+runs     less than a heading step               runs
+runs     a heading step that keeps to the mean  runs     the mean takes it in
+runs     a heading step that leaves the mean    runs     the stroke's number goes up; the turn
+                                                         is where the two legs meet, behind
+                                                         here; the step is the new mean
+runs     a gap                                  new      as at the first sub-step
+=======  =====================================  =======  =====================================
+
+A stroke is new while its ``length_m`` is zero.
+"""
+
+import math
+
+import numpy as np
+from numba import njit
+
+# The path's heading is judged over this travel, so that jitter at rest is no turn [m].
+HEADING_STEP_M = 0.01
+# A mean reaches back over this travel; curves of half of it as their radius still turn [m].
+MEMORY_M = 1.0
+# The path leaves a mean heading where it is more than 60 degrees off.
+COS_TURN = 0.5
+# A sharp turn is noticed at most so far behind it, after two heading steps [m].
+LATEST_NOTICE_M = 0.04
+
+
+@njit
+def dot(a, b):
+    """Scalar product of two vectors (3,)."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@njit
+def cosine(a, b):
+    """Cosine of the angle between two vectors (3,); 0 if one of them has no length."""
+    lengths = math.sqrt(dot(a, a) * dot(b, b))
+    return dot(a, b) / lengths if lengths > 0.0 else 0.0
+
+
+@njit
+def carry(vector, before, after):
+    """Turn a vector (3,) by the smallest rotation from one unit normal to the next, in place."""
+    wx = before[1] * after[2] - before[2] * after[1]
+    wy = before[2] * after[0] - before[0] * after[2]
+    wz = before[0] * after[1] - before[1] * after[0]
+    cos = dot(before, after)
+    if cos < -0.99:  # The tool was turned over at once: no rotation is the smallest.
+        return
+    x, y, z = vector[0], vector[1], vector[2]
+    cx, cy, cz = wy * z - wz * y, wz * x - wx * z, wx * y - wy * x
+    vector[0] = x + cx + (wy * cz - wz * cy) / (1.0 + cos)
+    vector[1] = y + cy + (wz * cx - wx * cz) / (1.0 + cos)
+    vector[2] = z + cz + (wx * cy - wy * cx) / (1.0 + cos)
+
+
+@njit
+def leaves(heading, mean, carried):
+    """Whether a heading is more than 60 degrees off a mean, both in space and to the tool."""
+    return cosine(heading, mean) < COS_TURN and cosine(heading, carried) < COS_TURN
+
+
+@njit
+def take_in(heading, step_m, length_m, mean, carried):
+    """Update a mean over a length, this step included, in place."""
+    gain = min(step_m / min(length_m, MEMORY_M), 1.0)
+    for k in range(3):
+        mean[k] += gain * (heading[k] - mean[k])
+        carried[k] += gain * (heading[k] - carried[k])
+
+
+STROKE_STATE = np.dtype(
+    [
+        ('number', 'i8'),
+        ('from_turn_m', 'f8'),
+        ('length_m', 'f8'),
+        ('position', 'f8', 3),
+        ('normal', 'f8', 3),
+        # Where the last two heading steps began and the path since then: a turn that shows now
+        # lies behind the earlier one.
+        ('anchor', 'f8', 3),
+        ('earlier', 'f8', 3),
+        ('since_anchor_m', 'f8'),
+        ('since_earlier_m', 'f8'),
+        ('heading', 'f8', 3),
+        ('mean', 'f8', 3),
+        ('carried', 'f8', 3),
+    ]
+)
+
+
+def first_stroke() -> np.ndarray:
+    """State before the first sub-step: (1,) record."""
+    state = np.zeros(1, STROKE_STATE)
+    state['number'] = -1
+    return state
+
+
+@njit
+def _begin_anew(state, position):
+    """Begin a stroke of unknown heading, as at the start and behind a gap."""
+    state.number += 1
+    state.from_turn_m = state.length_m = state.since_anchor_m = state.since_earlier_m = 0.0
+    for k in range(3):
+        state.anchor[k] = state.earlier[k] = state.position[k] = position[k]
+        state.heading[k] = state.mean[k] = state.carried[k] = 0.0
+
+
+@njit
+def _advance(state, position):
+    """Follow the path to its next position; length of the heading step that ends here, or 0."""
+    moved = position - state.position
+    travel = math.sqrt(dot(moved, moved))
+    state.since_anchor_m += travel
+    state.since_earlier_m += travel
+    step = position - state.anchor
+    length = math.sqrt(dot(step, step))
+    for k in range(3):
+        state.position[k] = position[k]
+        if length >= HEADING_STEP_M:
+            state.heading[k] = step[k] / length
+    return length if length >= HEADING_STEP_M else 0.0
+
+
+@njit
+def _take_step(state, length):
+    """Take a heading step into the stroke, or begin the next stroke with it: true if it turns."""
+    turns = state.length_m > 0.0 and leaves(state.heading, state.mean, state.carried)
+    if turns:
+        state.number += 1
+        state.from_turn_m = _behind_turn_m(state)
+        state.length_m = 0.0
+    state.length_m += length
+    take_in(state.heading, length, state.length_m, state.mean, state.carried)
+    state.since_earlier_m, state.since_anchor_m = state.since_anchor_m, 0.0
+    for k in range(3):
+        state.earlier[k], state.anchor[k] = state.anchor[k], state.position[k]
+    return turns
+
+
+@njit
+def _behind_turn_m(state):
+    """How far back the stroke turned, if straight up to there and straight since."""
+    chord = state.position - state.earlier
+    square = dot(chord, chord)
+    along = math.sqrt(square) * cosine(chord, state.mean)
+    detour = state.since_earlier_m - along
+    # Legs a + b = path and a + b cos = along, b sin = across, solved for b.
+    behind = (square - along**2 + detour**2) / (2.0 * detour) if detour > 0.0 else 0.0
+    return min(behind, state.since_earlier_m, LATEST_NOTICE_M)
+
+
+@njit(cache=True)
+def follow_strokes(states, position, normal, velocity, dwell, after_gap):
+    """Number the strokes and measure back along the path to where each began.
+
+    Args:
+        states: (1,) record of dtype STROKE_STATE, updated in place.
+        position, normal, velocity: (M, 3) TCP [m], tool axis z, and speed of the TCP [m/s].
+        dwell: (M,) duration of the sub-steps [s].
+        after_gap: (M,) bool, whether poses are missing before the sub-step.
+
+    Returns:
+        stroke (M,) int64; from_turn_m (M,); heading (M, 3), the last unit heading, zero before
+        there is one; and step_m (M,), length of the heading step that ended here, or 0.
+    """
+    count = len(dwell)
+    stroke, from_turn = np.empty(count, np.int64), np.empty(count)
+    heading, step = np.empty((count, 3)), np.zeros(count)
+    state = states[0]
+    for i in range(count):
+        v = velocity[i]
+        half_step = 0.5 * dwell[i] * math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+        carry(state.carried, state.normal, normal[i])
+        if state.number < 0 or after_gap[i]:
+            _begin_anew(state, position[i])
+        else:
+            step[i] = _advance(state, position[i])
+            if step[i] > 0.0 and _take_step(state, step[i]):
+                state.from_turn_m -= half_step
+        stroke[i], from_turn[i] = state.number, state.from_turn_m + half_step
+        state.from_turn_m += 2.0 * half_step
+        for k in range(3):
+            state.normal[k], heading[i, k] = normal[i, k], state.heading[k]
+    return stroke, from_turn, heading, step
+
+
+@njit(cache=True)
+def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
+    """Measure forward to the next trigger change and turn, within whole strokes.
+
+    Args:
+        stroke, since_on, from_turn: (M,) from ``follow_strokes`` and ``follow_trigger``; every
+            stroke complete.
+        velocity: (M, 3). dwell, flow: (M,).
+
+    Returns:
+        until_on_s, until_off_s, to_turn_m (M,); inf where a stroke ends without such an event.
+    """
+    count = len(dwell)
+    until_on, until_off, to_turn = np.empty(count), np.empty(count), np.empty(count)
+    on, off, turn, behind_m = np.inf, np.inf, 0.0, 0.0
+    for i in range(count - 1, -1, -1):
+        v = velocity[i]
+        step = dwell[i] * math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
+        if i == count - 1 or stroke[i + 1] != stroke[i]:
+            # The gun may close at the very turn; a gap closes it, and it opens again behind it.
+            closed = i == count - 1 or flow[i + 1] == 0.0 or since_on[i + 1] < dwell[i + 1]
+            closes = flow[i] > 0.0 and closed
+            on, off, turn = np.inf, (0.0 if closes else np.inf), 0.0
+            if i < count - 1:  # the turn is where it shows to be from behind, not where it shows
+                turn = 0.5 * behind_m - from_turn[i + 1]
+        elif flow[i + 1] > 0.0 and flow[i] == 0.0:
+            on = 0.0
+        elif flow[i + 1] == 0.0 and flow[i] > 0.0:
+            off = 0.0
+        until_on[i], until_off[i] = on + 0.5 * dwell[i], off + 0.5 * dwell[i]
+        to_turn[i] = abs(turn + 0.5 * step)
+        on, off, turn, behind_m = on + dwell[i], off + dwell[i], turn + step, step
+    return until_on, until_off, to_turn

@@ -1,0 +1,290 @@
+"""The faces of a part: how each is sprayed beside the others, in what order, and the way between.
+
+The faces overlap at their seams, because the spray of each reaches beyond it. Two things even
+that out on the film of all faces together: how far from its seams each face is sprayed, found by
+a search over a margin that they share, and the time that the gun spends on each pass, by bounded
+least squares, since the film is linear in it.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise, permutations, product
+
+import numpy as np
+from scipy.optimize import lsq_linear
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move, timed
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.sprayable_faces import Face
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.films import evenness
+from paint_deposition.planning.passes import (
+    PassStyle,
+    PlannedPass,
+    plan_pass,
+    planned_moves,
+    trajectory_of,
+)
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.requests import PlanRequest
+from paint_deposition.planning.surface_map import SurfaceMap
+
+# Margins along the seams that are tried, as shares of the overspray.
+MARGINS = (0.0, 0.35, 0.7, 1.0)
+# By how much longer or shorter the gun may stay on a pass than evenness on its face alone asks,
+# and what a change by that much is worth in film, as a share.
+DWELL, RELUCTANCE = (0.5, 2.0), 0.02
+# All orders are tried for so many faces; of more, each time the nearest is next.
+MOST_TRIED = 6
+# Between faces the gun is drawn back so far [m], by the first that keeps it clear of the part.
+RETREATS_M = (0.1, 0.2, 0.4, 0.8)
+
+
+@dataclass(frozen=True)
+class FacePasses:
+    """The passes of one face in running order, and how they are run."""
+
+    passes: tuple[PlannedPass, ...]
+    style: PassStyle
+
+    @property
+    def start_m(self) -> np.ndarray:
+        """(3,) TCP at the start of the first pass [m]."""
+        return self.passes[0].positions_m[0]
+
+    @property
+    def end_m(self) -> np.ndarray:
+        """(3,) TCP at the end of the last pass [m]."""
+        return self.passes[-1].positions_m[-1]
+
+    def reversed(self) -> 'FacePasses':
+        """The same passes the other way round, the last one first."""
+        return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
+
+
+@dataclass(frozen=True)
+class Blend:
+    """The faces with their passes, blended.
+
+    Attributes:
+        margin_m: by how much each face is sprayed less far than its seams.
+        faces: their passes, each at its speed.
+        sigma_n_before: of the film without margin, each face for itself.
+    """
+
+    margin_m: float
+    faces: tuple[FacePasses, ...]
+    sigma_n_before: float
+
+
+@dataclass(frozen=True)
+class _Laid:
+    """Passes on every face for one margin, and the film of each pass on the whole part."""
+
+    margin_m: float
+    faces: tuple[FacePasses, ...]
+    maps: tuple[SurfaceMap, ...]
+    films_um: np.ndarray
+
+
+def blend(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    faces: tuple[Face, ...],
+    area_m2: np.ndarray,
+    progress: Callable[[str, float], None],
+) -> Blend:
+    """Lay passes on each face, and choose margin and speeds for an even film of all.
+
+    Args:
+        surface: the part. model: what the gun sprays. request: for each face.
+        faces: of the part.
+        area_m2: (V,) of the surface that is to be even, 0 elsewhere [m2].
+        progress: called with what is done and its share, 0 to 1.
+    """
+    overspray_m, tried = 0.0, []
+    for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
+        progress('faces', number / len(MARGINS))
+        tried.append(_laid(surface, model, request, faces, share * overspray_m))
+        overspray_m = tried[0].faces[0].style.overspray_m
+    target = request.target_um if request.speed_m_per_s is None else None
+    dwells = [_dwell(laid, area_m2, target) for laid in tried]
+    sigmas = [
+        evenness(dwell @ laid.films_um, area_m2)[1]
+        for dwell, laid in zip(dwells, tried, strict=True)
+    ]
+    best = int(np.argmin(sigmas))
+    _, before = evenness(tried[0].films_um.sum(axis=0), area_m2)
+    return Blend(tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before)
+
+
+def _laid(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    faces: tuple[Face, ...],
+    margin_m: float,
+) -> _Laid:
+    passes, maps, films = [], [], []
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    for face in faces:
+        planned = plan(face.without_margin(margin_m).surface, model, request)
+        passes.append(FacePasses(planned.passes, planned.style))
+        maps.append(planned.line_films.surface_map)
+        for one in planned.passes:
+            path, _ = spray_path(trajectory_of((one,), planned.style), max_step_m=model.max_step_m)
+            integrator.reset()
+            integrator.add(path)
+            films.append(integrator.raw_um.copy())
+    return _Laid(margin_m, tuple(passes), tuple(maps), np.array(films))
+
+
+def _dwell(laid: _Laid, area: np.ndarray, target_um: float | None) -> np.ndarray:
+    """(n,) time on each pass, over what it is on its face alone, for an even film of all."""
+    weight = area / area.sum()
+    films = laid.films_um
+    wanted = target_um or float(weight @ films.sum(axis=0))
+    rows = np.sqrt(weight)[:, np.newaxis] * films.T / wanted
+    ridge = RELUCTANCE * np.eye(len(films)) / math.sqrt(len(films))
+    return lsq_linear(
+        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), DWELL
+    ).x
+
+
+def _with_dwell(laid: _Laid, dwell: np.ndarray, request: PlanRequest) -> tuple[FacePasses, ...]:
+    """The passes at their new speeds, with a run-up that suits them."""
+    found, first = [], 0
+    for face, surface_map in zip(laid.faces, laid.maps, strict=True):
+        passes = []
+        for number, planned in enumerate(face.passes):
+            style = replace(
+                face.style, speed_m_per_s=planned.speed_m_per_s / float(dwell[first + number])
+            )
+            backwards = bool(number % 2) and not request.one_way
+            passes.append(plan_pass(surface_map, planned.across_m, style, backwards))
+        first += len(passes)
+        found.append(FacePasses(tuple(passes), face.style))
+    return tuple(found)
+
+
+# --- order, and the way from face to face
+
+
+def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+    """The faces with least travel between them; a face may run the other way round.
+
+    Faces whose passes all run one way are not turned.
+    """
+    if len(faces) > MOST_TRIED:
+        return _nearest_next(faces)
+    ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
+    tried = (
+        tuple(either[k] for k in order)
+        for either in product(*ways)
+        for order in permutations(range(len(faces)))
+    )
+    return min(tried, key=_travel_m)
+
+
+def motion_over(
+    faces: Sequence[FacePasses], frame_id: str, is_clear: Callable[[Trajectory], bool]
+) -> tuple[Trajectory, tuple[Move, ...]]:
+    """The timed motion that sprays one face after the other, and the moves of a robot program.
+
+    Between the faces the gun is drawn back along its axis.
+
+    Args:
+        faces: in running order.
+        frame_id: of the poses.
+        is_clear: whether a way from face to face keeps clear of the part.
+    """
+    parts: list[Trajectory] = []
+    moves: list[Move] = []
+    for number, face in enumerate(faces):
+        own = planned_moves(face.passes, face.style)
+        if number:
+            between = _between(moves[-1], own[0], face.style, is_clear)
+            parts.append(timed([moves[-1], *between, own[0]], gun_known=False))
+            moves += between
+        parts.append(trajectory_of(face.passes, face.style, frame_id))
+        moves += own
+    return _joined(parts, frame_id), tuple(moves)
+
+
+def _between(
+    before: Move, after: Move, style: PassStyle, is_clear: Callable[[Trajectory], bool]
+) -> list[Move]:
+    """Moves from the end of a face to the start of the next, without both."""
+    speed = style.transfer_speed_m_per_s
+    for retreat_m in RETREATS_M:
+        between = [
+            Move(_drawn_back(move, retreat_m), move.quaternion_xyzw, speed, spraying=False)
+            for move in (before, after)
+        ]
+        if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
+            break
+    return between
+
+
+def _drawn_back(move: Move, by_m: float) -> np.ndarray:
+    return move.position_m - by_m * Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
+
+
+def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
+    """One motion after the other; each begins where the one before ends."""
+    clock, shifts = 0, []
+    for part in parts:
+        shifts.append(clock - int(part.stamps_ns[0]))
+        clock += int(part.stamps_ns[-1] - part.stamps_ns[0])
+
+    def rows(name: str, number: int) -> np.ndarray:
+        # Where one ends and the next begins there is one pose.
+        return getattr(parts[number], name)[1 if number else 0 :]
+
+    numbers = range(len(parts))
+    return Trajectory(
+        np.concatenate([rows('stamps_ns', k) + shifts[k] for k in numbers]),
+        np.concatenate([rows('positions_m', k) for k in numbers]),
+        np.concatenate([rows('quaternions_xyzw', k) for k in numbers]),
+        frame_id=frame_id,
+        trigger_stamps_ns=np.concatenate(
+            [parts[k].trigger_stamps_ns + shifts[k] for k in numbers]
+        ),
+        trigger_flow=np.concatenate([part.trigger_flow for part in parts]),
+        trigger_brush=np.concatenate([part.trigger_brush for part in parts]),
+    )
+
+
+def _reversed(planned: PlannedPass) -> PlannedPass:
+    length = float(planned.along_m[-1])
+    return replace(
+        planned,
+        positions_m=planned.positions_m[::-1],
+        rotations=planned.rotations[::-1],
+        along_m=length - planned.along_m[::-1],
+        on_m=length - planned.off_m,
+        off_m=length - planned.on_m,
+    )
+
+
+def _travel_m(faces: Iterable[FacePasses]) -> float:
+    return sum(
+        float(np.linalg.norm(after.start_m - before.end_m)) for before, after in pairwise(faces)
+    )
+
+
+def _nearest_next(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+    """From the first on, each time the face that begins nearest."""
+    order, left = [faces[0]], list(faces[1:])
+    while left:
+        end_m = order[-1].end_m
+        nearest = min(left, key=lambda face: float(np.linalg.norm(face.start_m - end_m)))
+        order.append(nearest)
+        left = [face for face in left if face is not nearest]
+    return tuple(order)

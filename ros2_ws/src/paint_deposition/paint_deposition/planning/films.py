@@ -1,0 +1,185 @@
+"""Films that plans are made from: of a motion, of single passes, and of pieces of a pass."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator, settled_um
+from paint_deposition.film.paint_used import PaintUsed
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.improvement.nodes import Nodes
+from paint_deposition.planning.improvement.programme import Programme
+from paint_deposition.planning.passes import PassStyle, plan_pass, trajectory_of
+from paint_deposition.planning.surface_map import SurfaceMap
+
+MOST_POINTS = 1500
+LINES_PER_SCALE = 5.0
+COARSEST_STEP_M = 0.02
+# Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak; of nodes: 1e-3.
+STEPS_PER_SCALE, STEPS_PER_SIGMA = 5.0, 6.0
+# Slower poses would be gaps, at which the gun is off.
+SLOWEST_RATE_HZ = 10.0
+
+
+def simulated(
+    surface: Surface,
+    model: DepositionModel,
+    trajectory: Trajectory,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[np.ndarray, PaintUsed]:
+    """(V,) film of a motion [um], and what it sprays."""
+    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator.add(path, lambda done: progress(done / len(path)))
+    return integrator.film_um, integrator.used
+
+
+def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
+    """Mean film [um] and sigma_n, weighted by area."""
+    weight = area_m2 / area_m2.sum()
+    mean = float(weight @ film_um)
+    sigma = math.sqrt(float(weight @ (film_um - mean) ** 2))
+    return mean, sigma / mean if mean > 0.0 else math.nan
+
+
+def stratified_sample(area_m2: np.ndarray) -> np.ndarray:
+    """Rows that stand for equal shares of the area, MOST_POINTS at most."""
+    reached = np.cumsum(area_m2)
+    count = min(MOST_POINTS, 4 * len(area_m2))
+    shares = (np.arange(count) + 0.5) / count * reached[-1]
+    return np.searchsorted(reached, shares)
+
+
+class LineFilms:
+    """Film at points spread evenly over the painted side, for passes along many lines.
+
+    Args:
+        surface: the part.
+        surface_map: its smoothed surface.
+        model: shadows and effects on the finished film are left out.
+        style: how passes are run.
+        finest_m: scale on which the film changes across a pass [m].
+        beyond_m: lines are laid this far past the part's edges [m].
+        progress: called with the share done.
+
+    Attributes:
+        lines_m: (L,) the lines, and low_m and high_m their ends [m].
+        rows: (V,) vertices of the part at which films are kept.
+        films_um: (L, V) film of each pass.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        surface_map: SurfaceMap,
+        model: DepositionModel,
+        style: PassStyle,
+        finest_m: float,
+        beyond_m: float,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        chosen = stratified_sample(surface.vertex_areas_m2[surface_map.painted])
+        self.rows = rows = np.flatnonzero(surface_map.painted)[chosen]
+        self.surface_map = surface_map
+        points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
+        low, high = surface_map.extent_m[1]
+        self.low_m, self.high_m = low - beyond_m, high + beyond_m
+        step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
+        count = math.ceil((self.high_m - self.low_m) / step) + 1
+        self.lines_m = np.linspace(self.low_m, self.high_m, count)
+        integrator = FilmIntegrator(points, model)
+        longest = finest_m / STEPS_PER_SCALE
+        self.films_um = np.empty((count, len(rows)))
+        for k, across in enumerate(self.lines_m):
+            motion = line_motion(surface_map, float(across), style, longest)
+            path, _ = spray_path(motion, max_step_m=longest)
+            integrator.reset()
+            integrator.add(path)
+            self.films_um[k] = integrator.raw_um
+            progress((k + 1) / count)
+        # Cubic splines through the lines' films are linear in them: one matrix for all points.
+        self._basis = CubicSpline(self.lines_m, np.eye(count))
+
+    def sigma_n(self, lines_m: np.ndarray) -> np.ndarray:
+        """(...) standard deviation over mean of the film of passes along lines (..., n) [m]."""
+        weights = self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
+        film = weights @ self.films_um
+        return film.std(axis=-1) / film.mean(axis=-1)
+
+
+def line_motion(
+    surface_map: SurfaceMap, across_m: float, style: PassStyle, step_m: float
+) -> Trajectory:
+    """The motion of a single pass along a line, with poses about a sub-step apart."""
+    rate = max(style.speed_m_per_s / step_m, SLOWEST_RATE_HZ)
+    return trajectory_of((plan_pass(surface_map, across_m, style),), style, rate_hz=rate)
+
+
+class FilmAtPoints:
+    """Films at some points of a part, with the model's effects, the film's own included.
+
+    Args:
+        surface: the part. rows: the vertices at which the film is wanted.
+        model: what the gun sprays.
+
+    Attributes:
+        step_m: longest travel of a sub-step [m].
+    """
+
+    def __init__(self, surface: Surface, rows: np.ndarray, model: DepositionModel) -> None:
+        self.model = model
+        self._surface, self._rows = surface, rows
+        points = surface.points().select(rows)
+        self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
+        narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
+        self.step_m = max(model.max_step_m, narrow / STEPS_PER_SIGMA)
+        self._settles = [e for e in model.effects if type(e).on_film is not Effect.on_film]
+
+    def film_um(self, programme: Programme) -> np.ndarray:
+        """(V,) film of a programme at the points [um]."""
+        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
+        self._integrator.reset()
+        self._integrator.add(path)
+        return self._integrator.raw_um * self._settling(path)
+
+    def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
+        """(n, V) films for a density of paint of 1 s/m at each node [um].
+
+        Density is slowness times flow. The film is linear in it, but for effects that depend on
+        the speed or on the time since the gun opened: they are taken as they are in this
+        programme, which was timed at a density of paint (n,) [s/m].
+        """
+        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
+        travel = programme.travel_at_m(path.stamp_ns)
+        # The opening that each sub-step belongs to: the last that has begun.
+        begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
+        sprayed, rows = self._integrator.sprayed(path)
+        hats = nodes.hats(travel[rows], np.maximum(begun - 1, 0)[rows])
+        shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()
+        films = np.empty((len(nodes), len(self._rows)))
+        for node in range(len(nodes)):
+            column = slice(shares.indptr[node], shares.indptr[node + 1])
+            part = sprayed.select(shares.indices[column])
+            self._integrator.reset()
+            self._integrator.add_sprayed(part.with_(dwell_s=part.dwell_s * shares.data[column]))
+            films[node] = self._integrator.raw_um
+        return films * self._settling(path)
+
+    def _settling(self, path: SprayPath) -> np.ndarray | float:
+        """(V,) film in the end over film that arrived; effects on the film need all of it."""
+        if not self._settles:
+            return 1.0
+        everywhere = self._surface.points()
+        whole = FilmIntegrator(everywhere, self.model, occluder=self._surface.occluder)
+        whole.add(path)
+        raw = whole.raw_um
+        settled = settled_um(raw, self._settles, everywhere)
+        return np.divide(settled, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -1,0 +1,301 @@
+"""Speeds, flows and triggers along a given path, chosen for an even film through the model."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.films import FilmAtPoints, stratified_sample
+from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
+from paint_deposition.planning.improvement.programme import Opening, Programme
+from paint_deposition.planning.improvement.quadratic_program import (
+    WORDS,
+    Density,
+    Problem,
+    solved,
+)
+from paint_deposition.planning.requests import ImproveRequest
+
+# Nodes per width of the pattern, within bounds.
+NODES_PER_SIGMA = 2.0
+FINEST_M, COARSEST_M = 0.015, 0.05
+# The film of the solution and the one that is laid agree to this share of the target.
+AGREED, ROUNDS = 5e-4, 4
+# Rounds of the solver for what need not be exact: triggers, and what limits cost.
+ROUGHLY = 3
+# A limit is named whose absence would lower sigma_n by this share.
+NAMED = 0.02
+# An opening is not cut to less than this share of its length.
+LEAST_SHARE = 0.3
+# It is extended only where the path runs on straight, at nearly the speed of its end.
+STRAIGHT, STEADY = 0.995, 0.99
+CHECKS = 20
+
+
+@dataclass(frozen=True)
+class BindingLimit:
+    """A limit that keeps the film from being more even.
+
+    Attributes:
+        name: of the limit, in words. sigma_n: what it would be without this limit alone.
+    """
+
+    name: str
+    sigma_n: float
+
+
+@dataclass(frozen=True)
+class Retiming:
+    """A programme with new times and openings.
+
+    Attributes:
+        given: the programme as it was; programme: the new one.
+        target_um: mean film aimed at.
+        binding: names of all limits that bind.
+        binding_limits: those of them that cost evenness, the strongest first.
+        sigma_n_of_path: the most even film of any densities of paint along this path, without
+            limits and without weights for paint, time and smoothness.
+    """
+
+    given: Programme
+    programme: Programme
+    target_um: float
+    binding: tuple[str, ...]
+    binding_limits: tuple[BindingLimit, ...]
+    sigma_n_of_path: float
+
+
+def retime_for_evenness(
+    surface: Surface,
+    target_region: np.ndarray,
+    programme: Programme,
+    models: Sequence[DepositionModel],
+    request: ImproveRequest,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+    explained: bool = True,
+) -> Retiming:
+    """Choose speeds, flows and triggers along the path of a programme.
+
+    The film at points spread evenly over the target region is linear in the density of paint
+    along the path: a quadratic program gives the best one. Effects that depend on speed, time or
+    film are followed by solving again about the film of the last solution.
+
+    Args:
+        surface: the part. target_region: (V,) bool, vertices whose film counts.
+        programme: as given.
+        models: equally likely ones; the first is the best known.
+        request: what is wanted and allowed.
+        progress: called with what is done and its share, 0 to 1.
+        explained: find out which limits cost evenness, and how even the path could be.
+
+    Raises:
+        PlanError: the limits contradict each other.
+    """
+    rows = np.flatnonzero(target_region)
+    rows = rows[stratified_sample(surface.vertex_areas_m2[target_region])]
+    films = [FilmAtPoints(surface, rows, model) for model in models]
+    mean = float(films[0].film_um(programme).mean())
+    target = request.target_um or mean
+    narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
+    spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
+    search = _Search(programme, films, target, target / mean, request, spacing, progress)
+    return search.retiming(explained)
+
+
+@dataclass(frozen=True)
+class _Search:
+    """The programme as given, and what is wanted of it; ``level`` is target over mean film."""
+
+    given: Programme
+    films: Sequence[FilmAtPoints]
+    target_um: float
+    level: float
+    request: ImproveRequest
+    spacing_m: float
+    progress: Callable[[str, float], None]
+
+    def retiming(self, explained: bool) -> Retiming:
+        """Choose where the gun opens, then solve and lay the film until both agree."""
+        self.progress('triggers', 0.0)
+        wide = replace(self.given, openings=widened(self.given, self.request))
+        nodes = Nodes.of(wide.openings, self.spacing_m)
+        open_ends = may_be_closed(nodes, self.given.openings, self.request)
+        programme, relaxed = self.given, None
+        if open_ends.any():
+            relaxed, density = self._problem(wide, nodes, None, open_ends)
+            density = solved(relaxed, density, ROUGHLY)
+            chosen = _openings(
+                nodes, density.density, open_ends, relaxed.bounds, self.given.openings,
+                self.request,
+            )  # fmt: skip
+            programme = replace(programme, openings=chosen)
+        nodes = Nodes.of(programme.openings, self.spacing_m)
+        closed = np.zeros(len(nodes), dtype=bool)
+        found: Density | None = None
+        for round_ in range(ROUNDS):
+            self.progress('speeds', round_ / ROUNDS)
+            problem, start = self._problem(programme, nodes, found, closed)
+            found = solved(problem, start)
+            timed = self._timed(programme, nodes, found)
+            laid = [one.film_um(timed) for one in self.films]
+            expected = [found.density @ films for films in problem.films]
+            off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
+            if off <= AGREED * self.target_um:
+                break
+        assert found is not None
+        limits: tuple[BindingLimit, ...] = ()
+        of_path = now = _sigma_n(laid)
+        if explained:
+            limits = self._binding_limits(problem, found, now)
+            free = [_solved_sigma_n(problem.relaxed(), found)]
+            if relaxed is not None:
+                free.append(_solved_sigma_n(relaxed.relaxed(), density))
+            of_path = min(now, *free)
+        names = tuple(WORDS[name] for name in found.binding)
+        return Retiming(self.given, timed, self.target_um, names, limits, of_path)
+
+    def _problem(
+        self, programme: Programme, nodes: Nodes, density: Density | None, open_ends: np.ndarray
+    ) -> tuple[Problem, Density]:
+        """The problem about a density; without one, about even speeds."""
+        given = self.given
+        bounds = speed_bounds(replace(given, openings=programme.openings), nodes, self.request)
+        now = density or self._even(nodes)
+        timed = self._timed(programme, nodes, now)
+        films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
+        flow = np.array([opening.flow for opening in given.openings])
+        sprayed_s = self.level * float(flow @ np.diff(given.seconds_at(given.ends_m))[:, 0])
+        return Problem(
+            films, self.target_um, nodes, bounds, self.request, sprayed_s, open_ends
+        ), now
+
+    def _even(self, nodes: Nodes) -> Density:
+        """The mean density of each opening as it was given, times the level."""
+        flow = np.array([opening.flow for opening in nodes.openings])
+        ends, request = self.given.ends_m, self.request
+        seconds = np.diff(self.given.seconds_at(ends))[:, 0]
+        slowness = np.clip(
+            self.level * seconds / np.diff(ends)[:, 0],
+            1.0 / request.speed_max_m_per_s,
+            1.0 / request.speed_min_m_per_s,
+        )
+        return Density((flow * slowness)[nodes.opening], flow)
+
+    def _timed(self, programme: Programme, nodes: Nodes, density: Density) -> Programme:
+        openings = tuple(
+            replace(opening, flow=float(flow))
+            for opening, flow in zip(nodes.openings, density.flow, strict=True)
+        )
+        slowness = density.slowness(nodes)
+        return retime(replace(programme, openings=openings), nodes, slowness, self.request)
+
+    def _binding_limits(
+        self, problem: Problem, found: Density, sigma_n: float
+    ) -> tuple[BindingLimit, ...]:
+        limits = []
+        for number, name in enumerate(found.binding):
+            self.progress('limits', number / len(found.binding))
+            without = _solved_sigma_n(replace(problem, without=frozenset({name})), found)
+            if without < (1.0 - NAMED) * sigma_n:
+                limits.append(BindingLimit(WORDS[name], without))
+        return tuple(sorted(limits, key=lambda limit: limit.sigma_n))
+
+
+def _solved_sigma_n(problem: Problem, start: Density) -> float:
+    density = solved(problem, start, ROUGHLY).density
+    return _sigma_n([density @ films for films in problem.films])
+
+
+def _sigma_n(films_um: Sequence[np.ndarray]) -> float:
+    """Root mean square over the models of standard deviation over mean."""
+    return math.sqrt(float(np.mean([(f.std() / f.mean()) ** 2 for f in films_um])))
+
+
+# --- where the gun opens and closes: the ends of the openings, from a relaxed problem
+
+
+def widened(programme: Programme, request: ImproveRequest) -> tuple[Opening, ...]:
+    """The openings with all places at which the gun might open earlier or close later."""
+    found = []
+    last = len(programme.openings) - 1
+    for number, (opening, around) in enumerate(
+        zip(programme.openings, programme.around_m.tolist(), strict=True)
+    ):
+        # Two openings may meet half way between them.
+        back = (0.5 if number else 1.0) * (opening.on_m - around[0])
+        ahead = (0.5 if number < last else 1.0) * (around[1] - opening.off_m)
+        back, ahead = (min(request.trigger_shift_m, room) for room in (back, ahead))
+        on = opening.on_m - _usable_m(programme, opening.on_m, -1.0, back)
+        off = opening.off_m + _usable_m(programme, opening.off_m, 1.0, ahead)
+        found.append(replace(opening, on_m=on, off_m=off))
+    return tuple(found)
+
+
+def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -> float:
+    """How far the path runs on from an end, straight and steadily."""
+    if most_m <= 0.0:
+        return 0.0
+    way = np.linspace(0.0, most_m, CHECKS + 1)
+    places = from_m + side * way
+    at = programme.positions_at_m(places)
+    seconds = np.abs(np.diff(programme.seconds_at(places)))
+    speed = np.diff(way) / np.maximum(seconds, 1e-9)
+    inner = from_m - side * way[1]
+    own = way[1] / max(float(np.ptp(programme.seconds_at(np.array([inner, from_m])))), 1e-9)
+    good = speed >= STEADY * own
+    good &= np.linalg.norm(at[1:] - at[0], axis=1) >= STRAIGHT * way[1:]
+    return float(way[np.argmin(good)] if not good.all() else way[-1])
+
+
+def may_be_closed(nodes: Nodes, given: tuple[Opening, ...], request: ImproveRequest) -> np.ndarray:
+    """(n,) bool, nodes so near the given ends that the gun may be closed there."""
+    near = np.zeros(len(nodes), dtype=bool)
+    if not request.trigger_cut_m and not request.trigger_shift_m:
+        return near
+    for number, opening in enumerate(given):
+        rows = nodes.rows(number)
+        cut = _most_cut_m(opening, request)
+        place = nodes.travel_m[rows]
+        near[rows] = (place < opening.on_m + cut) | (place > opening.off_m - cut)
+    return near
+
+
+def _openings(
+    nodes: Nodes,
+    density: np.ndarray,
+    open_ends: np.ndarray,
+    bounds: SpeedBounds,
+    given: tuple[Opening, ...],
+    request: ImproveRequest,
+) -> tuple[Opening, ...]:
+    """Openings that begin and end where the relaxed density reaches half of the least possible."""
+    found = []
+    for number, opening in enumerate(nodes.openings):
+        rows = nodes.rows(number)
+        place = nodes.travel_m[rows]
+        least = opening.flow / bounds.greatest_m_per_s[rows]
+        worth = (density[rows] - 0.5 * least) / least
+        cut = _most_cut_m(given[number], request)
+        kept = np.flatnonzero(~open_ends[rows] | (worth > 0.0))
+        first, last = int(kept[0]), int(kept[-1])
+        on = min(_crossing_m(place, worth, first, first - 1), given[number].on_m + cut)
+        off = max(_crossing_m(place, worth, last, last + 1), given[number].off_m - cut)
+        found.append(replace(opening, on_m=on, off_m=off))
+    return tuple(found)
+
+
+def _most_cut_m(opening: Opening, request: ImproveRequest) -> float:
+    length = opening.off_m - opening.on_m
+    return min(request.trigger_cut_m, 0.5 * (1.0 - LEAST_SHARE) * length)
+
+
+def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:
+    """Where the worth vanishes between a node and the next one outward."""
+    if not 0 <= outside < len(place_m):
+        return float(place_m[inside])
+    share = max(worth[inside], 0.0) / max(worth[inside] - worth[outside], 1e-12)
+    step = place_m[outside] - place_m[inside]
+    return float(place_m[inside] + np.clip(share, 0.0, 1.0) * step)

@@ -1,0 +1,127 @@
+"""Where to lay passes on a part: number, index and start offset, judged by their summed film."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize
+
+from paint_deposition.errors import PlanError
+from paint_deposition.planning.films import LineFilms
+
+INDICES, OFFSETS = 25, 25
+# One pass less is worth this much evenness: relative, and in sigma_n itself.
+SLACK, LEAST_SLACK = 1.05, 0.002
+
+
+@dataclass(frozen=True)
+class Placing:
+    """Parallel lines on a part.
+
+    Attributes:
+        passes: how many. index_m: distance between neighbours.
+        middle_m: coordinate across of their middle.
+        sigma_n: of their film on the part.
+    """
+
+    passes: int
+    index_m: float
+    middle_m: float
+    sigma_n: float
+
+    @property
+    def lines_m(self) -> np.ndarray:
+        """(n,) coordinates across, increasing [m]."""
+        return lines_of(self.passes, self.index_m, self.middle_m)
+
+
+def lines_of(passes: int, index_m: float | np.ndarray, middle_m: float | np.ndarray) -> np.ndarray:
+    """Lines (..., n) of evenly spaced passes from their indices and middles (...) [m]."""
+    steps = np.arange(passes) - 0.5 * (passes - 1)
+    return np.asarray(middle_m)[..., np.newaxis] + np.asarray(index_m)[..., np.newaxis] * steps
+
+
+def place_passes(
+    films: LineFilms,
+    extent_m: tuple[float, float],
+    index_range_m: tuple[float, float],
+    tolerance: float | None = None,
+) -> Placing:
+    """The most even placing with the fewest passes that come near the best, or the tolerance.
+
+    Args:
+        films: of single passes.
+        extent_m: ends of the part across the passes [m].
+        index_range_m: least and greatest index; equal ends fix it.
+
+    Raises:
+        PlanError: no placing keeps to the tolerance; names the closest.
+    """
+    height = extent_m[1] - extent_m[0]
+    fewest = max(1, int(height / index_range_m[1]))
+    most = max(fewest, int(np.ceil(height / index_range_m[0])) + 1)
+    best = [
+        placing
+        for passes in range(fewest, most + 1)
+        if (placing := _best_of(films, extent_m, index_range_m, passes)) is not None
+    ]
+    closest = min(best, key=lambda placing: placing.sigma_n)
+    limit = SLACK * closest.sigma_n + LEAST_SLACK if tolerance is None else tolerance
+    good = [placing for placing in best if placing.sigma_n <= limit]
+    if not good:
+        raise PlanError(
+            f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
+            f'sigma_n on this part within {tolerance:g}; the closest is {closest.sigma_n:.4f} '
+            f'with {closest.passes} at {closest.index_m:.3f} m: allow that much, or a smaller '
+            'index'
+        )
+    return good[0]
+
+
+def centred(
+    films: LineFilms, extent_m: tuple[float, float], passes: int, index_m: float
+) -> Placing:
+    """Passes about the middle of the part, as one would lay them on a plane."""
+    middle = 0.5 * (extent_m[0] + extent_m[1])
+    sigma = films.sigma_n(lines_of(passes, index_m, middle))
+    return Placing(passes, index_m, middle, float(sigma))
+
+
+def _best_of(
+    films: LineFilms,
+    extent_m: tuple[float, float],
+    index_range_m: tuple[float, float],
+    passes: int,
+) -> Placing | None:
+    middle = 0.5 * (extent_m[0] + extent_m[1])
+    low, high = index_range_m
+    # Lines further out than the films that are kept are not considered.
+    widest = (films.high_m - films.low_m) / max(passes - 1, 1)
+    high = min(high, widest)
+    index = np.linspace(low, high, INDICES if high > low and passes > 1 else 1)
+    offset = np.linspace(-0.5, 0.5, OFFSETS)
+    indices, offsets = (grid.ravel() for grid in np.meshgrid(index, offset))
+    lines = lines_of(passes, indices, middle + offsets * indices)
+    inside = (lines.min(axis=1) >= films.low_m) & (lines.max(axis=1) <= films.high_m)
+    if not inside.any():
+        return None
+    sigma = np.where(inside, films.sigma_n(lines), np.inf)
+    start = int(np.argmin(sigma))
+
+    def objective(x: np.ndarray) -> float:
+        there = float(np.clip(x[0], low, high))
+        spread = lines_of(passes, there, middle + x[1] * there)
+        if spread.min() < films.low_m or spread.max() > films.high_m:
+            return np.inf
+        return float(films.sigma_n(spread)) + abs(x[0] - there)
+
+    first = np.array([indices[start], offsets[start]])
+    aside = np.array([[0.0, 0.0], [min(0.01, high - first[0]) or -0.01, 0.0], [0.0, 0.02]])
+    found = minimize(
+        objective,
+        first,
+        method='Nelder-Mead',
+        options={'xatol': 1e-4, 'fatol': 1e-5, 'maxfev': 200, 'initial_simplex': first + aside},
+    )
+    there = float(np.clip(found.x[0], low, high))
+    centre = middle + float(found.x[1]) * there
+    return Placing(passes, there, centre, float(films.sigma_n(lines_of(passes, there, centre))))

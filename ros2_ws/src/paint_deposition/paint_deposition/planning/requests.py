@@ -1,0 +1,280 @@
+"""Requests to planning: an index, passes on a part, a better programme, points to measure.
+
+Options of the command line and keywords of Python are these fields; None is not given.
+"""
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import BeforeValidator, Field, model_validator
+
+from paint_deposition.errors import PlanError, ReadingsError
+from paint_deposition.request import Request, given
+
+# From evenness alone to paint above all, in units of sigma_n squared: the weights of a trade-off.
+PAINT_WEIGHTS = (0.0, 1e-3, 3e-3, 1e-2, 3e-2)
+USUAL_RANGE_M = (0.2, 0.8)
+# A pattern whose SB50 lies here is searched over the usual range, another one over its own scale.
+USUAL_HALF_WIDTHS_M = (0.25, 0.75)
+RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
+FASTEST_M_PER_S = 3.0
+WIDEST_LEAN_RAD = math.radians(45.0)
+
+Positive = Annotated[float, Field(gt=0.0)]
+Vector = Annotated[tuple[float, float, float], BeforeValidator(tuple)]
+
+
+class FilmBuild(Request):
+    """How much film passes lay."""
+
+    speed_m_per_s: float | None = given(
+        None, 'Speed of the passes [m/s].', '--speed', above=0.0, most=FASTEST_M_PER_S
+    )
+    target_um: float | None = given(
+        None, 'Mean film build; the speed is chosen for it if it is not given [µm].', above=0.0
+    )
+
+
+class PassRequest(FilmBuild):
+    """What all passes are asked for."""
+
+    index_min_m: float | None = given(
+        None, 'Least index [m].', '--index-min', least=0.001, most=10.0
+    )
+    index_max_m: float | None = given(
+        None, 'Greatest index [m].', '--index-max', least=0.001, most=10.0
+    )
+    tolerance: float | None = given(
+        None, 'Largest sigma_n accepted, 0.05 for 5 %.', above=0.0, below=1.0
+    )
+    one_way: bool = given(False, 'Every pass in one direction; default: they alternate.')
+    standoff_m: float | None = given(
+        None, 'Distance of the TCP from the part [m]; default: the part lies on the model plane.',
+        '--standoff', above=0.0,
+    )  # fmt: skip
+    travel_rad: float = given(
+        0.0, "Direction of the first pass in the tool's x-y frame, from x to y."
+    )
+
+    @model_validator(mode='after')
+    def _says_how_much(self) -> 'PassRequest':
+        if self.speed_m_per_s is None and self.target_um is None:
+            raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
+        return self
+
+
+class IndexRequest(PassRequest):
+    """An index between parallel passes on a plane."""
+
+    width_m: float | None = given(
+        None, 'Width to paint across the passes [m].', '--width', above=0.0, most=100.0
+    )
+    length_m: float | None = given(
+        None, 'Length of a pass [m]; default: the width.', '--length', above=0.0, most=100.0
+    )
+    gun_turns: bool = given(
+        False,
+        'The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
+    )
+
+    def index_range_m(self, half_width_m: float) -> tuple[float, float]:
+        """Range to search for a pass of this SB50 [m].
+
+        Raises:
+            PlanError: it is empty.
+        """
+        least, greatest = USUAL_HALF_WIDTHS_M
+        usual = USUAL_RANGE_M
+        if not least <= half_width_m <= greatest:
+            least, greatest = RANGE_IN_HALF_WIDTHS
+            usual = round(least * half_width_m, 3), round(greatest * half_width_m, 3)
+        low = usual[0] if self.index_min_m is None else self.index_min_m
+        high = usual[1] if self.index_max_m is None else self.index_max_m
+        if not low < high:
+            raise PlanError(
+                f'the index range {low:g} to {high:g} m is empty; give index_min_m < index_max_m'
+            )
+        return low, high
+
+
+class Limits(Request):
+    """What robot, gun and shop allow while the speeds along a path are chosen."""
+
+    speed_min_m_per_s: float = given(
+        0.1, 'Least speed while spraying [m/s].', '--speed-min', above=0.0
+    )
+    speed_max_m_per_s: float = given(
+        1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
+    )
+    acceleration_m_per_s2: float = given(
+        2.0, 'Of the robot along its path, and across it in bends [m/s2].', '--acceleration',
+        above=0.0,
+    )  # fmt: skip
+
+    @model_validator(mode='after')
+    def _in_order(self) -> 'Limits':
+        self._require_order('speed_min_m_per_s', 'speed_max_m_per_s')
+        return self
+
+    def _require_order(self, low: str, high: str) -> None:
+        least, most = getattr(self, low), getattr(self, high)
+        if least is not None and most is not None and least > most:
+            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
+
+
+class PlanRequest(PassRequest, Limits):
+    """Passes on a part; the speeds along them are chosen for ``optimise`` only."""
+
+    direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')
+    index_m: float | None = given(
+        None, 'Fixes the index [m]; default: most even.', '--index', above=0.0
+    )
+    smoothing_radius_m: float = given(
+        0.1, 'What is finer than this on the part is not followed.', above=0.0
+    )
+    overspray_m: float | None = given(
+        None,
+        'The gun opens this far before the part; default: where 90 % of the pattern reach.',
+        least=0.0,
+    )
+    outward: Vector | None = given(
+        None, 'From the part to the gun; default: the mean normal of the mesh.', metavar='X Y Z'
+    )
+    optimise: bool = given(
+        False,
+        'Choose number and place of the passes and the speeds along them for an even film and '
+        'little paint; default: even passes at one speed.',
+    )
+    paint_weight: float = given(
+        5e-3,
+        'With --optimise: what paint is worth, in units of sigma_n squared, for as much as the '
+        'film on the part holds.', least=0.0,
+    )  # fmt: skip
+    time_weight: float = given(
+        5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
+    )
+    standoff_min_m: float | None = given(
+        None, 'With --optimise: each pass may have a standoff of its own, from this one on [m].',
+        '--standoff-min', above=0.0,
+    )  # fmt: skip
+    standoff_max_m: float | None = given(
+        None, 'With --optimise: up to this one [m].', '--standoff-max', above=0.0
+    )
+    lean_max_rad: float = given(
+        0.0, 'With --optimise: the gun may be turned so far about the line of a pass.',
+        least=0.0, most=WIDEST_LEAN_RAD,
+    )  # fmt: skip
+
+    @model_validator(mode='after')
+    def _has_a_side(self) -> 'PlanRequest':
+        if self.outward is not None and not any(self.outward):
+            raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
+        return self
+
+    def improvement(
+        self, overspray_m: float, target_um: float | None, **weights: float
+    ) -> 'ImproveRequest':
+        """For the speeds along the passes; the gun may be closed up to the edge of the part."""
+        limits = {name: getattr(self, name) for name in Limits.model_fields}
+        return ImproveRequest(**limits, target_um=target_um, trigger_cut_m=overspray_m, **weights)
+
+    def for_plane(self, width_m: float, length_m: float) -> IndexRequest:
+        """The same for a plane of the part's size."""
+        shared = {name: getattr(self, name) for name in PassRequest.model_fields}
+        return IndexRequest(**shared, width_m=width_m, length_m=length_m)
+
+
+class ImproveRequest(Limits):
+    """A more even film along the path of a programme: what is wanted, and what is allowed.
+
+    The variance of film / target on the part is minimised, which is sigma_n squared where the
+    mean is on target, and these weights times what they weigh.
+    """
+
+    target_um: float | None = given(
+        None, 'Mean film wanted [µm]; default: that of the programme.', above=0.0
+    )
+    tolerance: float | None = given(
+        None, 'Accepted difference from the target, 0.1 for 10 %; film outside counts more.',
+        above=0.0,
+    )  # fmt: skip
+    paint_weight: float = given(
+        3e-3, 'What all the paint of the programme is worth, in units of sigma_n squared.',
+        least=0.0,
+    )  # fmt: skip
+    time_weight: float = given(0.0, 'The same of the time sprayed.', least=0.0)
+    smoothness: float = given(
+        1e-2, 'Weight of changes of speed; more gives calmer passes.', least=0.0
+    )
+    jerk_m_per_s3: float = given(50.0, 'Of the robot [m/s3].', '--jerk', above=0.0)
+    move_min_m: float = given(
+        0.02, 'Shortest move of the robot program while spraying [m].', '--move-min', above=0.0
+    )
+    settings_per_s: float = given(
+        20.0, 'Moves with a speed of their own that the controller follows in a second.',
+        above=0.0,
+    )  # fmt: skip
+    flow: tuple[Positive, Positive] = given(
+        (1.0, 1.0), 'Range of the flow of a pass, relative to the programmed one.',
+        metavar='MIN MAX',
+    )  # fmt: skip
+    trigger_shift_m: float = given(
+        0.1, 'The gun opens earlier and closes later by this much at most [m].',
+        '--trigger-shift', least=0.0,
+    )  # fmt: skip
+    trigger_cut_m: float = given(
+        0.3, 'The gun opens later and closes earlier by this much at most [m].',
+        '--trigger-cut', least=0.0,
+    )  # fmt: skip
+    film_min_um: float | None = given(None, 'Least film accepted anywhere [µm].', above=0.0)
+    film_max_um: float | None = given(None, 'Greatest film accepted anywhere [µm].', above=0.0)
+
+    @model_validator(mode='after')
+    def _bounds_in_order(self) -> 'ImproveRequest':
+        self._require_order('film_min_um', 'film_max_um')
+        if self.flow[0] > self.flow[1]:
+            raise PlanError(f'flow is {self.flow[0]:g} to {self.flow[1]:g}; swap the two')
+        return self
+
+    @property
+    def flow_is_free(self) -> bool:
+        """Whether passes may have flows of their own."""
+        return self.flow[0] < self.flow[1]
+
+
+class MeasureRequest(Request):
+    """Where to put the gauge on a part."""
+
+    refusal = ReadingsError
+    points: int = given(60, 'How many points.', least=1)
+    repeats: int = given(
+        8, 'Points to be read twice, which show the noise of the gauge; 0 if you know it.',
+        least=0,
+    )  # fmt: skip
+    foot_m: float = given(
+        0.015, "Radius of the gauge's foot: points keep this far off edges and bends.", above=0.0
+    )
+    seed: int = given(0, 'Random seed of the places tried and the noise simulated.')
+
+
+class GunEnvelope(Request):
+    """What must stay clear of the part, on the tool's axis."""
+
+    radius_m: float = given(
+        0.08, 'Of the gun, and of the cylinder before it that must stay free.', '--gun-radius-m',
+        above=0.0,
+    )  # fmt: skip
+    length_m: float = given(0.4, 'Of the gun behind its TCP.', '--gun-length-m', above=0.0)
+    before_m: float = given(
+        0.1, 'Nothing of the part may come nearer before the TCP.', '--keep-off-m', least=0.0
+    )
+
+    @property
+    def middle_m(self) -> float:
+        """Of the whole cylinder, along tool z from the TCP [m]."""
+        return 0.5 * (self.before_m - self.length_m)
+
+    @property
+    def reach_m(self) -> float:
+        """Radius of the sphere about that middle that holds it all [m]."""
+        return math.hypot(self.radius_m, 0.5 * (self.before_m + self.length_m))

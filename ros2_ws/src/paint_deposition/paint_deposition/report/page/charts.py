@@ -1,0 +1,263 @@
+"""Flat charts of the report: profiles, parity, covariates, history, the unexplained."""
+
+from collections.abc import Iterable, Iterator
+from textwrap import wrap
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.inference.comparison.profiles import Profile
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.layout import (
+    axis,
+    base_layout,
+    chart,
+    figure,
+    scatter,
+    zero_axis,
+)
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95
+from paint_deposition.report.words import covariate_label, minus, p_words, step_words
+
+CHART_PX = 300
+# Share of a chart's height that the residual takes, and above which the film begins.
+RESIDUAL_SHARE, FILM_FROM = 0.26, 0.31
+MOST_COVARIATES = 8
+BINS = 6
+# Conditions that differ by less than this share say nothing of the model.
+LEAST_SPREAD = 0.01
+# Characters in a line below a bar.
+LABEL = 24
+AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
+
+
+def profile_figure(data: ReportData, index: int) -> dict[str, Any]:
+    """Film along each column or row of one experiment: measured, before and after."""
+    experiment = data.experiments[index].name
+    profiles = [p for p in data.profiles if p.experiment == experiment]
+    film_range, residual_range = _ranges(data, profiles)
+    charts = []
+    for profile in profiles:
+        layout = base_layout(
+            xaxis=axis(f'{profile.axis} [mm]', anchor='y2', nticks=7),
+            yaxis=axis('film [µm]', domain=[FILM_FROM, 1.0], range=film_range, nticks=6),
+            yaxis2=zero_axis(
+                'residual', domain=[0.0, RESIDUAL_SHARE], range=residual_range, nticks=4
+            ),
+        )
+        residuals = [trace | {'yaxis': 'y2'} for trace in _residual_traces(data, profile)]
+        title = f'{profile.label}: {data.errors_in_words(profile.rows)}'
+        charts.append(chart(title, _film_traces(data, profile) + residuals, layout, CHART_PX))
+    return figure(f'profiles-{index}', charts, _profile_legend(data))
+
+
+def _profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
+    lined = any(len(profile.line_m) for profile in data.profiles)
+    models = [
+        (name, line['color'], 'dot' if not lined else 'bold' if line['width'] > 2 else 'line')
+        for name, line in zip(data.model_names, data.lines, strict=True)
+    ]
+    entries = [('measured, bars: 95 % gauge and texture', INK, 'dot'), *models]
+    return entries + [('each pass alone', BEFORE, 'dots')] * lined
+
+
+def _ranges(data: ReportData, profiles: list[Profile]) -> tuple[list[float], list[float]]:
+    lines = [p.lines_um.max(initial=0.0) for p in profiles]
+    measured = [data.study.measured_um[p.rows].max() for p in profiles]
+    rows = np.concatenate([p.rows for p in profiles])
+    off = max(np.abs(r[rows]).max() for r in data.residuals_um)
+    noise = TWO_SIDED_95 * data.study.sigma_um[rows].max()
+    reach = 1.05 * (off + 0.6 * noise)
+    return [0.0, 1.03 * max(*lines, *measured, 1.0) + noise], [-reach, reach]
+
+
+def _film_traces(data: ReportData, p: Profile) -> list[dict]:
+    line_mm, at_mm, measured = 1e3 * p.line_m, 1e3 * p.position_m, data.study.measured_um[p.rows]
+    traces = [
+        scatter(line_mm, single, 'lines', line={'color': BEFORE, 'width': 1, 'dash': 'dot'},
+                hovertemplate=f'pass {number}: %{{y:.1f}} µm<extra></extra>')
+        for number, single in enumerate(p.passes_um, start=1)
+    ]  # fmt: skip
+    named = zip(data.model_names, data.lines, strict=True)
+    for k, (name, line) in reversed(list(enumerate(named))):
+        if len(line_mm):
+            trace = scatter(line_mm, p.lines_um[k], 'lines', line=line)
+        else:
+            # An open ring lies over the full dot of the model after it.
+            marker = {'size': 7, 'color': line['color']}
+            if k < len(data.models) - 1:
+                marker |= {'symbol': 'circle-open'}
+            predicted = measured - data.residuals_um[k][p.rows]
+            trace = scatter(at_mm, predicted, 'markers', marker=marker)
+        traces.append(trace | {'hovertemplate': f'{name}: %{{y:.2f}} µm<extra></extra>'})
+    traces.append(
+        scatter(at_mm, measured, 'markers', marker={'size': 5, 'color': INK},
+                error_y=_bars(data, p, INK),
+                hovertemplate='measured %{y:.2f} µm at %{x:.0f} mm<extra></extra>')
+    )  # fmt: skip
+    return traces
+
+
+def _residual_traces(data: ReportData, p: Profile) -> list[dict]:
+    """Measured minus predicted; the bars of the last are the gauge's noise."""
+    traces = [
+        scatter(1e3 * p.position_m, residual[p.rows], 'lines+markers',
+                marker={'size': 4.5, 'color': colour}, line={'width': 1, 'color': colour},
+                hovertemplate='residual %{y:+.2f} µm<extra></extra>')
+        for residual, colour in zip(
+            reversed(data.residuals_um), reversed(data.colours), strict=True
+        )
+    ]  # fmt: skip
+    traces[0]['error_y'] = _bars(data, p, data.colours[-1])
+    return traces[::-1]
+
+
+def _bars(data: ReportData, p: Profile, colour: str) -> dict[str, Any]:
+    return {
+        'type': 'data', 'array': TWO_SIDED_95 * data.study.sigma_um[p.rows],
+        'color': colour, 'thickness': 1, 'width': 0,
+    }  # fmt: skip
+
+
+def parity_figure(data: ReportData) -> dict[str, Any]:
+    """Predicted against measured, with the band that the gauge's noise explains."""
+    measured = data.study.measured_um
+    predicted = [measured - residual for residual in data.residuals_um]
+    top = 1.05 * max(measured.max(), *(p.max() for p in predicted))
+    ends = np.array([0.0, top])
+    spread = TWO_SIDED_95 * data.study.noise_floor_um
+    bound = {'line': {'width': 0}, 'hoverinfo': 'skip'}
+    traces = [
+        scatter(ends, ends + spread, 'lines', **bound),
+        scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
+                fillcolor='rgba(154,165,177,0.25)'),
+        scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
+    ]  # fmt: skip
+    for name, values, colour in _of_each_model(data, predicted):
+        hover = 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>'
+        marker = {'size': 5.5, 'color': colour, 'opacity': 0.9}
+        traces.append(scatter(measured, values, 'markers', marker=marker, hovertemplate=hover))
+    layout = base_layout(
+        xaxis=axis('measured [µm]', range=[0, top], constrain='domain'),
+        yaxis=axis('predicted [µm]', range=[0, top], scaleanchor='x', constrain='domain'),
+    )
+    legend = [('95 % gauge and texture', BEFORE, 'band'), *_legend(data)]
+    return figure('parity', [chart('', traces, layout, 400)], legend)
+
+
+def _legend(data: ReportData) -> list[tuple[str, str, str]]:
+    return [(name, colour, 'dot') for name, colour in _of_each_model(data)]
+
+
+def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
+    """Name, values and colour of each model."""
+    return zip(data.model_names, *values, data.colours, strict=True)
+
+
+def covariate_figure(data: ReportData) -> dict[str, Any] | None:
+    """Residual against what differs from point to point, the most telling first."""
+    values = _conditions(data)
+    differing = {n for n, v in values.items() if np.ptp(v) > LEAST_SPREAD * np.abs(v).max()}
+    dependences = [d for d in data.comparisons[0].dependences if d.covariate in differing]
+    dependences = dependences[:MOST_COVARIATES]
+    if not dependences:
+        return None
+    reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
+    later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
+    charts = []
+    for dependence in dependences:
+        name = dependence.covariate
+        x_mean, residual_means = _means(values[name], data.residuals_um)
+        traces: list[dict] = []
+        for label, residual, mean, colour in _of_each_model(
+            data, data.residuals_um, residual_means
+        ):
+            traces += [
+                scatter(values[name], residual, 'markers',
+                        marker={'size': 4, 'color': colour, 'opacity': 0.6},
+                        hovertemplate=f'{AT_VALUE}<extra>{label}</extra>'),
+                scatter(x_mean, mean, 'lines', line={'color': colour, 'width': 2.5},
+                        hoverinfo='skip'),
+            ]  # fmt: skip
+        layout = base_layout(
+            xaxis=axis(covariate_label(name), nticks=5),
+            yaxis=zero_axis('residual [µm]', range=[-reach, reach]),
+        )
+        text = f'ρ {dependence.correlation:+.2f}'
+        if data.improved and name in later:
+            text += f' → {later[name]:+.2f}'
+        text += f', {p_words(dependence.p_value)}'
+        charts.append(chart(minus(text), traces, layout, 220))
+    return figure('covariates', charts, _legend(data))
+
+
+def _conditions(data: ReportData) -> dict[str, np.ndarray]:
+    """Covariates of the first model at the points; passes count from 1, as on the 3D part."""
+    values = {c.name: c.values for c in data.study.covariates(data.models[0])}
+    return values | {'spray_pass': values['spray_pass'] + 1.0}
+
+
+def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Means of the covariate, and of each model's residual, over sixths of the readings."""
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    bin_of = np.minimum(np.digitize(x, edges), max(len(edges) - 1, 1))
+    sums = np.array([np.bincount(bin_of, values) for values in (np.ones(len(x)), x, *residuals)])
+    means = sums[1:, sums[0] > 0.0] / sums[0, sums[0] > 0.0]
+    return means[0], means[1:]
+
+
+def history_figure(data: ReportData) -> dict[str, Any] | None:
+    """Errors of each model fitted to this campaign against the gauge's noise."""
+    if data.diagnosis is None or len(data.diagnosis.history) < 2:
+        return None
+    steps = data.diagnosis.history
+    names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
+    bars = [
+        ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
+        ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
+    ]
+    traces = [
+        {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},
+         'texttemplate': '%{y:.2f}', 'textposition': 'inside',
+         'insidetextanchor': 'start', 'textangle': 0, 'insidetextfont': {'color': text},
+         'hovertemplate': name + ': %{y:.2f} µm<extra></extra>'}
+        for name, values, colour, text in bars
+    ]  # fmt: skip
+    floor = data.diagnosis.noise_floor_um
+    top = 1.15 * max(*(max(values) for _, values, _, _ in bars), floor)
+    layout = base_layout(
+        margin={'l': 48, 'r': 64, 't': 8, 'b': 48}, barmode='group',
+        bargap=0.45, bargroupgap=0.06,
+        xaxis=axis('', ticks='', tickangle=0, tickfont={'size': 12, 'color': INK}),
+        yaxis=axis('RMSE [µm]', range=[0, top]),
+        shapes=[{'type': 'line', 'xref': 'paper', 'x0': 0, 'x1': 1, 'y0': floor, 'y1': floor,
+                 'line': {'color': INK, 'width': 1.5, 'dash': 'dash'}}],
+        annotations=[{
+            'xref': 'paper', 'x': 1.01, 'y': floor, 'xanchor': 'left', 'yanchor': 'middle',
+            'showarrow': False, 'text': f'gauge and<br>texture<br>{floor:.2f} µm',
+            'font': {'size': 11, 'color': INK}, 'align': 'left',
+        }],
+    )  # fmt: skip
+    legend = [(name, colour, 'band') for name, _, colour, _ in bars]
+    return figure('history', [chart('', traces, layout, 400)], legend)
+
+
+def unknown_figure(data: ReportData) -> dict[str, Any] | None:
+    """Mean residual along the covariate where the unexplained shows."""
+    unknown = data.diagnosis.unknown if data.diagnosis else None
+    if unknown is None or len(unknown.curve) < 2:
+        return None
+    covariate, y = list(unknown.curve.values())[:2]
+    x = np.add(covariate, 1.0 if unknown.covariate == 'spray_pass' else 0.0)
+    hover = f'{AT_VALUE}<extra></extra>'
+    traces = [
+        scatter(_conditions(data)[unknown.covariate], data.residuals_um[-1], 'markers',
+                hovertemplate=hover, marker={'size': 5, 'color': BEFORE}),
+        scatter(x, np.asarray(y), 'lines', hovertemplate=hover,
+                line={'color': ACCENT, 'width': 2.5}),
+    ]  # fmt: skip
+    layout = base_layout(
+        xaxis=axis(covariate_label(unknown.covariate)), yaxis=zero_axis('residual [µm]')
+    )
+    legend = [('residual of each point', BEFORE, 'dot'), ('smoothed', ACCENT, 'bold')]
+    return figure('unknown', [chart('', traces, layout, 320)], legend)

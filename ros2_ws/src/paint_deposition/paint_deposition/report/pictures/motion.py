@@ -1,0 +1,204 @@
+"""The gun's motion: over its part from three sides, and its speed against the programmed one."""
+
+from pathlib import Path
+from textwrap import fill
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection, TriMesh
+from matplotlib.colors import to_rgb
+from matplotlib.lines import Line2D
+from matplotlib.tri import Triangulation
+
+from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.motion.driven_speed import TOLERANCE, DrivenSpeed
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import box_extent_m
+from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.surface import Surface
+from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
+from paint_deposition.report.pictures.view import View
+from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
+
+PART_COLOUR = '#b8c2cc'
+PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
+WARNING_COLOUR = SLOWER_COLOUR = '#c0392b'
+WIDTH_IN, VIEWS_IN, LINE_IN = 11.5, 7.4, 0.22
+TEXT_COLUMNS = 130
+# Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
+AXIS_SHARE, AXES_APART = 0.09, 0.04
+# Smaller parts of a picture are marked: they would not be seen.
+SMALL = 0.02
+
+
+def write_geometry_picture(
+    path: str | Path, surface: Surface, spray: SprayPath, geometry: SprayGeometry, title: str
+) -> Path:
+    """Draw part and motion from the gun, and from the right and the top of that picture.
+
+    Args:
+        path: PNG to write.
+        surface: the part.
+        spray: the tool path.
+        geometry: its sentence and warnings are written above.
+        title: what to write on top.
+    """
+    front = View.of_front(surface.outward, surface.down)
+    views = (front, front.from_the_right(), front.from_above())
+    lines = [fill(f'warning: {warning}', TEXT_COLUMNS) for warning in geometry.warnings]
+    text_in = LINE_IN * (3.5 + sum(1 + line.count('\n') for line in lines))
+    figure = new_figure(WIDTH_IN, VIEWS_IN + text_in)
+    corners = np.concatenate([surface.vertices_m, spray.position_m])
+    sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
+    grid = figure.add_gridspec(
+        2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
+        height_ratios=_ratios(sizes[0][1], sizes[2][1]),
+    )  # fmt: skip
+    size_m = float(np.linalg.norm(box_extent_m(corners)))
+    places, names = ((0, 0), (0, 1), (1, 0)), ('from the gun', 'from its right', 'from its top')
+    for place, view, name in zip(places, views, names, strict=True):
+        axes = figure.add_subplot(grid[place])
+        _draw(axes, view, surface, spray, size_m)
+        axes.set_title(name, loc='left', fontsize=10, color=MUTED)
+    key = figure.add_subplot(grid[1, 1])
+    key.set_axis_off()
+    key.legend(handles=_key(), loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
+    views_share = VIEWS_IN / (VIEWS_IN + text_in)
+    figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, views_share))
+    top = 1.0 - 0.5 * LINE_IN / (VIEWS_IN + text_in)
+    figure.text(0.02, top, title, va='top', fontsize=13, color=INK)
+    step = LINE_IN / (VIEWS_IN + text_in)
+    figure.text(0.02, top - 1.3 * step, f'{geometry.sentence}.', va='top', fontsize=10, color=INK)
+    figure.text(
+        0.02, top - 2.4 * step, '\n'.join(lines), va='top', fontsize=9, color=WARNING_COLOUR,
+        linespacing=1.4,
+    )  # fmt: skip
+    return save_picture(figure, path)
+
+
+def _ratios(one: float, other: float) -> tuple[float, float]:
+    """Shares of a side for two views, neither of which becomes a sliver."""
+    share = float(np.clip(one / (one + other), 0.3, 0.7))
+    return share, 1.0 - share
+
+
+def _draw(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: float) -> None:
+    _draw_part(axes, view, surface, size_m)
+    on = spray.flow > 0.0
+    colours = [PASS_COLOURS[n % len(PASS_COLOURS)] for n in np.maximum(spray.spray_pass, 0)]
+    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0))
+    numbered = set()
+    for rows in np.split(np.arange(len(spray)), breaks):
+        line = view.flat(spray.position_m[rows])
+        if not on[rows[0]]:
+            axes.plot(*line.T, color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)))
+            continue
+        axes.plot(*line.T, color=colours[rows[0]], linewidth=1.8)
+        number = int(spray.spray_pass[rows[0]])
+        if number not in numbered and len(rows) > 1:
+            numbered.add(number)
+            axes.annotate(
+                str(number + 1), line[0], fontsize=7.5, color='white', ha='center', va='center',
+                bbox={'boxstyle': 'circle,pad=0.2', 'facecolor': colours[rows[0]], 'linewidth': 0},
+            )  # fmt: skip
+    shown = _evenly(spray, AXES_APART * size_m)
+    start = spray.position_m[shown]
+    ends = start + AXIS_SHARE * size_m * spray.rotation[shown, :, 2]
+    axes.add_collection(
+        LineCollection(
+            list(np.stack([view.flat(start), view.flat(ends)], axis=1)), linewidths=0.9,
+            colors=[colours[row] if on[row] else '#c5ccd3' for row in shown],
+        )
+    )  # fmt: skip
+    axes.plot(*view.flat(ends).T, linestyle='', marker='.', markersize=2.5, color=INK)
+    axes.set_aspect('equal', adjustable='datalim')
+    axes.margins(0.06)
+    axes.grid(True, color=GRID, linewidth=0.8)
+    axes.set_axisbelow(True)
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.tick_params(colors=MUTED, labelsize=8)
+    axes.set_xlabel(view.labels[0], color=MUTED, fontsize=9)
+    axes.set_ylabel(view.labels[1], color=MUTED, fontsize=9)
+    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
+    for axis, direction in ((axes.xaxis, view.right), (axes.yaxis, view.up)):
+        if direction[np.abs(direction).argmax()] < 0.0:
+            axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
+
+
+def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
+    normals = face_normals(surface.vertices_m, surface.faces)
+    toward = normals @ view.toward
+    depth = surface.vertices_m[surface.faces].mean(axis=1) @ view.toward
+    order = np.argsort(depth)
+    # The back of a sheet is seen from some sides: it is darker.
+    light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
+    colours = np.clip(np.array(to_rgb(PART_COLOUR)) * light[:, None], 0.0, 1.0)
+    flat = view.flat(surface.vertices_m)
+    triangles = Triangulation(flat[:, 0], flat[:, 1], surface.faces[order])
+    axes.add_collection(TriMesh(triangles, facecolors=colours, edgecolors='none'))
+    axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
+    if np.ptp(flat, axis=0).max() < SMALL * size_m:
+        axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
+        axes.annotate(
+            'the part', flat.mean(axis=0), xytext=(8, 4), textcoords='offset points', fontsize=9,
+            color=INK,
+        )  # fmt: skip
+    axes.update_datalim(flat)
+
+
+def _evenly(spray: SprayPath, apart_m: float) -> np.ndarray:
+    """Rows of the path about so far apart along it."""
+    travel = np.cumsum(spray.dwell_s * spray.speed_m_per_s)
+    return np.unique(np.searchsorted(travel, np.arange(0.5 * apart_m, travel[-1], apart_m)))
+
+
+def _key() -> list[Line2D]:
+    return [
+        Line2D([], [], color=PASS_COLOURS[0], linewidth=1.8, label='gun on, a colour a pass'),
+        Line2D([], [], color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)), label='gun off'),
+        Line2D(
+            [], [], color=PASS_COLOURS[0], linewidth=0.9, marker='.', markersize=4,
+            markerfacecolor=INK, label='tool z from the TCP (the dot is its tip)',
+        ),
+        Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
+    ]  # fmt: skip
+
+
+def write_speed_picture(path: str | Path, speed: DrivenSpeed, title: str) -> Path:
+    """Draw both speeds over the way, pass behind pass, and mark where the robot is slower.
+
+    Args:
+        path: PNG to write.
+        speed: what to draw.
+        title: what to write on top.
+    """
+    figure = new_figure(11.5, 4.2)
+    axes = figure.add_subplot()
+    driven, programmed = speed.driven_m_per_s, speed.programmed_m_per_s
+    for number in range(1, len(speed.passes) + 1):
+        rows = np.flatnonzero(speed.spray_pass == number)
+        way_m = speed.way_m[rows]
+        if number % 2 == 0:
+            axes.axvspan(way_m[0], way_m[-1], color=GRID, alpha=0.6, linewidth=0)
+        first = number == 1
+        axes.plot(
+            way_m, programmed[rows], color=MUTED, linewidth=1.2, linestyle=(0, (4, 2)),
+            label='programmed' if first else None,
+        )  # fmt: skip
+        axes.plot(
+            way_m, driven[rows], color=ACCENT, linewidth=1.4, label='driven' if first else None
+        )
+        axes.fill_between(
+            way_m, driven[rows], programmed[rows], color=SLOWER_COLOUR, alpha=0.35, linewidth=0,
+            where=(driven[rows] < (1.0 - TOLERANCE) * programmed[rows]).tolist(),
+            label=f'more than {100 * TOLERANCE:.0f} % slower' if first else None,
+        )  # fmt: skip
+        axes.annotate(
+            str(number), (0.5 * (way_m[0] + way_m[-1]), 0.0), xytext=(0, 3),
+            textcoords='offset points', ha='center', fontsize=8, color=MUTED,
+        )  # fmt: skip
+    axes.set_xlim(0.0, speed.way_m[-1])
+    axes.set_ylim(0.0, 1.15 * max(driven.max(), programmed.max()))
+    quiet(axes, 'way sprayed, pass behind pass [m]', 'speed of the TCP [m/s]', title)
+    legend(axes, loc='lower right', ncols=3, bbox_to_anchor=(1.0, 1.0))
+    return save_picture(figure, path)

@@ -1,0 +1,220 @@
+"""A recommended index, what evenness costs in paint, and a programme before and after."""
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.patches import Patch
+
+from paint_deposition.film.colour_scales import OVER_RGB, TABLE, UNDER_RGB, ColourScale, film_scale
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.planning.improvement.improvement import Improvement, LaidFilm
+from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
+from paint_deposition.planning.plan import TradeOffPoint
+from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
+from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
+
+PERCENT = 100.0
+POINTS = 600
+CHOSEN = '#c0392b'
+WITHIN_TOLERANCE = '#d9ecf0'
+# The colours span this share of both films about the target, to the next 5 %.
+SHOWN, STEP = 0.98, 0.05
+MOST_CHARTS, SAMPLES = 12, 120
+FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
+
+
+def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
+    """Draw a recommendation: sigma_n over the index, and the film at the recommended one."""
+    figure = new_figure(11.0, 4.4)
+    left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
+    draw_curve(left, recommendation)
+    draw_passes(right, recommendation)
+    return save_picture(figure, path)
+
+
+def draw_curve(axes: Axes, answer: Recommendation) -> None:
+    """Draw sigma_n over the index with its minima, the tolerance and the recommended index."""
+    quiet(axes, 'index [mm]', r'$\sigma_N$ [%]', 'Evenness over the index, eq. (5)')
+    top = 1.08 * PERCENT * float(answer.curve.sigma_n.max())
+    if answer.tolerance is not None:
+        tolerance = PERCENT * answer.tolerance
+        if tolerance < top:
+            axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
+            axes.annotate(
+                f'tolerance {tolerance:g} %', (1.0, tolerance),
+                xycoords=axes.get_yaxis_transform(), ha='right', va='bottom', fontsize=9,
+                color=MUTED,
+            )  # fmt: skip
+        for low, high in answer.windows_m:
+            axes.axvspan(MM * low, MM * high, color=WITHIN_TOLERANCE, linewidth=0.0, zorder=0)
+    axes.plot(
+        MM * answer.curve.index_m, PERCENT * answer.curve.sigma_n, color=ACCENT, linewidth=1.8
+    )
+    for minimum in answer.minima:
+        axes.plot(
+            MM * minimum.index_m, PERCENT * minimum.sigma_n, 'o', markersize=5,
+            markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
+        )  # fmt: skip
+    chosen = MM * answer.index_m, PERCENT * answer.sigma_n
+    axes.plot(*chosen, 'o', color=CHOSEN, markersize=7)
+    axes.annotate(
+        f'{chosen[0]:.0f} mm\n{chosen[1]:.2g} %', chosen, (chosen[0], chosen[1] + 0.2 * top),
+        ha='center', va='bottom', color=CHOSEN, fontsize=10, fontweight='bold',
+        arrowprops={'arrowstyle': '-', 'color': CHOSEN, 'linewidth': 0.9, 'shrinkB': 5},
+    )  # fmt: skip
+    axes.set_xlim(MM * answer.index_range_m[0], MM * answer.index_range_m[1])
+    axes.set_ylim(0.0, top)
+
+
+def draw_passes(axes: Axes, answer: Recommendation) -> None:
+    """Draw the film of passes at the recommended index, each alone and all together."""
+    quiet(
+        axes, 'across the passes [mm]', 'film [µm]',
+        f'Passes at {MM * answer.index_m:.0f} mm and {answer.speed_m_per_s:.3g} m/s, eq. (4)',
+    )  # fmt: skip
+    parallel, index = answer.curve.parallel, answer.index_m
+    x = np.linspace(-1.5 * index, 1.5 * index, POINTS)
+    for number in range(-4, 5):
+        one = parallel.second if number % 2 else parallel.first
+        film = one.thickness_um(x - number * index)
+        if film.max() > 1e-3 * answer.mean_um:
+            axes.plot(
+                MM * x, film, color=MUTED, linewidth=1.0, alpha=0.8,
+                label='single pass' if number == 0 else None,
+            )  # fmt: skip
+    total = parallel.thickness_um(index, x)
+    axes.plot(MM * x, total, color=ACCENT, linewidth=1.8, label='sum of passes')
+    axes.axhline(
+        answer.mean_um, color=INK, linewidth=0.9, linestyle='--',
+        label=f'mean {answer.mean_um:.1f} µm',
+    )  # fmt: skip
+    axes.set_xlim(MM * x[0], MM * x[-1])
+    axes.set_ylim(0.0, 1.25 * float(total.max()))
+    legend(axes, loc='upper right', ncols=3)
+
+
+def write_trade_off(
+    path: str | Path, given: TradeOffPoint, points: Sequence[TradeOffPoint]
+) -> Path:
+    """Draw unevenness over paint for a programme as given and for each weight."""
+    figure = new_figure(7.0, 4.6)
+    axes = figure.subplots()
+    quiet(axes, 'paint sprayed [cm³]', r'$\sigma_N$ [%]', 'What evenness costs in paint')
+    order = sorted(points, key=lambda point: point.paint_cm3)
+    axes.plot(
+        [p.paint_cm3 for p in order], [100.0 * p.sigma_n for p in order], 'o-', color=ACCENT,
+        linewidth=1.6, markersize=6,
+    )  # fmt: skip
+    axes.plot(given.paint_cm3, 100.0 * given.sigma_n, 's', color=BEFORE, markersize=8)
+    axes.annotate(
+        f'as given, {given.cycle_time_s:.1f} s', (given.paint_cm3, 100.0 * given.sigma_n),
+        xytext=(8, 6), textcoords='offset points', fontsize=9, color=INK,
+    )  # fmt: skip
+    for point in order:
+        axes.annotate(
+            f'{point.paint_weight:g}: {point.passes} passes, {point.cycle_time_s:.1f} s',
+            (point.paint_cm3, 100.0 * point.sigma_n), xytext=(8, -3),
+            textcoords='offset points', fontsize=8, color=MUTED,
+        )  # fmt: skip
+    axes.set_ylim(bottom=0.0)
+    axes.margins(x=0.2)
+    return save_picture(figure, path)
+
+
+def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
+    """Draw the film before and after in one scale; below, the speeds along the passes."""
+    part = PartPicture.of(result.surface)
+    windows = [part.window(path) for path in result.paths]
+    low = np.minimum(windows[0][0], windows[1][0])
+    high = np.maximum(windows[0][1], windows[1][1])
+    openings = result.retiming.programme.openings[:MOST_CHARTS]
+    columns = min(len(openings), 4)
+    rows = math.ceil(len(openings) / columns)
+    width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
+    above, below = height + AROUND_IN[1], rows * CHART_IN[1]
+    figure = new_figure(max(2.0 * width + AROUND_IN[0], 10.0), above + below)
+    top, bottom = figure.subfigures(2, 1, height_ratios=[above, below])
+    axes = top.subplots(1, 2, sharex=True, sharey=True)
+    scale = _scale(result)
+    films = zip(axes, result.paths, (result.before, result.after), strict=True)
+    for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
+        part.dress(one, low, high)
+        _draw_film(one, part, scale, driven, laid)
+        one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
+    axes[1].set_ylabel('')
+    bar = top.colorbar(
+        ScalarMappable(
+            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
+        ),
+        ax=axes, location='bottom', shrink=0.4, aspect=40, pad=0.04,
+    )  # fmt: skip
+    bar.set_label('film [µm]', color=MUTED)
+    bar.outline.set_visible(False)
+    top.legend(
+        handles=[
+            Patch(color='#{:02x}{:02x}{:02x}'.format(*rgb), label=f'{side} {end:.3g} µm')
+            for rgb, side, end in (
+                (OVER_RGB, 'above', scale.high), (UNDER_RGB, 'below', scale.low)
+            )
+        ],
+        loc='outside lower right', frameon=False, fontsize=8.5, ncols=2,
+    )  # fmt: skip
+    charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
+    for chart in charts.ravel()[len(openings) :]:
+        chart.set_axis_off()
+    programmes = result.retiming.given, result.retiming.programme
+    for number, chart in enumerate(charts.ravel()[: len(openings)]):
+        _draw_speeds(chart, number, programmes)
+    charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
+    legend(charts[0, 0], loc='best')
+    return save_picture(figure, path)
+
+
+def _scale(result: Improvement) -> ColourScale:
+    target = result.target_um
+    off = [
+        np.abs(one.film_um[result.target_region] / target - 1.0)
+        for one in (result.before, result.after)
+    ]
+    reach = float(np.quantile(np.concatenate(off), SHOWN))
+    reach = min(max(math.ceil(reach / STEP) * STEP, 2.0 * STEP), 0.95)
+    film = np.concatenate([result.before.film_um, result.after.film_um])
+    return film_scale(film, target * (1.0 - reach), target * (1.0 + reach))
+
+
+def _draw_film(
+    axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: LaidFilm
+) -> None:
+    seen = part.spread(laid.film_um)
+    part.draw_pixels(axes, scale.rgba(seen, seen > 1.0))
+    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
+    draw_tool_path(axes, path, part.view, low, high)
+
+
+def _title(name: str, laid: LaidFilm) -> str:
+    return (
+        f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
+        f'{laid.min_um:.1f} to {laid.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
+        f'{laid.cycle_s:.1f} s'
+    )
+
+
+def _draw_speeds(axes: Axes, number: int, programmes: tuple[Programme, Programme]) -> None:
+    """The speeds along an opening of the gun, over the path from where it first opened."""
+    openings: list[Opening] = [programme.openings[number] for programme in programmes]
+    origin = openings[0].on_m
+    for programme, opening, colour, name in zip(
+        programmes, openings, (BEFORE, ACCENT), ('before', 'after'), strict=True
+    ):
+        places = np.linspace(opening.on_m, opening.off_m, SAMPLES + 1)
+        middle = 0.5 * (places[1:] + places[:-1]) - origin
+        axes.plot(middle, speed_along(programme, places), color=colour, linewidth=1.6, label=name)
+    quiet(axes, 'along the pass [m]', 'speed [m/s]' if number % 4 == 0 else '',
+          f'pass {number + 1}', size=9.0)  # fmt: skip

@@ -1,0 +1,157 @@
+"""What readings say of a model on disk: figures, residuals, the fitted model and the report."""
+
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.gauge_readings import write_table
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.meshes import write_mesh_ply
+from paint_deposition.files.model_file import ModelFile
+from paint_deposition.files.provenance import origin
+from paint_deposition.film.colour_scales import residual_scale
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.comparison.residual_field import spread_over_surface
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
+from paint_deposition.inference.fitting.calibration import Calibration
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.page.report import write_report
+from paint_deposition.report.pictures.inference import (
+    write_calibration_pictures,
+    write_comparison_picture,
+)
+from paint_deposition.report.writers.fitted_model import write_fitted
+from paint_deposition.report.writers.write import written
+
+
+@written.register
+def _write_calibration(
+    result: Calibration, folder: Path, start: ModelFile | None = None, pictures: str = 'png'
+) -> list[Path]:
+    model_file, figures = folder / 'model.yaml', folder / 'calibration.json'
+    study = result.study
+    names = ', '.join(experiment.name for experiment in study.campaign.experiments)
+    header = [
+        f'Calibrated on {len(study)} points ({names}).',
+        *(f'Mind: {warning}.' for warning in result.warnings),
+    ]
+    step = Step.of(study, '', result.fit)
+    write_fitted(model_file, study, [step], start, '\n'.join(header))
+    write_json(figures, result.to_dict() | _provenance(study, result.model))
+    return [model_file, figures, *write_calibration_pictures(folder, result, pictures)]
+
+
+@written.register
+def _write_comparison(result: Comparison, folder: Path, pictures: str = 'png') -> list[Path]:
+    figures = result.to_dict()
+    return _write_results(folder, 'comparison.json', figures, ReportData.of(result), pictures)
+
+
+@written.register
+def _write_side_by_side(result: SideBySide, folder: Path, pictures: str = 'png') -> list[Path]:
+    data = ReportData.of(result)
+    models = {name: comparison.model for name, comparison in result.by_name.items()}
+    figures = folder / 'comparison.json'
+    write_json(figures, result.to_dict() | _provenance(data.study, models))
+    files = [figures, write_comparison_picture(folder / f'comparison.{pictures}', data)]
+    for name, comparison in result.by_name.items():
+        files.append(folder / f'residuals_{file_name(name)}.csv')
+        write_table(files[-1], _residual_rows(comparison))
+    return [*files, write_report(folder / 'report.html', data)]
+
+
+@written.register
+def _write_diagnosis(
+    result: Diagnosis, folder: Path, start: ModelFile | None = None, pictures: str = 'png'
+) -> list[Path]:
+    start = start or ModelFile(result.history[0].model)
+    models = [folder / 'model_before.yaml', folder / 'model.yaml']
+    write_fitted(models[0], result.study, result.history[:1], start)
+    write_fitted(models[1], result.study, result.history, start)
+    data = ReportData.of(result, start.history)
+    return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)
+
+
+def _provenance(
+    study: Study, model: DepositionModel | Mapping[str, DepositionModel]
+) -> dict[str, Any]:
+    campaign = study.campaign
+    files = {'start model': campaign.model_file or ''}
+    for experiment in campaign.experiments:
+        files |= {f'{experiment.name}: {kind}': file for kind, file in experiment.files.items()}
+    name = campaign.name if Path(campaign.name).is_file() else ''
+    return {'provenance': origin(model, files, name)}
+
+
+def _write_results(
+    folder: Path, name: str, figures: dict[str, Any], data: ReportData, pictures: str
+) -> list[Path]:
+    """Figures, the last model's residuals as a table and as meshes, picture and report."""
+    last = data.comparisons[-1]
+    files = [folder / name, folder / 'residuals.csv']
+    write_json(files[0], figures | _provenance(last.study, last.model))
+    write_table(files[1], _residual_rows(last))
+    return [
+        *files,
+        write_comparison_picture(folder / f'comparison.{pictures}', data),
+        write_report(folder / 'report.html', data),
+        *write_residual_meshes(folder, last),
+    ]
+
+
+def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
+    """A heading and a row a reading; those that were left out are without a prediction."""
+    yield (
+        'experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
+        'residual_um', 'sigma_um', 'used',
+    )  # fmt: skip
+    found = comparison.readings
+    fitted = zip(found.predicted_um, found.residual_um, found.sigma_um, strict=True)
+    for experiment in comparison.study.campaign.experiments:
+        readings = experiment.taken
+        for k, used in enumerate(experiment.used):
+            yield [
+                experiment.name,
+                str(readings.point[k]),
+                str(readings.group[k]),
+                *(f'{value:.5f}' for value in readings.positions_m[k]),
+                f'{readings.thickness_um[k]:.3f}',
+                *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
+                str(int(used)),
+            ]
+
+
+def write_residual_meshes(folder: Path, comparison: Comparison) -> list[Path]:
+    """Write ``residual_<experiment>.ply``: vertex colours and property ``residual_um``.
+
+    Residual = measured minus predicted, interpolated between readings; grey and NaN where no
+    reading is near. All experiments share one scale of colours.
+    """
+    campaign = comparison.study.campaign
+    fields = []
+    for number, experiment in enumerate(campaign.experiments):
+        at = experiment.measured_points
+        residual_um = comparison.points.residual_um[campaign.experiment_of == number]
+        surface = experiment.surface
+        fields.append(spread_over_surface(surface, at.positions_m, at.normals, residual_um))
+    everything = np.concatenate(fields)
+    scale = residual_scale(everything[np.isfinite(everything)])
+    paths: list[Path] = []
+    for experiment, field in zip(campaign.experiments, fields, strict=True):
+        path = folder / f'residual_{file_name(experiment.name)}.ply'
+        if path in paths:
+            path = path.with_stem(f'{path.stem}_{len(paths) + 1}')
+        colours = scale.rgba(field, np.isfinite(field))
+        write_mesh_ply(path, experiment.surface, colours, residual_um=field)
+        paths.append(path)
+    return paths
+
+
+def file_name(name: str) -> str:
+    """An experiment's name without what file systems do not like."""
+    return re.sub(r'[^\w.-]+', '_', name).strip('._') or 'experiment'

@@ -1,0 +1,89 @@
+"""Options of a command from the model of its request."""
+
+import math
+from typing import Literal
+
+import click
+import pytest
+from click.testing import CliRunner
+
+from paint_deposition.cli.options_of import options_of
+from paint_deposition.errors import PlanError
+from paint_deposition.request import Request, given, takes
+
+
+class Coat(Request):
+    speed_m_per_s: float = given(0.3, 'Of the passes [m/s].', '--speed', above=0.0, most=3.0)
+    passes: int | None = given(None, 'How many.', least=1)
+    lean_rad: float = given(0.0, 'Of the gun.', least=-math.pi / 4, most=math.pi / 4)
+    outward: tuple[float, float, float] | None = given(None, 'To the gun.', metavar='X Y Z')
+    direction: Literal['level', 'upright'] = given('level', 'Of the passes.')
+    one_way: bool = given(False, 'All passes in one direction.')
+
+
+@click.command()
+@options_of(Coat, into='coat')
+def command(coat):
+    click.echo(repr(coat))
+
+
+def run(*words):
+    return CliRunner().invoke(command, [str(word) for word in words])
+
+
+def test_each_field_is_an_option_and_the_command_gets_the_request():
+    words = ('--speed', 0.5, '--passes', 3, '--lean-deg', 30, '--outward', 0, -1, 0)
+    done = run(*words, '--direction', 'upright', '--one-way')
+    expected = Coat(
+        speed_m_per_s=0.5, passes=3, lean_rad=math.radians(30), outward=(0, -1, 0),
+        direction='upright', one_way=True,
+    )  # fmt: skip
+    assert done.output.strip() == repr(expected)
+    assert run().output.strip() == repr(Coat())
+
+
+def test_help_shows_text_default_and_bounds():
+    text = ' '.join(run('--help').output.split())
+    assert '--speed FLOAT RANGE Of the passes [m/s]. [default: 0.3; 0.0<x<=3.0]' in text
+    assert '--outward X Y Z' in text
+    assert '--direction [level|upright]' in text
+
+
+@pytest.mark.parametrize(
+    ('words', 'said'),
+    [
+        (('--speed', 0), '--speed'),
+        (('--speed', 'nan'), 'nan is not finite'),
+        (('--lean-deg', 50), '--lean-deg'),
+        (('--outward', 1, 2), '--outward'),
+    ],
+)
+def test_what_is_out_of_bounds_is_refused_by_the_name_of_its_option(words, said):
+    done = run(*words)
+    assert done.exit_code == 2
+    assert said in done.output
+
+
+@pytest.mark.parametrize(
+    ('values', 'said'),
+    [
+        ({'speed_m_per_s': -1.0}, 'speed_m_per_s is -1; give a number above 0'),
+        ({'direction': 'up'}, "direction is 'up'; give 'level' or 'upright'"),
+        ({'speed': 0.4}, "speed is no option here; did you mean 'speed_m_per_s'"),
+    ],
+)
+def test_a_script_is_refused_by_the_name_of_the_field(values, said):
+    with pytest.raises(PlanError, match=said):
+        Coat(**values)
+
+
+def test_a_verb_shows_the_fields_of_its_request():
+    @takes(Coat)
+    def spray(model, *, frame_id='part', **wanted):
+        return Coat(**wanted)
+
+    import inspect
+
+    shown = inspect.signature(spray)
+    assert list(shown.parameters)[:3] == ['model', 'frame_id', 'speed_m_per_s']
+    assert shown.parameters['speed_m_per_s'].default == 0.3

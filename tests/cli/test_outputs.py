@@ -1,0 +1,76 @@
+"""What commands print as JSON; `cli.command` holds every output against `report/outputs.py`."""
+
+import json
+
+import click
+import pytest
+from pydantic import ValidationError
+
+from booth import SAMPLES
+from cli.command import KINDS, installed_paint, paint
+from paint_deposition.cli.main import COMMANDS, Commands
+from paint_deposition.files.provenance import sha256
+from paint_deposition.report.outputs import OUTPUTS
+
+BAG = SAMPLES / 'door_horizontal'
+
+
+def test_every_command_that_prints_json_has_its_model():
+    commands, context = Commands(), click.Context(Commands())
+    printing = {
+        name
+        for name in COMMANDS
+        if any('--json' in option.opts for option in commands.get_command(context, name).params)
+    }
+    assert printing == set(KINDS)
+    assert set(KINDS.values()) < set(OUTPUTS)
+
+
+def test_provenance_names_each_file_with_its_digest():
+    told = json.loads(paint('inspect', BAG, '--json').stdout)
+    (file,) = told['provenance']['files']
+    assert file == {'what': 'recording', 'file': str(BAG), 'sha256': sha256(BAG)}
+
+
+def test_a_digest_changes_with_content_and_with_names(tmp_path):
+    (tmp_path / 'a').write_text('film')
+    first = sha256(tmp_path)
+    (tmp_path / 'a').rename(tmp_path / 'b')
+    renamed = sha256(tmp_path)
+    (tmp_path / 'b').write_text('films')
+    assert len({first, renamed, sha256(tmp_path)}) == 3
+
+
+def test_a_wrong_or_missing_figure_is_refused():
+    figures = json.loads(paint('inspect', BAG, '--json').stdout)
+    figures['topics'][0]['message_count'] = 'many'
+    del figures['triggers']
+    with pytest.raises(ValidationError, match='2 validation errors'):
+        OUTPUTS['recording'].model_validate(figures)
+
+
+@pytest.mark.slow
+def test_models_side_by_side(tmp_path, repository):
+    start, other = repository / 'config/model.yaml', tmp_path / 'other.yaml'
+    other.write_text(start.read_text().replace('K1_cm3_per_s: 1.9', 'K1_cm3_per_s: 2.4'))
+    done = installed_paint(
+        'compare', SAMPLES / 'measured_door/unseen.yaml', '--model', start, '--model', other,
+        '--json', '-o', tmp_path / 'out',
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    errors = {one['name']: one['rmse_um'] for one in told['models']}
+    assert list(errors) == ['model', 'other']
+    assert told['best'] == min(errors, key=errors.get)
+    assert told['provenance']['models']['other']['planar']['K1_cm3_per_s'] == 2.4
+    page = (tmp_path / 'out/report.html').read_text(encoding='utf-8')
+    assert f'{told["best"]} is nearest to the readings' in page
+    assert (tmp_path / 'out/residuals_other.csv').is_file()
+
+
+def test_a_model_given_twice_is_refused(tmp_path, repository):
+    model = repository / 'config/model.yaml'
+    twice = ('--model', model) * 2
+    done = paint('compare', repository / 'config/campaign.yaml', *twice, '-o', tmp_path / 'out')
+    assert done.returncode == 2
+    assert 'given twice' in done.stderr

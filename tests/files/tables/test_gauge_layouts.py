@@ -1,0 +1,323 @@
+"""Files as gauges, robots and spreadsheets write them.
+
+The layouts follow what the makers' manuals and programs show: lines about the batch, a table with
+units in its headings or in a column of its own, and the statistics of the batch below it.
+"""
+
+from __future__ import annotations
+
+from contextlib import suppress
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.files.gauge_readings import read_readings, write_predictions
+from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.part.surface import Surface
+from surfaces import triangulated
+from workbook import open_document, open_row, write_workbook
+
+POINTS_M = np.array([[0.1, 0.0, 0.05], [0.1, 0.0, 0.2], [0.25, 0.0, 0.35]])
+
+# Unit in a column of its own; time of each reading; statistics behind their names.
+ELCOMETER = """Batch Name:,DOOR LH 17
+Gauge:,Elcometer 456
+Probe:,"Scale 1, F"
+Date:,12/03/2026
+
+Reading No.,Point,X (mm),Y (mm),Z (mm),Reading,Units,Date,Time,Notes
+1,A1,100,0,50,21.5,µm,12/03/2026,08:15:02,
+2,A1,100,0,50,22.1,µm,12/03/2026,08:15:07,
+3,A2,100,0,200,24.0,µm,12/03/2026,08:15:30,"left, near hinge"
+4,A3,250,0,350,,µm,12/03/2026,08:15:41,lift off
+5,A3,250,0,350,19.4,µm,12/03/2026,08:15:44,
+
+Statistics
+Number of Readings,4
+Mean,21.75,µm
+Standard Deviation,1.87,µm
+Coefficient of Variation,8.6,%
+Lowest Reading,19.4,µm
+Highest Reading,24.0,µm
+"""
+
+# German Windows: cp1252, tabs, decimal comma, blocks of repeats side by side.
+FISCHER = (
+    'FISCHER DataCenter\r\n'
+    'Applikation:\tLack/Stahl 7\r\n'
+    'Datum:\t12.03.2026\r\n'
+    'Messstelle\tX [mm]\tY [mm]\tZ [mm]\tSchichtdicke 1 [µm]\tSchichtdicke 2 [µm]\r\n'
+    'A1\t100,0\t0,0\t50,0\t21,5\t22,1\r\n'
+    'A2\t100,0\t0,0\t200,0\t24,0\t----\r\n'
+    'A3\t250,0\t0,0\t350,0\t19,4\t\r\n'
+    '\r\n'
+    'n =\t\t\t\t4\r\n'
+    'Mittelwert\t\t\t\t21,75\r\n'
+    'Std.-Abw.\t\t\t\t1,87\r\n'
+    'Variationskoeff.\t\t\t\t8,6\r\n'
+    'Min\t\t\t\t19,4\r\n'
+    'Max\t\t\t\t24,0\r\n'
+)  # fmt: skip
+
+# Summary before the readings; unit of all in a line of its own; label of a point in the notes.
+POSITECTOR = """"PosiSoft Desktop"
+"Batch Name","B1"
+"Probe Type","6000 FS1"
+"Units","mils"
+"Summary"
+"Average","0.856"
+"Std. Dev.","0.074"
+"Minimum","0.764"
+"Maximum","0.945"
+"Count","4"
+
+"#","Thickness","Date","Time","Point"
+"1","0.8465","3/12/2026","8:15 AM","A1"
+"2","0.8701","3/12/2026","8:15 AM","A1"
+"3","0.9449","3/12/2026","8:16 AM","A2"
+"4","0.7638","3/12/2026","8:16 AM","A3"
+"""
+POINTS = 'Name;X;Y;Z;Bemerkung\nA1;100,0;1,5;50,0;\nA2;100,0;1,5;200,0;\nA3;250,0;1,5;350,0;\n'
+
+# A measuring robot's list: aligned by blanks, nominal and measured places, the normal.
+ROBOT = """ROBOT CELL 4 / PART 1187-L
+ID        X_NOM     Y_NOM     Z_NOM    X_ACT     Y_ACT     Z_ACT      DFT
+A1      100.000     0.000    50.000   100.000     0.000    50.000    21.50
+A1      100.000     0.000    50.000   100.000     0.000    50.000    22.10
+A2      100.000     0.000   200.000   100.000     0.000   200.000    24.00
+A3      250.000     0.000   350.000   250.000     0.000   350.000    19.40
+END OF LIST
+"""
+
+
+@pytest.fixture
+def file(tmp_path):
+    """`file(name, text)`: the path of a new file."""
+
+    def write(name: str, text: str, encoding: str = 'utf-8'):
+        path = tmp_path / name
+        path.write_bytes(text.encode(encoding))
+        return path
+
+    return write
+
+
+def require_the_four_readings(readings, within_um=1e-9):
+    """All layouts tell of the same four readings at the same three points."""
+    assert readings.thickness_um == pytest.approx([21.5, 22.1, 24.0, 19.4], abs=within_um)
+    assert readings.point.tolist() == ['A1', 'A1', 'A2', 'A3']
+    assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
+
+
+def test_elcometer(file):
+    readings = read_readings(file('batch.csv', ELCOMETER, 'utf-8-sig'))
+    require_the_four_readings(readings)
+    assert readings.understood == (
+        "batch.csv: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from 'Reading'; "
+        'left out: 1 row without a reading, 7 rows of statistics'
+    )
+
+
+def test_fischer(file):
+    path = file('panel.txt', FISCHER, 'cp1252')
+    readings = read_readings(path)
+    require_the_four_readings(readings)
+    assert 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm' in readings.understood
+    assert '6 rows of statistics' in readings.understood
+    written = path.with_name('predicted.csv')
+    write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
+    lines = written.read_text().splitlines()
+    assert lines[1] == 'A1,"100,0","0,0","50,0","21,5","22,1",1.0000'
+    assert len(lines) == 4
+
+
+def test_positector_with_a_list_of_points(file):
+    readings = read_readings(file('B1.csv', POSITECTOR), file('points.csv', POINTS))
+    assert readings.positions_m[:, 1] == pytest.approx(0.0015)
+    readings.positions_m[:, 1] = 0.0
+    require_the_four_readings(readings, within_um=2e-3)
+    assert "of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by 'Point'" in (
+        readings.understood
+    )
+    assert "thickness in mil from 'Thickness'" in readings.understood
+
+
+def test_spreadsheet(tmp_path):
+    """Title rows, numbers as numbers and as text with a comma, a second sheet without readings."""
+    rows = [
+        ['Türaußenhaut, Los 17'],
+        [],
+        [None, 'Messpunkt', 'X', 'Y', 'Z', 'Lackschichtdicke', 'i.O.?'],
+        [None, None, 'mm', 'mm', 'mm', 'µm'],
+        [None, 'A1', 100, 0, 50, 21.5, 'ja'],
+        [None, 'A1', 100, 0, 50, '22,1', 'ja'],
+        [None, 'A2', 100, 0, 200, 24, 'ja'],
+        [None, 'A3', 250, 0, 350, '19,4', 'nein'],
+        [None, 'Mittelwert', None, None, None, 21.75],
+    ]
+    path = tmp_path / 'tuer.xlsx'
+    write_workbook(path, {'Deckblatt': [['Kunde', 'Werk 3']], 'Messung': rows})
+    readings = read_readings(path)
+    require_the_four_readings(readings)
+    assert "sheet 'Messung'" in readings.understood
+    twice = tmp_path / 'twice.xlsx'
+    write_workbook(twice, {'left': rows, 'right': rows})
+    with pytest.raises(ReadingsError, match="tables in sheet 'left' and sheet 'right'; name one"):
+        read_readings(twice)
+    require_the_four_readings(read_readings(twice, layout=Layout(sheet='right')))
+
+
+def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
+    """As LibreOffice writes it: empty cells and rows to the end of the sheet."""
+    rows = [
+        ('Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Lackschichtdicke [µm]'),
+        ('A1', 100.0, 0.0, 50.0, 21.5),
+        ('A1', 100.0, 0.0, 50.0, 22.1),
+        ('A2', 100.0, 0.0, 200.0, 24.0),
+        ('A3', 250.0, 0.0, 350.0, 19.4),
+    ]
+    rest = open_row(rows=1_048_571, empty=16_384)
+    path = tmp_path / 'tuer.ods'
+    path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
+    require_the_four_readings(read_readings(path))
+
+
+def test_measuring_robot(file):
+    readings = read_readings(file('list.txt', ROBOT, 'utf-16'))
+    require_the_four_readings(readings)
+    assert 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350)' in (
+        readings.understood
+    )
+    assert 'thickness in µm (no unit is given)' in readings.understood
+
+
+def test_a_list_of_points_needs_no_headings(file):
+    listed = 'A1 100.0 0.0 50.0 0 -1 0\nA2 100.0 0.0 200.0 0 -1 0\nA3 250.0 0.0 350.0 0 -1 0\n'
+    readings = read_readings(file('B1.csv', POSITECTOR), file('points.txt', listed))
+    require_the_four_readings(readings, within_um=2e-3)
+    assert readings.normals[0].tolist() == [0.0, -1.0, 0.0]
+
+
+def test_readings_in_order_belong_to_points_numbered_from_one(file):
+    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0,0,0\n')
+    readings = read_readings(file('b.txt', 'DFT\n20.5\n21\n'), listed)
+    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.2], [0.3, 0.0, 0.4]]
+    assert '1 of them without a reading: 3' in readings.understood
+
+
+@pytest.mark.parametrize(
+    'text', ['DFT\n20.5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n']
+)
+def test_a_missing_reading_keeps_its_number(file, text):
+    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0.5,0,0\n')
+    readings = read_readings(file('b.csv', text), listed)
+    assert readings.positions_m[:, 0].tolist() == [0.1, 0.5]
+    assert 'without a reading: 2' in readings.understood
+    assert '1 row without a reading' in readings.understood
+
+
+def test_points_that_are_not_listed_are_named_all_at_once(file):
+    text = 'point,DFT\nA1,20\nB7,21\nB8,22\n'
+    with pytest.raises(ReadingsError, match=r"line 3: no point 'B7' in .* line 4: no point 'B8'"):
+        read_readings(file('b.csv', text), file('points.csv', POINTS))
+    twice = POINTS + 'A1;0,0;0,0;0,0;\n'
+    with pytest.raises(ReadingsError, match="line 5: point 'A1' is elsewhere in line 2"):
+        read_readings(file('b.csv', text), file('twice.csv', twice))
+
+
+@pytest.mark.parametrize(
+    ('heading', 'um'),
+    [
+        ('DFT [mil]', 25.4), ('Film build (mils)', 25.4), ('Dicke in mm', 1000.0),
+        ('thickness', 1.0),
+        ('Trockenschichtdicke [um]', 1.0), ('[µm]', 1.0),
+    ],
+)  # fmt: skip
+def test_headings_of_the_film_in_english_and_german(file, heading, um):
+    text = f'Punkt;x [m];y [m];z [m];{heading};Soll [µm];Std [µm]\nP;0;0;0;1,5;30;2\n'
+    assert read_readings(file('a.csv', text)).thickness_um.tolist() == [1.5 * um]
+
+
+def test_columns_unit_and_decimals_can_be_named(file):
+    path = file('a.csv', 'a;b;c;clear;base\n1,000;2;3;4,000;9\n')
+    layout = Layout(
+        columns={'x': 'a', 'y': 'b', 'z': 3, 'thickness': 'clear'},
+        unit={'position': 0.0254, 'thickness': 25.4e-6},
+        decimal=',',
+    )
+    readings = read_readings(path, layout=layout)
+    assert readings.positions_m[0] == pytest.approx([0.0254, 0.0508, 0.0762], abs=1e-12)
+    assert readings.thickness_um == pytest.approx([101.6])
+    with pytest.raises(
+        ReadingsError, match="'1,000' in line 2 may have a decimal comma or a comma"
+    ):
+        read_readings(path, layout=Layout(columns=layout.columns, unit=layout.unit))
+    with pytest.raises(
+        ReadingsError, match=r"no column 'clea' for thickness .*did you mean 'clear'"
+    ):
+        read_readings(path, layout=Layout(columns={'thickness': 'clea'}))
+
+
+def test_thousands_are_told_from_decimals(file):
+    text = 'x [mm];y [mm];z [mm];DFT [µm]\n1.250,5;0,0;-1.000,0;20,25\n'
+    readings = read_readings(file('a.csv', text))
+    assert readings.positions_m.tolist() == [[1.2505, 0.0, -1.0]]
+    mixed = 'x [mm];y [mm];z [mm];DFT [µm]\n1.25;0;0;20,25\n'
+    with pytest.raises(ReadingsError, match=r"point \('1.25' in line 2\) .*comma \('20,25' in"):
+        read_readings(file('mixed.csv', mixed))
+
+
+def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
+    """On an upright panel whose outward side is -y, left is -x and the height is z."""
+    sheet = triangulated(lambda x, z: 0.0 * x, 0.05, half_width_m=0.3, half_height_m=0.2)
+    panel = Surface.from_triangles(*sheet, max_edge_length_m=0.1)
+    path = file('a.csv', 'Point;from left [mm];height [mm];DFT [µm]\nA;100;50;20\nB;580;390;21\n')
+    readings = read_readings(path, surface=panel)
+    low = np.array([-0.3, 0.0, -0.2])
+    assert readings.positions_m == pytest.approx(
+        low + np.array([[0.1, 0.0, 0.05], [0.58, 0.0, 0.39]]), abs=1e-6
+    )
+    beside = file('b.csv', 'from left [mm];height [mm];DFT [µm]\n610;50;20\n')
+    with pytest.raises(ReadingsError, match=r'line 2: 0\.610 m from the left .* is no surface'):
+        read_readings(beside, surface=panel)
+    with pytest.raises(
+        ReadingsError, match=r'are places on a face; .*name the file in a campaign'
+    ):
+        read_readings(path)
+
+
+def refused_or_read(path):
+    with suppress(ReadingsError):
+        assert len(read_readings(path)) > 0
+
+
+@settings(max_examples=150, deadline=None)
+@given(data=st.data())
+def test_no_damaged_file_is_worse_than_refused(tmp_path_factory, data):
+    text = data.draw(st.sampled_from([ELCOMETER, FISCHER, POSITECTOR, ROBOT]))
+    start = data.draw(st.integers(0, len(text)))
+    stop = data.draw(st.integers(start, min(len(text), start + 30)))
+    put = data.draw(st.text('x,;\t"\r\n0123.-#µ[]=', max_size=12))
+    path = tmp_path_factory.mktemp('fuzz') / 'any.txt'
+    path.write_bytes((text[:start] + put + text[stop:]).encode())
+    refused_or_read(path)
+
+
+def test_rows_with_coordinates_are_points_whatever_their_labels(file):
+    """Compass points and letters beside statistics are no statistics where they have a place."""
+    labels = ['E', 'N', 'W', 'S', 'R', 'X', 'V']
+    rows = [f'{label};{k};0;1;{20 + k}' for k, label in enumerate(labels)]
+    text = '\n'.join(['Punkt;x [m];y [m];z [m];DFT [µm]', *rows, 'Mean;;;;23', 's;;;;2', 'n;;;;7'])
+    readings = read_readings(file('a.csv', text))
+    assert readings.point.tolist() == labels
+    assert '3 rows of statistics' in readings.understood
+
+
+def test_labels_of_listed_points_are_no_statistics(file):
+    listed = file('points.csv', 'point,x_m,y_m,z_m\n' + 'N,0,0,0\nS,1,0,0\nX,2,0,0\n')
+    text = 'point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n'
+    readings = read_readings(file('a.csv', text), listed)
+    assert readings.point.tolist() == ['N', 'S', 'X']

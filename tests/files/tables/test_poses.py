@@ -1,0 +1,206 @@
+"""Tables of poses as robots and loggers write them: one motion in many layouts."""
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.motion.programmed import PROGRAMMED
+
+# A gun that sways while it goes, and is on in the middle.
+TIMES_S = np.array([0.0, 0.02, 0.041, 0.06, 0.0805])
+POSITIONS_M = np.array(
+    [
+        [1.2, -0.25, 0.9],
+        [1.21, -0.251, 0.9],
+        [1.22, -0.25, 0.91],
+        [1.232, -0.25, 0.9],
+        [1.24, 0, 1],
+    ]
+)
+TURNS = Rotation.from_euler(
+    'ZYX', [[10, -20, 170], [12, -18, 175], [15, -15, 179], [20, -10, 170], [25, 5, 160]], True
+)
+ON = [0, 1, 1, 0, 0]
+
+
+def table(headings: str, *columns, separator: str = ',', decimal: str = '.') -> str:
+    """The text of a table of these columns, each (N,) or (N, C)."""
+    rows = np.column_stack(columns)
+    lines = [separator.join(f'{value:.9f}'.replace('.', decimal) for value in row) for row in rows]
+    return '\n'.join([headings, *lines]) + '\n'
+
+
+def quaternions(order: str = 'xyzw') -> np.ndarray:
+    return TURNS.as_quat()[:, ['xyzw'.index(letter) for letter in order]]
+
+
+def degrees(sequence: str) -> np.ndarray:
+    return TURNS.as_euler(sequence, degrees=True)
+
+
+LAYOUTS = {
+    'plain': (table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
+    'own': (
+        table('time_s,x_m,y_m,z_m,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}
+    ),
+    'German, millimetres': (
+        table(
+            'Zeit [ms];X [mm];Y [mm];Z [mm];A [deg];B [deg];C [deg]', 1e3 * TIMES_S,
+            1e3 * POSITIONS_M, degrees('ZYX'), separator=';', decimal=',',
+        ), {},
+    ),
+    'KUKA without units': (
+        table('time_s,X,Y,Z,A,B,C', TIMES_S, 1e3 * POSITIONS_M, degrees('ZYX')),
+        {'pose_unit': 'mm'},
+    ),
+    'Fanuc': (
+        table('time (s)\tX (mm)\tY (mm)\tZ (mm)\tW (deg)\tP (deg)\tR (deg)', TIMES_S,
+              1e3 * POSITIONS_M, degrees('xyz'), separator='\t'), {},
+    ),
+    'ABB quaternion': (
+        table('time_s,x_mm,y_mm,z_mm,q1,q2,q3,q4', TIMES_S, 1e3 * POSITIONS_M,
+              quaternions('wxyz')), {},
+    ),
+    'rotation vector': (
+        table('timestamp,TCP_x,TCP_y,TCP_z,TCP_rx,TCP_ry,TCP_rz', TIMES_S, POSITIONS_M,
+              TURNS.as_rotvec()), {},
+    ),
+    'rotation vector in degrees': (
+        table('t,x,y,z,rx [deg],ry [deg],rz [deg]', TIMES_S, POSITIONS_M,
+              np.degrees(TURNS.as_rotvec())), {'rotation': 'rotvec'},
+    ),
+    'roll pitch yaw': (
+        table('t,x,y,z,roll,pitch,yaw', TIMES_S, POSITIONS_M, np.radians(degrees('xyz'))), {},
+    ),
+    'named axes, a convention that takes z first': (
+        table('t,x,y,z,rx_deg,ry_deg,rz_deg', TIMES_S, POSITIONS_M, degrees('ZYX')[:, ::-1]),
+        {'rotation': 'ZYX'},
+    ),
+    'Kawasaki': (
+        table('time_s,x,y,z,O,A,T', TIMES_S, POSITIONS_M, degrees('ZYZ')),
+        {'rotation': 'kawasaki'},
+    ),
+    'a logger of messages': (
+        table(
+            '__time,/gun/pose/position/x,/gun/pose/position/y,/gun/pose/position/z,'
+            '/gun/pose/orientation/x,/gun/pose/orientation/y,/gun/pose/orientation/z,'
+            '/gun/pose/orientation/w', TIMES_S, POSITIONS_M, quaternions(),
+        ), {},
+    ),
+    'NumPy': (table('# t x y z qx qy qz qw'.replace(' ', ',').replace('#,', '# '), TIMES_S,
+                    POSITIONS_M, quaternions()), {}),
+    'comments and blank lines': (
+        '# robot 3, shift 2\n\n' + table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M,
+                                         quaternions()).replace('\n', '\n\n'), {},
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize('name', LAYOUTS)
+@pytest.mark.parametrize('encoding', ['utf-8-sig', 'utf-16'])
+def test_every_layout_is_the_same_motion(name, encoding, tmp_path):
+    text, options = LAYOUTS[name]
+    (tmp_path / 'poses.csv').write_text(text, encoding=encoding)
+    read = read_recording(tmp_path / 'poses.csv', **options)
+    assert np.array_equal(read.stamps_ns, [0, 20_000_000, 41_000_000, 60_000_000, 80_500_000])
+    assert np.allclose(read.positions_m, POSITIONS_M, atol=1e-9)
+    turned_by = (TURNS.inv() * Rotation.from_quat(read.quaternions_xyzw)).magnitude()
+    assert turned_by.max() < 1e-7
+    assert len(read.trigger_flow) == 0
+    (note,) = read.notes
+    assert note.startswith('5 poses: x y z in m')
+
+
+@pytest.mark.parametrize(
+    ('heading', 'values', 'flows', 'options'),
+    [
+        ('spraying', ON, ON, {}),
+        ('Gun on', ON, ON, {}),
+        ('flow', [0, 0.9, 1.1, 0, 0], [0, 0.9, 1.1, 0, 0], {}),
+        ('DO_12', ON, ON, {'state_topic': 'DO_12'}),
+    ],
+)
+def test_the_trigger_holds_from_its_row_on(heading, values, flows, options, tmp_path):
+    text = table(
+        f't,x,y,z,qx,qy,qz,qw,{heading}', TIMES_S, POSITIONS_M, quaternions(), values
+    )  # fmt: skip
+    (tmp_path / 'poses.csv').write_text(text)
+    read = read_recording(tmp_path / 'poses.csv', **options)
+    assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
+    assert np.allclose(read.trigger_flow, flows)
+    assert f'gun by {heading}' in read.notes[0]
+
+
+def test_words_switch_the_gun_and_a_flow_counts_while_it_is_on(tmp_path):
+    rows = ['0,1,2,3,0,0,0,1,on,0.8', '0.1,1,2,4,0,0,0,1,OFF,0.8', '0.2,1,2,5,0,0,0,1,true,nan']
+    (tmp_path / 'poses.csv').write_text('t,x,y,z,qx,qy,qz,qw,trigger,flow\n' + '\n'.join(rows))
+    assert read_recording(tmp_path / 'poses.csv').trigger_flow.tolist() == [0.8, 0.0, 1.0]
+
+
+def test_times_of_a_clock_keep_their_nanoseconds(tmp_path):
+    stamp = 1_760_000_000_123_456_789
+    for heading, cell in (('stamp_ns', str(stamp)), ('t', '1760000000.123456789')):
+        rows = f'{heading},x,y,z,qx,qy,qz,qw\n{cell},0,0,0,0,0,0,1\n{cell},1,0,0,0,0,0,1\n'
+        (tmp_path / 'poses.csv').write_text(rows)
+        assert read_recording(tmp_path / 'poses.csv').stamps_ns.tolist() == [stamp, stamp]
+
+
+def test_the_frame_of_the_poses_is_read(tmp_path):
+    text = 't,x,y,z,qx,qy,qz,qw,frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
+    (tmp_path / 'poses.csv').write_text(text)
+    assert read_recording(tmp_path / 'poses.csv', frame_id='base').frame_id == 'base'
+    (tmp_path / 'poses.csv').write_text(text.replace('1,base\n1', '1,world\n1'))
+    with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
+        read_recording(tmp_path / 'poses.csv')
+
+
+def test_programmed_passes_take_their_speeds(tmp_path):
+    """Half a metre at 0.5 m/s with the gun on takes a second; the approach is gun off."""
+    (tmp_path / 'passes.csv').write_text(
+        'pass,x_m,y_m,z_m,qx,qy,qz,qw,speed_m_per_s,spraying\n'
+        '1,0,0,0,1,0,0,0,1,0\n1,0.1,0,0,1,0,0,0,0.5,0\n1,0.6,0,0,1,0,0,0,0.5,1\n'
+    )
+    read = read_recording(tmp_path / 'passes.csv')
+    assert read.duration_s == pytest.approx(1.2)
+    assert read.trigger_flow.tolist() == [0.0, 1.0]
+    assert read.trigger_stamps_ns.tolist() == [0, 200_000_000]
+    assert read.notes[0] == PROGRAMMED
+
+
+@pytest.mark.parametrize(
+    ('text', 'words'),
+    [
+        ('', 'no columns x, y, z'),
+        ('t,x,y,z,qx,qy,qz,qw\n', 'no poses'),
+        ('t,x,y,z,qx,qy,qz\n0,0,0,0,0,0,0\n', 'no orientation among the columns'),
+        ('t,x,y,qx,qy,qz,qw\n0,0,0,0,0,0,1\n', 'no columns x, y, z'),
+        ('n,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n', 'no time among the columns'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,?,0,0,0,0,1\n1,0\n', "line 3: y is '?'"),
+        ('t,x,y,z,qx,qy,qz,qw\n0,2350,0,0,0,0,0,1\n', 'reach 2350 and have no unit'),
+        ('t,x_mm,y,z,qx,qy,qz,qw\n0,2,0,0,0,0,0,1\n', 'in mm, no unit; give all in m or in mm'),
+        ('t,x,y,z,rx_deg,ry_deg,rz_deg\n0,0,0,0,9,0,0\n', 'Euler angles or a rotation vector'),
+        ('t,x,y,z,alpha,beta,gamma\n0,0,0,0,9,0,0\n', 'unknown convention'),
+        ('t,x,y,z,roll,pitch,yaw\n0,0,0,0,90,0,0\n', 'reach 90 and are read in rad'),
+        ('t,x,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0,1\n', 'x x could all be x; keep one'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1e300,0,0,0,0,0,0,1\n', 'spans 1e+300 s'),
+        ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
+        ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_read_for_certain_is_refused(text, words, tmp_path):
+    (tmp_path / 'poses.csv').write_text(text)
+    with pytest.raises(RecordingError) as refused:
+        read_recording(tmp_path / 'poses.csv')
+    assert str(tmp_path / 'poses.csv') in str(refused.value)
+    assert words in str(refused.value)
+
+
+def test_options_of_other_kinds_of_files_are_refused(tmp_path):
+    (tmp_path / 'poses.csv').write_text(LAYOUTS['plain'][0])
+    with pytest.raises(RecordingError, match='--pose-topic is for bags'):
+        read_recording(tmp_path / 'poses.csv', '/pose')
+    with pytest.raises(RecordingError, match="rotation: 'zxq' is no convention; give 'rotvec'"):
+        read_recording(tmp_path / 'poses.csv', rotation='zxq')
