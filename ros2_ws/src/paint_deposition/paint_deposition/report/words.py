@@ -12,6 +12,7 @@ from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
@@ -142,7 +143,22 @@ def learned_range(law: LearnedLaw) -> str:
         return f'{name}: neutral farther than {reach} from the axis on the model plane.'
     _, ends, unit = learned_words(law)[1]
     words = f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
-    return words + _band_words(law) if isinstance(law, LearnedCurve) and law.sd else words
+    if not (isinstance(law, LearnedCurve) and law.sd):
+        return words
+    return f'{words}{_band_words(law)} {form_words(law)}'
+
+
+def form_words(law: LearnedCurve) -> str:
+    """The closed forms that fit a curve, with their values and probabilities, as sentences."""
+    forms = [
+        f'{form.formula} with '
+        + joined([f'{name} {number(found.value)}' for name, found in form.parameters.items()])
+        + f' ({percent(form.probability)})'
+        for form in forms_of(law)
+    ]
+    if not forms:
+        return 'No closed form of few parameters fits within its band.'
+    return f'Closed forms that fit within its band: {"; ".join(forms)}.'
 
 
 def _band_words(law: LearnedCurve) -> str:
