@@ -129,7 +129,7 @@ ADDED = {
          'width': _Shape(1, 'width of the change', 'shape', (0.06, 0.2), (0.02, 1.0))},
     ),
 }  # fmt: skip
-FORMS = {'constant': ('', {})} | MULTIPLIED | ADDED
+FORMS: dict[str, tuple[str, dict[str, _Shape]]] = {'constant': ('', {})} | MULTIPLIED | ADDED
 # What a form need not say where it is about 0 or 1.
 IDLE = {'(x - 0.0)': 'x', '(0.0 - x)': '-x', '(0.0 + ': '(', '(x / 1.0)': '(x)'}
 POSITIVE = ('power', 'inverse')
@@ -186,6 +186,8 @@ def fitting_forms(
     Returns:
         None where nothing of few parameters fits, or where a constant does as well.
     """
+    if len(x) < LEAST_KNOTS:
+        return ()
     sd = np.maximum(sd, 1e-9)
     fits = [fit for form in FORMS for fit in _fitted(form, x, value, sd, unit, addition)]
     deviation = min((fit.fun for _, _, fit in fits), key=lambda z: float(z @ z))
@@ -199,7 +201,7 @@ def fitting_forms(
     sound = chi2.sf(misfit, np.maximum(knots - count, 1.0)) > IMPROBABLE
     sound &= (probability > FAINT) & (criterion < criterion[0])
     return tuple(
-        _described(*fits[k], float(probability[k]), x, weight, name, unit, addition)
+        _described(fits[k], float(probability[k]), weight, name, unit, addition)
         for k in np.argsort(-probability)
         if sound[k]
     )
@@ -210,8 +212,7 @@ def _independent(deviation: np.ndarray) -> float:
     square = float(deviation @ deviation)
     alike = float(deviation[1:] @ deviation[:-1]) / square if square > 0.0 else 0.0
     count = len(deviation)
-    most = max(count, LEAST_KNOTS)
-    return float(np.clip(count * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, most))
+    return float(np.clip(count * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, count))
 
 
 def _fitted(
@@ -245,9 +246,10 @@ def _fitted(
 
 
 def _described(
-    form: str, code: str, fit: Any, probability: float, x: np.ndarray, weight: float,
+    fitted: tuple[str, str, Any], probability: float, weight: float,
     name: str, unit: str, addition: bool,
 ) -> ClosedForm:  # fmt: skip
+    form, code, fit = fitted
     half = TWO_SIDED_95 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
     level = _Shape(0, 'level of the law; the pattern can take it up', 'amplitude')
     parameters = {}
