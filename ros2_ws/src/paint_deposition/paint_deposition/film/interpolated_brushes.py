@@ -16,7 +16,6 @@ from paint_deposition.model.brush import (
     SetPoints,
     listed,
 )
-from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
@@ -63,14 +62,6 @@ def with_set_points(
     }
     new = Brush(number=number, planar=planar, interpolated=True, **known, **paint)
     return model.model_copy(update={'brushes': (*model.brushes, new)}), number
-
-
-def require_its_brush(model: DepositionModel, change: TriggerChange) -> None:
-    """Refuse by ModelError a change whose brush or set-points the model cannot paint with."""
-    if uses_set_points(model, change.brush, change.set_points):
-        with_set_points(model, change.set_points)
-    else:
-        model.require_brushes([change.brush])
 
 
 def with_brushes_of(model: DepositionModel, before: DepositionModel) -> DepositionModel:

@@ -24,7 +24,7 @@ from paint_deposition.part.gauge_places import (
 )
 from paint_deposition.part.surface import Surface
 
-DEFAULT_POINTS, DEFAULT_REPEATS = 60, 8
+DEFAULT_REPEATS = 8
 # With fewer points than this the pattern's parameters alone take up all that is read.
 LEAST_POINTS, MOST_POINTS = 12, 400
 # Places from which the points are chosen.
