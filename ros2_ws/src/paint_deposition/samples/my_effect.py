@@ -3,9 +3,8 @@
 In model.yaml: ``effects: [{file: my_effect.py, loss_per_m_per_s: 0.2}]``.
 """
 
-from paint_deposition.effects.base import Effect, parameter
+from paint_deposition.effects.base import Effect, Ray, parameter
 from paint_deposition.kernel.fast_math import exp
-from paint_deposition.kernel.laws import Ray
 
 
 class WakeLoss(Effect):
