@@ -4,15 +4,15 @@ from itertools import combinations, product
 
 import numpy as np
 import pytest
-from scipy.stats import multivariate_normal, multivariate_t, norm
-
-from paint_deposition.inference.diagnosis.evidence import Principal
 from paint_deposition.inference.diagnosis.joint_evidence import (
     NEVER,
     Directions,
     log_evidence,
     refine,
 )
+from scipy.stats import multivariate_normal, multivariate_t, norm
+
+from paint_deposition.inference.diagnosis.evidence import Principal
 
 READINGS = 12
 SIZES = np.array([0.5, 1.0, 3.0])

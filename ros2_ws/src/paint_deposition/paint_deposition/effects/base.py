@@ -137,6 +137,7 @@ class Effect(BaseModel):
     # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
     # over a covariate is not that effect.
     free_law: ClassVar[str] = ''
+    exact: ClassVar[bool] = False
     # What the cell must switch off for the effect to vanish: 'voltage', 'draught', or '' where
     # nothing does.
     needs: ClassVar[str] = ''

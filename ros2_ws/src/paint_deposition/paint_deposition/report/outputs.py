@@ -161,9 +161,10 @@ output(
     ],
     rmse_um=figures(
         'before after holdout_before holdout_after noise_floor',
-        left_out=Literal['points'],
+        left_out=Literal['experiments', 'points'],
     ),
     experiments=list[figures('rmse_before_um rmse_after_um', name=str)],
+    remainder=dict | None, footprint=dict | None,
     detectable=dict[str, dict[str, Number]], regions=list[Region], noise=Noise,
     next=figures(measure=list[dict], spray=list[figures(what=str, separates=Words)]),
     pattern_shift=dict | None, left_out=list[dict], notes=Words,

@@ -19,6 +19,7 @@ class GaugeGain(Effect):
 
     id = 'gauge_gain'
     family = 'level'
+    exact = True
     covariates = over(film_um=0)
     signature = 'in proportion to the film everywhere; the same as another K1'
     rivals = ('gauge_zero',)

@@ -18,13 +18,14 @@ class GaugeZero(Effect):
 
     id = 'gauge_zero'
     family = 'level'
+    exact = True
     covariates = over(film_um=0)
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'
 
     offset_um: float = parameter(
-        0.0, low=-20.0, high=20.0, typical=1.2, unit='um',
+        0.0, low=-20.0, high=20.0, typical=0.8, unit='um',
         description='b, reading on bare metal; positive reads high',
     )  # fmt: skip
 

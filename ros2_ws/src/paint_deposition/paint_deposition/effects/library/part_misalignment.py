@@ -22,6 +22,7 @@ class PartMisalignment(Effect):
 
     id = 'part_misalignment'
     family = 'lateral shift'
+    exact = True
     covariates = over(height_fraction=0)
     signature = 'pattern shifted in a direction fixed in the part, more so away from its centre'
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'sag')

@@ -20,6 +20,7 @@ class PoseLag(Effect):
 
     id = 'pose_lag'
     family = 'time'
+    exact = True
     signature = 'passes moved along their own direction, to opposite sides when they alternate'
     rivals = ('gun_wake', 'trigger_lag')
     source = 'ABB externally guided motion: a pose every 4 ms, lag of control 10 to 20 ms'

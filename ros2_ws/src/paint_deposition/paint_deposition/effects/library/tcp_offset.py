@@ -17,6 +17,7 @@ class TcpOffset(Effect):
 
     id = 'tcp_offset'
     family = 'lateral shift'
+    exact = True
     signature = 'pattern shifted in a direction fixed in the tool; turning the gun turns it'
     rivals = ('air_drift', 'tcp_tilt', 'part_misalignment', 'sag')
     source = 'error of tool calibration; size from general practice'

@@ -18,6 +18,7 @@ class TcpStandoff(Effect):
 
     id = 'tcp_standoff'
     family = 'standoff'
+    exact = True
     covariates = over(standoff_ratio=0)
     signature = 'as if the whole path were sprayed from another distance'
     rivals = ('pattern_spread', 'standoff_efficiency')

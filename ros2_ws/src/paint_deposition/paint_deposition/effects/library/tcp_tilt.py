@@ -20,6 +20,7 @@ class TcpTilt(Effect):
 
     id = 'tcp_tilt'
     family = 'lateral shift'
+    exact = True
     signature = 'pattern shifted as by an offset, and one flank heavier than the other'
     rivals = ('air_drift', 'tcp_offset', 'part_misalignment', 'sag')
     source = 'error of tool calibration; size from general practice'

@@ -1,91 +1,51 @@
-"""Cross-validation: how well a fitted model predicts points that were left out."""
+"""Cross-validation: how well a fitted model predicts readings that were left out."""
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.evidence import left_out
+from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
-from paint_deposition.inference.fitting.study import Study
-
-
-def hold_out(null: NullModel, folds: np.ndarray) -> np.ndarray:
-    """(P,) deviations over the noise of points while those of their fold (P,) were left out."""
-    deviation = np.empty(len(folds))
-    for fold in np.unique(folds):
-        out = folds == fold
-        deviation[out] = left_out(null, [], out)
-    return deviation
-
-
-@dataclass(frozen=True)
-class Stage:
-    """One step of a search.
-
-    Attributes:
-        space: what may be missing at a fit, whose effects' laws may be off.
-        plain: the model of that fit, its laws taken as they are.
-        accepted: effects that were added after it; none at the last stage.
-        shapeless: whether they took the place of a shapeless cause that the space called for.
-    """
-
-    space: ModelSpace
-    plain: NullModel
-    accepted: frozenset[str] = frozenset()
-    shapeless: bool = False
-
-    def goes_on(self, part: ModelSpace) -> bool:
-        """Whether the same effects would be added with the space of a part of the readings."""
-        found = frozenset(cause for cause, _, _ in part.accepted)
-        if self.shapeless:
-            return not found and part.is_shapeless
-        return bool(found) and found == self.accepted
+from paint_deposition.inference.diagnosis.search import Stage, Trial
+from paint_deposition.inference.readings.residuals import root_mean_square
 
 
 def nested_rmse_um(
-    stages: Sequence[Stage], study: Study, without: Collection[str] = ()
+    stages: Sequence[Stage], options: Sequence[Explanation], without: Collection[str] = ()
 ) -> np.ndarray:
-    """(n,) errors on points left out with effects and 0 to n - 1 laws learned without them [um].
+    """(n,) errors on readings left out with effects and 0 to n - 1 laws learned without them [um].
 
-    For each fold the search is repeated on the other points: as long as they call for the same
-    effects, it goes on to the next stage; only the linearisations are shared by all folds.
+    For each fold the choice is repeated with the other readings between the sets of effects that
+    were tried: as long as it is the same, it goes on to the next stage. The fits of the sets are
+    shared by all folds.
 
     Args:
         stages: of the search.
-        study: the readings.
+        options: laws of any form that may be learned.
         without: covariates of laws that are not learned.
     """
-    folds = study.folds()
+    run = stages[0].here.run
+    folds = run.study.folds()
+    options = [option for option in options if option.learns not in without]
     deviation = np.empty((MOST_LAWS + 1, len(folds)))
     for fold in np.unique(folds):
         out = folds == fold
-        for stage in stages:
-            space, part = stage.space, stage.space.select(~out)
-            if not stage.goes_on(part):
-                break
-        found = part.accepted
-        columns = [size * space.explanations[k].law for _, k, size in found]
-        given = np.hstack([stage.plain.columns, *columns])
-        null = NullModel.of(given[~out], stage.plain.raw[~out])
-        options = [k for k, e in enumerate(space.explanations) if e.learns not in without]
-        laws = choose_laws(null, [part.explanations[k] for k in options], space.freedom)
-        learned = [size * space.explanations[options[k]].columns for k, size in laws]
+        found = _found_without(stages, out)
+        plain = run.plain(found.fit)
+        beside = plain.with_remainder(found.space.of_parts).select(~out)
+        kept = [option.select(~out) for option in options]
+        laws = choose_laws(beside, kept, run.study.noise.degrees_of_freedom)
+        learned = [size * options[k].columns for k, size in laws]
         for count in range(MOST_LAWS + 1):
-            deviation[count, out] = left_out(stage.plain, columns + learned[:count], out)
-    return np.sqrt(np.mean((deviation * study.sigma_um) ** 2, axis=1))
+            deviation[count, out] = left_out(plain, learned[:count], out)
+    return np.array([root_mean_square(each * run.study.sigma_um) for each in deviation])
 
 
-def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
-    """Deviations of points from what the others predict, by the model and the levels of parts.
-
-    Args:
-        null: what the model varies. added: directions (P, n) of what it has besides.
-        out: (P,) bool, the points left out.
-    """
-    columns = np.hstack([null.columns, *added])
-    kept = columns[~out]
-    precision = np.eye(columns.shape[1]) + kept.T @ kept
-    amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
-    return null.raw[out] - columns[out] @ amounts
+def _found_without(stages: Sequence[Stage], out: np.ndarray) -> Trial:
+    """The set of effects that is found while some readings (P,) are left out."""
+    for stage, following in zip(stages, [*stages[1:], None], strict=True):
+        chosen = stage.chosen(~out)
+        if following is None or chosen is not following.here:
+            break
+    return chosen

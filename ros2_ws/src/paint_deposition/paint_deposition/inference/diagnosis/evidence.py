@@ -6,19 +6,16 @@ with a known covariance. Whitening them by the covariance under the null hypothe
 pattern's parameters; every explanation then adds a low-rank term to the identity.
 """
 
-import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from scipy.linalg import solve_triangular
 from scipy.special import log_ndtr
 
 from paint_deposition.inference.fitting.least_squares import Fit, covariance_factor
 
-# More degrees of freedom than this count as a noise that is known.
-KNOWN_NOISE = 1e9
 # An entry of a fit this close to a bound has been stopped by it.
 AT_BOUND = 1e-6
 # A direction whose squared length, in standard deviations, is less cannot be seen.
@@ -33,23 +30,33 @@ class NullModel:
         columns: (P, m) directions in which the base model and the nuisance vary, for unit
             amplitudes, over the noise.
         raw: (P,) deviations over the noise from the base model at the centre of its priors.
+        remainder: (P, P) covariance of what nature leaves over, or None if nothing is.
         lower: (P, P) Cholesky factor of the deviations' covariance.
         deviation: (P,) whitened deviations; standard normal if nothing is missing.
     """
 
     columns: np.ndarray
     raw: np.ndarray
+    remainder: np.ndarray | None
     lower: np.ndarray
     deviation: np.ndarray
 
     @staticmethod
-    def of(columns: np.ndarray, raw: np.ndarray) -> 'NullModel':
-        """From directions (P, m) and deviations (P,)."""
-        lower = covariance_factor(columns)
-        return NullModel(columns, raw, lower, solve_triangular(lower, raw, lower=True))
+    def of(
+        columns: np.ndarray, raw: np.ndarray, remainder: np.ndarray | None = None
+    ) -> 'NullModel':
+        """From directions (P, m), deviations (P,) and what is left over."""
+        lower = covariance_factor(columns, remainder)
+        deviation = solve_triangular(lower, raw, lower=True, check_finite=False)
+        return NullModel(columns, raw, remainder, lower, deviation)
 
     @staticmethod
-    def around(fit: Fit, nuisance: np.ndarray, apart: frozenset[str] = frozenset()) -> 'NullModel':
+    def around(
+        fit: Fit,
+        nuisance: np.ndarray,
+        apart: frozenset[str] = frozenset(),
+        remainder: np.ndarray | None = None,
+    ) -> 'NullModel':
         """Linear around a fit, with nuisance directions (P, n) over the noise.
 
         Args:
@@ -57,6 +64,7 @@ class NullModel:
             nuisance: directions that carry no meaning.
             apart: ids of effects in it that the null hypothesis does not have: what they
                 contribute to the film counts as deviation.
+            remainder: (P, P) covariance of what nature leaves over.
         """
         prior, entries = fit.parameters.prior, fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)
@@ -70,15 +78,59 @@ class NullModel:
         kept &= free
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
         directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
-        return NullModel.of(np.hstack([directions, nuisance]), raw)
+        return NullModel.of(np.hstack([directions, nuisance]), raw, remainder)
+
+    def beside(self, more: np.ndarray) -> 'NullModel':
+        """The same where some more directions (P, n) may vary."""
+        return NullModel.of(np.hstack([self.columns, more]), self.raw, self.remainder)
+
+    def with_remainder(self, remainder: np.ndarray) -> 'NullModel':
+        """The same with another covariance (P, P) of what nature leaves over."""
+        return NullModel.of(self.columns, self.raw, remainder)
+
+    def log_evidence(self, deviations: np.ndarray, freedom: float) -> np.ndarray:
+        """(D,) log likelihood of whitened deviations (P, D), the noise's scale integrated out.
+
+        Args:
+            deviations: of the readings, or simulated. freedom: of the noise estimate.
+        """
+        half_log_det = np.log(np.diag(self.lower)).sum()
+        squares = np.sum(deviations**2, axis=0)
+        if not np.isfinite(freedom):
+            return -0.5 * squares - half_log_det
+        return -0.5 * (freedom + len(self.raw)) * np.log1p(squares / freedom) - half_log_det
 
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
-        return solve_triangular(self.lower, columns, lower=True)
+        return solve_triangular(self.lower, columns, lower=True, check_finite=False)
 
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The same for some of the readings."""
-        return NullModel.of(self.columns[rows], self.raw[rows])
+        kept = None if self.remainder is None else self.remainder[np.ix_(rows, rows)]
+        return NullModel.of(self.columns[rows], self.raw[rows], kept)
+
+
+def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
+    """Deviations of readings from what the others predict, by the model and the levels of parts.
+
+    Args:
+        null: what the model varies. added: directions (P, n) of what it has besides.
+        out: (P,) bool, the readings left out.
+    """
+    columns = np.hstack([null.columns, *added])
+    kept = columns[~out]
+    precision = np.eye(columns.shape[1]) + kept.T @ kept
+    amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
+    return null.raw[out] - columns[out] @ amounts
+
+
+def hold_out(null: NullModel, folds: np.ndarray) -> np.ndarray:
+    """(P,) deviations over the noise of points while those of their fold (P,) were left out."""
+    deviation = np.empty(len(folds))
+    for fold in np.unique(folds):
+        out = folds == fold
+        deviation[out] = left_out(null, [], out)
+    return deviation
 
 
 @dataclass(frozen=True)
@@ -173,7 +225,9 @@ class Principal:
         return factors
 
 
-def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
+def simulated(
+    count: int, freedom: float, draws: int, seed: int | np.random.Generator
+) -> np.ndarray:
     """(count, draws) whitened deviations under the null hypothesis.
 
     The scale of the noise varies between draws as that of an estimate with ``freedom`` degrees of
@@ -184,74 +238,3 @@ def simulated(count: int, freedom: float, draws: int, seed: int) -> np.ndarray:
     if np.isfinite(freedom):
         deviations /= np.sqrt(random.chisquare(freedom, draws) / freedom)
     return deviations
-
-
-@njit(cache=True, nogil=True)
-def log_normal_cdf(x):
-    """Logarithm of the standard normal distribution function."""
-    if x > -30.0:
-        return math.log(0.5 * math.erfc(-x / math.sqrt(2.0)))
-    return -0.5 * x * x - math.log(-x * math.sqrt(2.0 * math.pi))
-
-
-@njit(cache=True, nogil=True, fastmath={'reassoc', 'contract'})
-def log_bayes_factor(gram, scores, square, signed, sides, scale, freedom, count, orthogonal=0):
-    """Log Bayes factor of explanations together against the null hypothesis.
-
-    Args:
-        gram: (n, n) products of their whitened directions; of those that are orthogonal to each
-            other only the diagonal is read.
-        scores: (n,) products with the deviations. square: of the deviations' length.
-        signed: (q, n) sums of amplitudes, each in units of its standard deviation, whose sign is
-            known; they count as independent in the posterior. sides: (q,) +1 or -1.
-        scale: (n,) standard deviation of each amplitude, in units of its direction.
-        freedom: degrees of freedom of the noise estimate; the evidence integrates over the
-            noise's unknown scale, so with few a misfit counts less.
-        count: of readings.
-        orthogonal: how many of the directions, the first ones, are orthogonal to each other.
-    """
-    n = len(scores)
-    # Cholesky factor of the amplitudes' posterior precision; its first rows are diagonal.
-    lower, pivot, half = np.empty((n, n)), np.empty(n), np.empty(n)
-    log_det = explained = 0.0
-    for i in range(n):
-        for j in range(orthogonal if i >= orthogonal else 0):
-            lower[i, j] = gram[i, j] * scale[i] * scale[j] / pivot[j]
-        for j in range(orthogonal, i):
-            value = gram[i, j] * scale[i] * scale[j]
-            for k in range(j):
-                value -= lower[i, k] * lower[j, k]
-            lower[i, j] = value / pivot[j]
-        value = 1.0 + gram[i, i] * scale[i] ** 2
-        for k in range(i if i >= orthogonal else 0):
-            value -= lower[i, k] ** 2
-        pivot[i] = math.sqrt(max(value, 1e-12))
-        log_det += 2.0 * math.log(pivot[i])
-        half[i] = scores[i] * scale[i]
-    _solve(lower, pivot, half, orthogonal)
-    for i in range(n):
-        explained += half[i] ** 2
-    if freedom < KNOWN_NOISE:
-        share = min(explained / (freedom + square), 1.0 - 1e-12)
-        factor = -0.5 * (freedom + count) * math.log1p(-share) - 0.5 * log_det
-    else:
-        factor = 0.5 * (explained - log_det)
-    for q in range(len(sides)):
-        column = signed[q].copy()
-        _solve(lower, pivot, column, orthogonal)
-        mean = variance = 0.0
-        for i in range(n):
-            mean += column[i] * half[i]
-            variance += column[i] ** 2
-        factor += math.log(2.0) + log_normal_cdf(sides[q] * mean / math.sqrt(variance))
-    return factor
-
-
-@njit(cache=True, nogil=True, fastmath={'reassoc', 'contract'})
-def _solve(lower, pivot, column, orthogonal):
-    """Divide a column (n,) by a lower triangle, in place; its first rows are diagonal."""
-    for i in range(len(column)):
-        value = column[i]
-        for k in range(i if i >= orthogonal else 0):
-            value -= lower[i, k] * column[k]
-        column[i] = value / pivot[i]

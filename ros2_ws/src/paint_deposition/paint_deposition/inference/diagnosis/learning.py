@@ -12,7 +12,7 @@ from paint_deposition.inference.diagnosis.evidence import NullModel, Principal
 from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.model_space import SIZES
 
-MOST_LAWS = 3
+MOST_LAWS = 2
 # A law must raise the log evidence by this much: it is chosen among some dozens.
 WORTH_LEARNING = 6.0
 
@@ -24,7 +24,7 @@ def choose_laws(
 
     Args:
         null: what varies already: pattern, nuisance and the accepted laws.
-        explanations: those with a random law are considered, one for each covariate.
+        explanations: laws of any form, of which one for each covariate is considered.
         freedom: degrees of freedom of the noise estimate.
 
     Returns:
@@ -42,7 +42,7 @@ def choose_laws(
             break
         chosen.append((k, size))
         # What was chosen may vary from now on, too.
-        null = NullModel.of(np.hstack([null.columns, size * left[k].columns]), null.raw)
+        null = null.beside(size * left[k].columns)
         left = {number: e for number, e in left.items() if e.learns != left[k].learns}
     return chosen
 

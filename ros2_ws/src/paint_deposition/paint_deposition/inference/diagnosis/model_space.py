@@ -1,69 +1,47 @@
-"""The space of models: every set of up to three causes, with its posterior probability.
+"""The evidence of what may be missing beside one fitted model.
 
-Each cause is missing or not, independently of the others before the readings. A cause has several
-explanations (laws in a few shapes, free laws, fields) at several sizes; their evidence is averaged
-for one cause alone and, for sets, searched from the best ones on.
+Each cause is missing or not, independently of the others before the readings; its laws in a few
+shapes and at several sizes are averaged. How large the remainder of nature is and how far it
+reaches is not known before either: every hypothesis is weighed at several of its sizes, and its
+evidence is averaged over them, too. All of it is linear around the fit, which is quick and good
+enough to test whether anything is missing, and to propose what.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.special import expit
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, simulated
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.joint_evidence import (
-    NEVER,
-    Directions,
-    log_evidence_of_each,
-    refine,
-)
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 
-# Prior probability that a cause is missing: an effect of the library, something outside it, and
-# a pattern that is no two Gaussians. No measured pattern is exactly one.
-PRIOR_EFFECT, PRIOR = 0.02, {UNKNOWN: 0.08, FOOTPRINT: 0.06}
+# Prior probability that a cause is missing: an effect of the library, and something outside it,
+# half of which shows over a covariate and half as a setting that differs beyond nature.
+PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.08
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
-SIZES = np.array([0.35, 0.7, 1.4, 2.8, 5.6])
-# How many sets are searched in full: pairs, pairs from which triples grow, and triples.
-PAIRS, GROWN, TRIPLES = 60, 12, 20
-SWEEPS = 2
+SIZES = np.array([0.5, 1.0, 2.0])
 # An effect acts for certain from this posterior probability of its group on.
 SURE = 0.8
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
-DRAWS = 2000
-# Effects that could stand in one place, most probable first, and the probability of one of them.
-Group = tuple[tuple[str, ...], float]
-# The error of a law is at most this large beside the law; a smaller one, in standard deviations
-# of the noise, may be noise.
-LARGEST_ERROR, NOTICED = 0.6, 3.0
-# An effect beside a stronger shapeless cause acts only if it moves the readings by this share of
-# what the other does (squared): no shapeless cause is known more exactly.
-LEAST_BESIDE = 0.04
+DRAWS = 1000
+# So many sizes of the remainder are kept at most, of nature and beyond it, and none whose share
+# of the posterior is smaller.
+MOST_SIZES, LEAST_SHARE = 4, 0.02
 
 
-@dataclass(frozen=True)
-class Model:
-    """A set of causes with their best explanations.
-
-    Attributes:
-        causes: names, sorted.
-        chosen: numbers of their explanations. sizes: of their amplitudes.
-        log_weight: logarithm of its posterior weight, that of no cause being 0.
-    """
-
-    causes: tuple[str, ...]
-    chosen: tuple[int, ...] = ()
-    sizes: tuple[float, ...] = ()
-    log_weight: float = 0.0
+def log_odds(probability: float) -> float:
+    """Logarithm of the odds of a probability."""
+    return float(np.log(probability / (1.0 - probability)))
 
 
-class ModelSpace:
-    """All models around a null model.
+class CauseEvidence:
+    """Log evidence of each explanation alone, against one null model.
 
     Args:
         null: the null hypothesis.
@@ -74,168 +52,15 @@ class ModelSpace:
     def __init__(
         self, null: NullModel, explanations: Sequence[Explanation], freedom: float
     ) -> None:
-        self.null, self.freedom = null, freedom
-        self._simulated: dict[int, np.ndarray] = {}
-        # By how much a cause's averaged log evidence, with its odds, exceeds that of its best.
-        self._averaging: dict[str, float] = {}
-        self.explanations = sorted(explanations, key=lambda e: e.cause)
-        self.causes = tuple(dict.fromkeys(e.cause for e in self.explanations))
-        names = [e.cause for e in self.explanations]
-        self._first = np.array([names.index(c) for c in self.causes])
-        self._last = np.append(self._first[1:], len(names))
-        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in self.explanations]
-        self._directions = Directions.of(self.principal, null.deviation, freedom)
-        shares = np.log([e.share / len(SIZES) for e in self.explanations])
-        self._log_share = np.repeat(shares[:, np.newaxis], len(SIZES), axis=1)
-        physical = np.array([self._physical_sizes(k) for k in range(len(names))])
-        self._log_share_alone = np.where(physical, self._log_share, NEVER)
-        odds = np.array([PRIOR.get(c, PRIOR_EFFECT) for c in self.causes])
-        self._log_odds = np.log(odds / (1.0 - odds))
+        self.null, self.explanations, self.freedom = null, explanations, freedom
+        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in explanations]
 
     @cached_property
-    def models(self) -> tuple[Model, ...]:
-        """The models that matter, most probable first."""
-        alone = {model.causes[0]: model for model in self._alone}
-        pairs = [_joined(*pair) for pair in combinations(self._alone, 2)]
-        pairs = [self._refined(m) for m in self._most_probable(pairs, PAIRS)]
-        grown = {
-            tuple(sorted((*pair.causes, cause))): _joined(pair, single)
-            for pair in self._most_probable(pairs, GROWN)
-            for cause, single in alone.items()
-            if cause not in pair.causes
-        }
-        triples = [self._refined(m) for m in self._most_probable(grown.values(), TRIPLES)]
-        found = [Model((), (), (), 0.0), *self._alone, *pairs, *triples]
-        return tuple(sorted(found, key=lambda m: -m.log_weight))
-
-    @cached_property
-    def probabilities(self) -> np.ndarray:
-        """Posterior probability of each of ``models``."""
-        weights = np.array([m.log_weight for m in self.models])
-        return np.exp(weights - np.logaddexp.reduce(weights))
-
-    def inclusion(self, *causes: str) -> float:
-        """Posterior probability that at least one of these causes acts."""
-        holds = [bool(set(causes) & set(m.causes)) for m in self.models]
-        return float(self.probabilities[holds].sum())
-
-    def against_nothing(self, cause: str) -> float:
-        """Posterior probability of one cause against none, if both were as probable before."""
-        number = self.causes.index(cause)
-        return float(expit(self._alone[number].log_weight - self._log_odds[number]))
-
-    def alternatives(self, cause: str) -> dict[str, float]:
-        """What could stand in the place of one cause beside the others of its best model.
-
-        The causes and their probabilities, which sum to one, all other causes being as they are;
-        this is the single-effect posterior of Wang et al. (JRSS-B 82, 2020). Empty where the
-        other causes are as many as a model can hold.
-        """
-        best = next((m for m in self.models if cause in m.causes), self.models[0])
-        others = set(best.causes) - {cause}
-        found: dict[str, float] = {}
-        for model, probability in zip(self.models, self.probabilities, strict=True):
-            if len(model.causes) == len(others) + 1 and others < set(model.causes):
-                (other,) = set(model.causes) - others
-                found[other] = found.get(other, 0.0) + float(probability)
-        total = sum(found.values())
-        return {name: value / total for name, value in sorted(found.items(), key=lambda i: -i[1])}
-
-    def group(self, cause: str) -> Group:
-        """The effects that could stand in the place of a cause, and how probable one of them is.
-
-        The most probable ones that together have a chance of 95 % among all alternatives; what is
-        no effect of the library is none of them.
-        """
-        members, total = [], 0.0
-        for name, probability in self.alternatives(cause).items():
-            if total >= CREDIBLE:
-                break
-            total += probability
-            members.append(name)
-        effects = tuple(name for name in members if name not in PRIOR)
-        return effects, self.inclusion(*effects) if effects else 0.0
-
-    @property
-    def is_shapeless(self) -> bool:
-        """Whether the most probable model has a cause from outside the library."""
-        return bool(PRIOR.keys() & set(self.models[0].causes))
-
-    def best_law(self, cause: str) -> tuple[int, float, float]:
-        """The explanation of an effect by its law, its size and log evidence, if it acts alone."""
-        first, last = self._first[self.causes.index(cause)], self._last[self.causes.index(cause)]
-        laws = [k for k in range(first, last) if self.explanations[k].sensitivity is not None]
-        values = self._factors_alone[laws]
-        k, s = np.unravel_index(values.argmax(), values.shape)
-        return laws[k], float(SIZES[s]), float(values[k, s])
-
-    def _physical_sizes(self, k: int) -> np.ndarray:
-        """(S,) whether an explanation, alone at each size, is what its cause can be."""
-        return self._is_physical(k, self.principal[k].amplitudes(self.null.deviation, SIZES))
-
-    def _is_physical(self, k: int, amounts: np.ndarray) -> np.ndarray:
-        """(...) whether an explanation with amplitudes (..., n) is what its cause can be.
-
-        The error of a law stays small beside the law, and a free law goes in its direction.
-        """
-        explanation, own = self.explanations[k], self.principal[k]
-        if explanation.sensitivity is None:
-            return explanation.goes_right(amounts)
-        of_law = len(explanation.sensitivity.names)
-        law = own.length(amounts, slice(of_law))
-        error = own.length(amounts, slice(of_law, None))
-        return error <= np.maximum(NOTICED, LARGEST_ERROR * law)
-
-    @cached_property
-    def accepted(self) -> list[tuple[str, int, float]]:
-        """Causes of the most probable model that act with some certainty.
-
-        Each with the number of its explanation and the size of its amplitudes.
-        """
-        best = self.models[0]
-        if not best.causes:
-            return []
-        amounts, own = self.amplitudes(best), self.principal
-        moved = {
-            cause: own[k].length(part) ** 2
-            for cause, k, part in zip(best.causes, best.chosen, amounts, strict=True)
-        }
-        least = LEAST_BESIDE * max((moved[c] for c in best.causes if c in PRIOR), default=0.0)
-        return [
-            (cause, k, size)
-            for cause, k, size in zip(best.causes, best.chosen, best.sizes, strict=True)
-            if cause not in PRIOR and moved[cause] >= least and self.group(cause)[1] > SURE
-        ]
-
-    def select(self, rows: np.ndarray) -> 'ModelSpace':
-        """The space that some of the readings (P,) bool give, explanations in the same order."""
-        few = [explanation.select(rows) for explanation in self.explanations]
-        return ModelSpace(self.null.select(rows), few, self.freedom)
-
-    def amplitudes(self, model: Model) -> list[np.ndarray]:
-        """Posterior mean amplitudes of each of a model's explanations, in their own units."""
-        along = self._directions.amplitudes(model.chosen, model.sizes)
-        own = (self.principal[k].axes for k in model.chosen)
-        return [axes @ part for axes, part in zip(own, along, strict=True)]
-
-    def p_value(self, seed: int) -> float:
-        """Probability of at least this much evidence for any cause if none acted.
-
-        By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes, which is
-        computed for every draw as for the readings: nothing is chosen on the readings.
-        """
-        found = self.evidence(self.null.deviation[:, np.newaxis])[0]
-        return float((1 + np.count_nonzero(self.null_evidence(seed) >= found)) / (1 + DRAWS))
-
-    def null_evidence(self, seed: int) -> np.ndarray:
-        """(DRAWS,) simulated evidence if no cause acted."""
-        if seed not in self._simulated:
-            self._simulated[seed] = self.evidence(self.null_draws(seed))
-        return self._simulated[seed]
-
-    def null_draws(self, seed: int) -> np.ndarray:
-        """(P, DRAWS) whitened deviations behind ``null_evidence``."""
-        return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
+    def of_readings(self) -> np.ndarray:
+        """(K, S) log Bayes factors of each explanation at every size."""
+        deviation = self.null.deviation[:, np.newaxis]
+        factors = [self._by_size(k, deviation)[:, 0] for k in range(len(self.principal))]
+        return np.array(factors).reshape(len(self.principal), len(SIZES))
 
     def evidence(
         self,
@@ -250,103 +75,229 @@ class ModelSpace:
             chosen: numbers of explanations; default: all.
             shifts: (P, R), each of which is added to all deviations: R times as many.
         """
-        terms = []
-        for k in range(len(self.explanations)) if chosen is None else chosen:
-            explanation = self.explanations[k]
-            odds = self._log_odds[self.causes.index(explanation.cause)]
-            share = np.log(explanation.share / len(SIZES))
-            terms.append(np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + share + odds)
+        numbers = range(len(self.explanations)) if chosen is None else chosen
+        terms = [
+            np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + log_share(e)
+            for k in numbers
+            for e in [self.explanations[k]]
+        ]
         return np.logaddexp.reduce(terms)
+
+    def null_draws(self, seed: int) -> np.ndarray:
+        """(P, DRAWS) whitened deviations if no cause acted."""
+        return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
 
     def _by_size(
         self, k: int, deviations: np.ndarray, shifts: np.ndarray | None = None
     ) -> np.ndarray:
-        """(S, D) log Bayes factors of one explanation at every size, for (P, D) deviations."""
         return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
 
-    @cached_property
-    def _factors_alone(self) -> np.ndarray:
-        """(K, S) log Bayes factors of each explanation alone at every size."""
-        shape = len(self.explanations), len(SIZES)
-        chosen = np.repeat(np.arange(shape[0]), shape[1])[:, np.newaxis]
-        sizes = np.tile(SIZES, shape[0])[:, np.newaxis]
-        return log_evidence_of_each(self._directions, chosen, sizes).reshape(shape)
 
-    @cached_property
-    def _alone(self) -> list[Model]:
-        """One cause each: its evidence averaged, and its best explanation."""
-        found = []
-        for number, cause in enumerate(self.causes):
-            numbers = range(self._first[number], self._last[number])
-            factors = self._factors_alone[numbers]
-            values = factors + self._log_share_alone[numbers]
-            k, s = np.unravel_index(values.argmax(), values.shape)
-            weight = float(np.logaddexp.reduce(values, axis=None)) + self._log_odds[number]
-            any_form = factors + self._log_share[numbers]
-            best = factors.flat[any_form.argmax()]
-            self._averaging[cause] = (
-                float(np.logaddexp.reduce(any_form, axis=None)) + self._log_odds[number] - best
-            )
-            found.append(Model((cause,), (numbers[k],), (float(SIZES[s]),), weight))
-        return found
+def log_share(explanation: Explanation) -> float:
+    """Logarithm of the prior odds of an explanation at one size against nothing missing."""
+    unknown = explanation.cause == UNKNOWN
+    odds = log_odds(PRIOR_UNKNOWN) - np.log(2.0) if unknown else log_odds(PRIOR_EFFECT)
+    return float(odds + np.log(explanation.share / len(SIZES)))
 
-    def _most_probable(self, models: Iterable[Model], count: int) -> list[Model]:
-        """The best ones, weighed with the explanations that they have."""
-        all_models = list(models)
-        if not all_models:
-            return []
-        evidence = log_evidence_of_each(
-            self._directions,
-            np.array([model.chosen for model in all_models]),
-            np.array([model.sizes for model in all_models]),
+
+class Weighed(NamedTuple):
+    """Sizes of the remainder, the null model with it, and the logarithm of its weight."""
+
+    sizes: Sizes
+    null: NullModel
+    log_weight: float
+
+    @staticmethod
+    def of(plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float) -> 'Weighed':
+        """Weigh one choice by its evidence and its prior."""
+        null = plain.with_remainder(remainder.covariance(sizes))
+        evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
+        prior = log_odds(PRIOR_UNKNOWN) - np.log(2.0) if sizes.is_beyond_nature else 0.0
+        return Weighed(sizes, null, evidence + sizes.log_prior + float(prior))
+
+
+@dataclass(frozen=True)
+class RemainderFigures:
+    """What nature leaves over in a campaign, as far as its readings show it.
+
+    Attributes:
+        setting_share, part_share: by how much the film of a setting differs from any law, and
+            parts of one setting from each other, as shares of the thickest film.
+        length_m: over which neighbours differ alike [m].
+        footprint_of_peak: largest deviation of the footprint from eq. (1), over its peak.
+    """
+
+    setting_share: float
+    part_share: float
+    length_m: float
+    footprint_of_peak: float
+
+    def __str__(self) -> str:
+        setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
+        parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
+        return (
+            f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
+            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm; '
+            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak.'
         )
-        weights = [
-            value + sum(self._averaging[c] for c in model.causes)
-            for value, model in zip(evidence, all_models, strict=True)
-        ]
-        best = np.argsort(-np.array(weights), kind='stable')[:count]
-        return [replace(all_models[k], log_weight=float(weights[k])) for k in best]
 
-    def _refined(self, model: Model) -> Model:
-        """The same causes with the explanations and sizes that are best together."""
-        numbers = np.array([self.causes.index(c) for c in model.causes])
-        # Beside other effects an explanation may be physical that is not so alone; beside what has
-        # no shape it would be too easily.
-        shares = (self._log_share, self._log_share_alone)
-        for log_share in shares[1:] if PRIOR.keys() & set(model.causes) else shares:
-            chosen, sizes = np.array(model.chosen), np.array(model.sizes)
-            refine(
-                self._directions, log_share, self._first[numbers], self._last[numbers], SIZES,
-                chosen, sizes, SWEEPS,
-            )  # fmt: skip
-            amounts = self.amplitudes(Model(model.causes, tuple(chosen), tuple(sizes)))
-            allowed = log_share[chosen, np.searchsorted(SIZES, sizes)].min() > NEVER
-            if allowed and all(map(self._is_physical, chosen, amounts)):
-                break
+
+class ModelSpace:
+    """What may be missing beside a model, whatever the size of what nature leaves over.
+
+    Args:
+        weighed: the null hypothesis at the sizes of the remainder that matter.
+        explanations: of all causes.
+        remainder: what the sizes are of.
+        freedom: degrees of freedom of the noise estimate.
+    """
+
+    def __init__(
+        self,
+        weighed: Sequence[Weighed],
+        explanations: Sequence[Explanation],
+        remainder: Remainder,
+        freedom: float,
+    ) -> None:
+        self.explanations, self.remainder, self.freedom = explanations, remainder, freedom
+        self.nature = [one for one in weighed if not one.sizes.is_beyond_nature]
+        self.beyond = [one for one in weighed if one.sizes.is_beyond_nature]
+        self.evidences = [CauseEvidence(one.null, explanations, freedom) for one in self.nature]
+
+    @cached_property
+    def _log_null(self) -> float:
+        return float(np.logaddexp.reduce([one.log_weight for one in self.nature]))
+
+    @cached_property
+    def share(self) -> np.ndarray:
+        """Posterior probability of each of nature's sizes if nothing is missing."""
+        return np.exp([one.log_weight - self._log_null for one in self.nature])
+
+    @cached_property
+    def central(self) -> CauseEvidence:
+        """The evidence at nature's most probable sizes, for what needs no average."""
+        return self.evidences[int(self.share.argmax())]
+
+    @cached_property
+    def of_parts(self) -> np.ndarray:
+        """(P, P) remainder of parts and settings at nature's most probable sizes."""
+        return self.remainder.of_parts(self.nature[int(self.share.argmax())].sizes)
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """Log evidence of the model at all sizes, with or without something unknown beside it."""
+        return float(np.logaddexp(self._log_null, self._log_null + self.alone[UNKNOWN]))
+
+    @cached_property
+    def alone(self) -> dict[str, float]:
+        """Logarithm of each cause's odds against nothing missing, most probable first."""
+        terms: dict[str, list[float]] = {}
+        for k, explanation in enumerate(self.explanations):
+            factors = np.array([e.of_readings[k] for e in self.evidences])
+            averaged = np.logaddexp.reduce(factors + np.log(self.share)[:, np.newaxis], axis=None)
+            terms.setdefault(explanation.cause, []).append(averaged + log_share(explanation))
+        beyond = [one.log_weight - self._log_null for one in self.beyond]
+        terms[UNKNOWN] = [*terms.get(UNKNOWN, []), *beyond, -np.inf]
+        found = {cause: float(np.logaddexp.reduce(values)) for cause, values in terms.items()}
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+    def inclusion(self, cause: str) -> float:
+        """Posterior probability that a cause acts, if one acts at the most."""
+        total = np.logaddexp.reduce([0.0, *self.alone.values()])
+        return float(np.exp(self.alone[cause] - total))
+
+    def by_law(self, cause: str) -> Effect:
+        """An effect in its best shape with the amplitudes that it has if nothing else acts."""
+        best, found = -np.inf, None
+        for one in self.evidences:
+            for k, explanation in enumerate(self.explanations):
+                if explanation.cause == cause and one.of_readings[k].max() > best:
+                    size = int(one.of_readings[k].argmax())
+                    best, found = one.of_readings[k, size], (one, k, size)
+        assert found is not None
+        one, k, size = found
+        amounts = one.principal[k].amplitudes(one.null.deviation, SIZES[[size]])[0]
+        law = self.explanations[k].law
+        assert law is not None
+        return law.with_amplitudes(amounts)
+
+    def p_value(self, seed: int) -> float:
+        """Probability of at least this much evidence for any cause if none acted.
+
+        By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes at all sizes,
+        which is computed for every draw as for the readings: nothing is chosen on the readings.
+        """
+        random = np.random.default_rng(seed)
+        draws = []
+        for one, count in zip(self.nature, random.multinomial(DRAWS, self.share), strict=True):
+            noise = simulated(len(one.null.raw), self.freedom, count, random)
+            draws.append(one.null.lower @ noise)
+        found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
+        by_chance = self._evidence(np.hstack(draws))
+        return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
+
+    def _evidence(self, raw: np.ndarray) -> np.ndarray:
+        """(D,) log evidence that any cause acts against none, for deviations (P, D)."""
+        nulls, causes = [], []
+        for one, evidence in zip(self.nature, self.evidences, strict=True):
+            deviations = one.null.whiten(raw)
+            null = self._log_weight(one, deviations)
+            nulls.append(null)
+            causes.append(null + evidence.evidence(deviations))
+        causes += [self._log_weight(one, one.null.whiten(raw)) for one in self.beyond]
+        return np.logaddexp.reduce(causes) - np.logaddexp.reduce(nulls)
+
+    def _log_weight(self, one: Weighed, deviations: np.ndarray) -> np.ndarray:
+        """(D,) what the weight of one choice of sizes would be for whitened deviations (P, D)."""
+        here, there = one.null.deviation[:, np.newaxis], deviations
+        change = one.null.log_evidence(there, self.freedom)
+        return one.log_weight + change - one.null.log_evidence(here, self.freedom)
+
+    @property
+    def figures(self) -> RemainderFigures:
+        """What is left over: sizes on average over their posterior, the footprint's mean."""
+        sizes, null = self.nature[int(self.share.argmax())].sizes, self.central.null
+        columns, of_peak = self.remainder.footprints[sizes.footprint]
+        amplitudes = null.whiten(columns).T @ null.deviation
+        found = [one.sizes for one in self.nature]
+        return RemainderFigures(
+            float(self.share @ [one.setting for one in found]),
+            float(self.share @ [one.part for one in found]),
+            float(self.share @ [self.remainder.lengths_m[one.length] for one in found]),
+            float(np.abs(of_peak @ amplitudes).max()),
+        )
+
+
+def probable_sizes(
+    plain: NullModel, remainder: Remainder, explanations: Sequence[Explanation], freedom: float
+) -> list[Sizes]:
+    """The sizes that matter where nothing, or the law of any one effect, acts."""
+    laws = [e.columns for e in explanations if e.law is not None]
+    columns = np.hstack(laws) if laws else plain.columns[:, :0]
+    found: list[tuple[float, Sizes]] = []
+    for sizes in remainder.choices():
+        one = Weighed.of(plain, remainder, sizes, freedom)
+        law = one.null.whiten(columns)
+        score, square = law.T @ one.null.deviation, np.sum(law**2, axis=0)
+        precision = 1.0 + np.multiply.outer(SIZES**2, square)
+        explained = (SIZES**2)[:, np.newaxis] * score**2 / precision
+        if np.isfinite(freedom):
+            count = freedom + len(plain.raw)
+            whole = freedom + one.null.deviation @ one.null.deviation
+            gain = -0.5 * count * np.log1p(-explained / whole)
         else:
-            return replace(model, log_weight=NEVER)
-        weight = self._log_evidence(chosen, sizes)
-        alone = {m.causes[0]: m for m in self._alone}
-        for cause, k in zip(model.causes, chosen, strict=True):
-            best = self.explanations[alone[cause].chosen[0]]
-            weight += self._averaging[cause]
-            weight += np.log(self.explanations[k].share / best.share)
-        return Model(model.causes, tuple(map(int, chosen)), tuple(map(float, sizes)), weight)
-
-    def _log_evidence(self, chosen: ArrayLike, sizes: ArrayLike) -> float:
-        together = np.atleast_2d(chosen), np.atleast_2d(sizes)
-        return float(log_evidence_of_each(self._directions, *together)[0])
+            gain = 0.5 * explained
+        best = np.max(gain - 0.5 * np.log(precision), initial=0.0)
+        with_law = one.log_weight + log_odds(PRIOR_EFFECT) + float(best)
+        found.append((float(np.logaddexp(one.log_weight, with_law)), sizes))
+    kept = []
+    for beyond in (False, True):
+        here = sorted((f for f in found if f[1].is_beyond_nature == beyond), key=lambda f: -f[0])
+        least = float(np.logaddexp.reduce([weight for weight, _ in here])) + np.log(LEAST_SHARE)
+        kept += [sizes for weight, sizes in here[:MOST_SIZES] if weight > least]
+    return kept
 
 
-def _joined(first: Model, second: Model) -> Model:
-    """The causes of both with the explanations of both, sorted by cause."""
-    members = sorted(
-        zip(
-            (*first.causes, *second.causes),
-            (*first.chosen, *second.chosen),
-            (*first.sizes, *second.sizes),
-            strict=True,
-        )
-    )
-    causes, chosen, sizes = zip(*members, strict=True)
-    return Model(causes, chosen, sizes)
+def inclusion_of(log_weights: Sequence[float], nothing: float) -> float:
+    """Posterior probability of any of some models against one without what they have more."""
+    return float(expit(np.logaddexp.reduce(log_weights) - nothing))

@@ -230,9 +230,10 @@ def power_of(
         freedom: degrees of freedom of the noise estimate.
     """
     space = part.space(part.study(vertices), freedom)
-    null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]
+    draws = space.null_draws(seed)
+    null, draws = space.evidence(draws), draws[:, :DRAWS]
     found: dict[str, list[float]] = {}
-    for law in (e.sensitivity for e in space.explanations if e.sensitivity is not None):
+    for law in (e.law for e in space.explanations if e.law is not None):
         for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
             strength = float(np.linalg.norm(column))
             direction = (-column if side < 0.0 else column) / max(strength, 1e-12)

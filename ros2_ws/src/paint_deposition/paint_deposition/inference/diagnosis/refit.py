@@ -10,15 +10,11 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.diagnosis.cross_validation import left_out
-from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.evidence import NullModel, left_out
 from paint_deposition.inference.diagnosis.explanations import (
-    FREE_ADDITION_UM,
-    FREE_FACTOR,
-    FREE_LENGTHS,
+    ADDITION_UM,
+    FACTOR,
     LENGTHS,
-    UNKNOWN,
-    WIGGLY,
     Explanation,
     of_random,
 )
@@ -64,14 +60,15 @@ def refit(
     run = Run(campaign, start, candidates, seed, progress, known)
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
-    space = run.linearise()
+    space = run.space(run.fit)
+    run.left_over = space.figures
     p_value = space.p_value(seed)
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'
         if not missing:
             return run.diagnosis(p_value, 'none_missing', f'{reason}.')
-        unknown = locate_unexplained(run.study, run.fit, False, seed)
+        unknown = locate_unexplained(run.study, run.fit, seed)
         reason += '; something is missing, which diagnose can tell.'
         return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
     if law is not None:
@@ -79,8 +76,10 @@ def refit(
         return _with_learned(run, law, p_value)
     progress(f'fitting with {added.id}')
     fits = [run.fitted_with([shape]) for shape in run.candidates[added.id]]
-    before, probability = run.history[-1], space.against_nothing(added.id)
-    run.record(added.id, min(fits, key=lambda fit: fit.objective))
+    before, best = run.history[-1], min(fits, key=lambda fit: fit.objective)
+    gain = run.log_evidence(run.null(best)) - run.log_evidence(run.null(run.fit))
+    probability = float(expit(gain))
+    run.record(added.id, best)
     run.accepted.append(run.described((added.id,), probability, before))
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
@@ -93,7 +92,7 @@ def refit(
 
 def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence."""
-    options, null = _options(run, law), run.plain
+    options, null = _options(run, law), run.plain(run.fit)
     weights = _log_bayes_factors(run, null, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before = run.history[-1]
@@ -106,18 +105,18 @@ def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
     )
     if p_value >= ALPHA:
         return run.diagnosis(p_value, 'none_missing', reason)
-    unknown = locate_unexplained(run.study, run.history[0].fit, False, run.seed)
+    unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)
     return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
 
 
 def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
     """Laws over the covariate of every kind and length of correlation."""
     found = [
-        of_random(UNKNOWN, run.study, basis.random(unit, length), 1.0)
+        of_random(run.study, basis.random(unit, length))
         for kind in law.kinds
         for basis in bases_over(run.study, run.fit.model, law, kind)
-        for length in LENGTHS.get(law.covariate, (WIGGLY, *FREE_LENGTHS))
-        for unit in (FREE_FACTOR if kind == 'factor' else FREE_ADDITION_UM,)
+        for length in LENGTHS.get(law.covariate, LENGTHS['covariate'])
+        for unit in (FACTOR if kind == 'factor' else ADDITION_UM,)
     ]
     if not found:
         raise ModelError(

@@ -10,16 +10,15 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
-    FIELD_SHARE,
+    FACTOR,
     FOOTPRINT,
-    FOOTPRINT_SHARE,
     LAW_LENGTH,
     LENGTHS,
     UNKNOWN,
 )
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.inference.diagnosis.separation import Predicted
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_along
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
@@ -140,9 +139,8 @@ class Rivals:
     ) -> Predicted:
         """What an explanation predicts, its amounts being 0."""
         if rival.name == FOOTPRINT:
-            (*_, every) = footprint_kinds()
             basis = footprint_along(rays, self.fit.model.patterns)
-            random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], every)
+            random = basis.random(FACTOR, LENGTHS[FOOTPRINT][0])
             return _shapeless(random.change_um / sigma_um[:, np.newaxis])
         values = (
             Covariate(same[0].name, np.concatenate([part.values for part in same]))
@@ -157,7 +155,7 @@ class Rivals:
             none = np.zeros(len(law.low))
             return Predicted(law.columns, smooth, none, law.low, law.high)
         film = forward.predict_um(self.fit.model)
-        return _shapeless((FIELD_SHARE * film / sigma_um)[:, np.newaxis] * smooth)
+        return _shapeless((FACTOR * film / sigma_um)[:, np.newaxis] * smooth)
 
     def _functions(self, covariate: Covariate) -> np.ndarray:
         """(P, n) smooth random functions of a covariate, of unit variance within its range."""
@@ -179,7 +177,7 @@ def rivals_of(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> Riva
     if not names:
         return None
     wanted: dict[str, type[Effect] | str] = {n: library[n] for n in names}
-    if diagnosis.unknown is not None and diagnosis.unknown.kind != FOOTPRINT:
+    if diagnosis.unknown is not None:
         wanted[UNKNOWN] = diagnosis.unknown.covariate
     wanted[FOOTPRINT] = FOOTPRINT
     rivals = Rivals.of(diagnosis.study, diagnosis.history[-1].fit, wanted)

@@ -6,6 +6,7 @@ user asks for.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import fdtr
@@ -14,8 +15,20 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import Explanation, explanations, law_errors
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.explanations import (
+    Explanation,
+    law_errors,
+    of_any_form,
+    of_effects,
+    of_footprint,
+)
+from paint_deposition.inference.diagnosis.model_space import (
+    ModelSpace,
+    RemainderFigures,
+    Weighed,
+    probable_sizes,
+)
+from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.diagnosis.verdict import (
@@ -86,37 +99,72 @@ class Run:
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
+        self.left_over: RemainderFigures | None = None
         self.trouble = trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
         return FreeParameters.of(start, *start.effects, known=self.known)
 
+    @cached_property
+    def remainder(self) -> Remainder:
+        """What nature leaves over, around the fit that the run began with."""
+        return Remainder.of(self.study, self.history[0].fit)
+
+    @cached_property
+    def any_form(self) -> list[Explanation]:
+        """Laws of any form, for what is outside the library."""
+        return of_any_form(self.study, self.history[0].model)
+
+    @cached_property
+    def options(self) -> list[Explanation]:
+        """Laws of any form that may be learned beside the newest model."""
+        model = self.fit.model
+        return [*of_any_form(self.study, model), *of_footprint(self.study, model)]
+
+    @cached_property
+    def sizes(self) -> list[Sizes]:
+        """The sizes of the remainder that matter."""
+        fit = self.history[0].fit
+        laws = list(of_effects(self.study, fit, self.candidates))
+        return probable_sizes(self.null(fit), self.remainder, laws, self.freedom)
+
     @property
-    def added(self) -> frozenset[str]:
-        """Ids of the candidates that the newest model has."""
-        return frozenset(effect.id for effect in self.taken)
+    def freedom(self) -> float:
+        """Degrees of freedom of the noise estimate."""
+        return self.study.noise.degrees_of_freedom
 
-    def linearise(self, fit: Fit | None = None) -> ModelSpace:
-        """The space of what may be missing beside a model, whose effects' laws may be off.
-
-        Args:
-            fit: of the model; default the newest.
-        """
-        fit = fit or self.fit
+    def null(self, fit: Fit) -> NullModel:
+        """The model of a fit as the null hypothesis, without a remainder; its laws may be off."""
         kept = frozenset(effect.id for effect in self.candidates_in(fit))
         free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
-        null = NullModel.around(fit, free)
-        found = explanations(self.study, fit, self.candidates)
-        space = ModelSpace(null, found, self.study.noise.degrees_of_freedom)
+        return NullModel.around(fit, free)
+
+    def plain(self, fit: Fit) -> NullModel:
+        """The model of a fit as it is, with nothing missing."""
+        return NullModel.around(fit, self.study.nuisance)
+
+    def weighed(self, null: NullModel) -> list[Weighed]:
+        """A null hypothesis at the sizes of the remainder that matter."""
+        return [Weighed.of(null, self.remainder, sizes, self.freedom) for sizes in self.sizes]
+
+    def space(self, fit: Fit, null: NullModel | None = None) -> ModelSpace:
+        """What may be missing beside the model of a fit.
+
+        Args:
+            null: that of the fit, if it is known.
+        """
+        null = null or self.null(fit)
+        found = [*of_effects(self.study, fit, self.candidates), *self.any_form]
+        space = ModelSpace(self.weighed(null), found, self.remainder, self.freedom)
         if self.testable is None:
-            self.testable = testability(space, self.seed)
+            self.testable = testability(space.central, self.seed)
         return space
 
-    @property
-    def plain(self) -> NullModel:
-        """The newest model as it is, with nothing missing."""
-        return NullModel.around(self.fit, self.study.nuisance)
+    def log_evidence(self, null: NullModel) -> float:
+        """Log evidence of a refitted model, with or without something unknown beside it."""
+        space = ModelSpace(self.weighed(null), self.any_form, self.remainder, self.freedom)
+        return space.log_evidence
 
     @property
     def taken(self) -> list[Effect]:
@@ -241,6 +289,7 @@ class Run:
             not_testable,
             detectable,
             remarks=self.remarks,
+            remainder=self.left_over,
         )
 
 

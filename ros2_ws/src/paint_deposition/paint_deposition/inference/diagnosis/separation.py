@@ -15,12 +15,13 @@ from scipy.linalg import cho_solve, cholesky, solve_triangular
 from scipy.optimize import lsq_linear
 
 from paint_deposition.inference.diagnosis.explanations import LAW_ERROR
-from paint_deposition.inference.diagnosis.model_space import LARGEST_ERROR
 
 # Precision of amplitudes that are free, which only keeps the equations regular.
 ALMOST_FREE = 1e-6
 # A smaller change of all readings together, in standard deviations, is none to speak of.
 NOTICED = 1.0
+# The error of a law is at most this large beside the law.
+LARGEST_ERROR = 0.6
 # The errors of laws are made smaller step by step until they are as small as they must be.
 MOST_STEPS, TOLERANCE = 12, 0.1
 

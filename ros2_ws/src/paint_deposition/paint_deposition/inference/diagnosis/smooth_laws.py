@@ -28,7 +28,7 @@ FAINT, OUTERMOST = 0.02, 0.01
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
 # Steps between the knots of a map [m], and of the radius of a footprint.
-MAP_STEP_M, RADII = 0.06, 10
+MAP_STEP_M, RADII = 0.06, 20
 # The pattern ends at this many of its widths beyond the ring.
 WIDTHS = 3.0
 # Distance of knots that have nothing in common.
@@ -55,28 +55,21 @@ class Basis:
     shortest: float
     edges: bool = False
 
-    def within(self, low: float, high: float) -> np.ndarray:
-        """(K,) knots of a curve at values of its covariate in a range."""
-        axis = CURVES[self.law.covariate].axis
-        first, last = axis(self.settings['low']), axis(self.settings['high'])
-        values = np.linspace(first, last, len(self.knots))
-        return (values >= axis(low)) & (values <= axis(high))
-
-    def random(self, size: float, length: float, among: np.ndarray | None = None) -> 'RandomLaw':
+    def random(self, size: float, length: float, centred: bool = False) -> 'RandomLaw':
         """Random laws.
 
         Args:
             size: standard deviation of the values.
             length: of correlation.
-            among: (K,) bool, knots at which the law is not zero; default all.
+            centred: whether the law leaves the film as a whole as it is.
         """
-        kept = np.arange(len(self.knots)) if among is None else np.flatnonzero(among)
-        small = root_of_field(
-            self.knots[kept], max(length, self.shortest), NEGLIGIBLE,
-            with_edges if self.edges else smooth,
-        )  # fmt: skip
-        root = np.zeros((len(self.knots), small.shape[1]))
-        root[kept] = size * small
+        correlation = with_edges if self.edges else smooth
+        root = size * root_of_field(
+            self.knots, max(length, self.shortest), NEGLIGIBLE, correlation
+        )
+        if centred:
+            film_um = self.film_um.sum(axis=0)
+            root = root - film_um @ root / film_um.sum()
         return RandomLaw(self, root)
 
 
@@ -246,17 +239,6 @@ def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) ->
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
     change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
-
-
-def footprint_kinds() -> list[np.ndarray]:
-    """(K,) knots of a footprint: those of the mean over the angle, of each harmonic, and of all.
-
-    At the centre the angle means nothing.
-    """
-    radius, wave = np.indices((RADII, WAVES)).reshape(2, -1)
-    sound = (wave == 0) | (radius > 0)
-    order = (wave + 1) // 2
-    return [sound & (order == k) for k in range(order.max() + 1)] + [sound]
 
 
 def _range(rays: list[Rays], values: list[np.ndarray]) -> tuple[float, float]:

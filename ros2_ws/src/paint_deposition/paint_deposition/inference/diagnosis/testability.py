@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.model_space import CauseEvidence
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 
 # Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
@@ -23,13 +23,14 @@ FOLLOWING = 6
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 
-def testability(space: ModelSpace, seed: int) -> Testability:
+def testability(space: CauseEvidence, seed: int) -> Testability:
     """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
     shapes: dict[str, list[Sensitivity]] = {}
     for explanation in space.explanations:
-        if explanation.sensitivity is not None:
-            shapes.setdefault(explanation.cause, []).append(explanation.sensitivity)
-    null, draws = space.null_evidence(seed), space.null_draws(seed)[:, :DRAWS]
+        if explanation.law is not None:
+            shapes.setdefault(explanation.cause, []).append(explanation.law)
+    draws = space.null_draws(seed)
+    null, draws = space.evidence(draws), draws[:, :DRAWS]
     not_testable, detectable = [], {}
     for effect_id, found in shapes.items():
         # Along the combination of amplitudes that shows most.
@@ -41,7 +42,7 @@ def testability(space: ModelSpace, seed: int) -> Testability:
 
 
 def _detectable(
-    space: ModelSpace, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
+    space: CauseEvidence, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
 ) -> dict[str, float]:
     """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
     info = type(shapes[0].effect).parameters()
@@ -61,7 +62,9 @@ def _detectable(
     return found
 
 
-def _ratio(space: ModelSpace, direction: np.ndarray, null: np.ndarray, draws: np.ndarray) -> float:
+def _ratio(
+    space: CauseEvidence, direction: np.ndarray, null: np.ndarray, draws: np.ndarray
+) -> float:
     """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried."""
     power = power_along(space, direction, RATIOS, null, draws)
     if power[-1] < POWER:
@@ -70,7 +73,7 @@ def _ratio(space: ModelSpace, direction: np.ndarray, null: np.ndarray, draws: np
 
 
 def power_along(
-    space: ModelSpace,
+    space: CauseEvidence,
     direction: np.ndarray,
     ratios: np.ndarray,
     null: np.ndarray,
@@ -89,7 +92,7 @@ def power_along(
     return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
 
 
-def _following(space: ModelSpace, direction: np.ndarray) -> Sequence[int]:
+def _following(space: CauseEvidence, direction: np.ndarray) -> Sequence[int]:
     """Numbers of the explanations that take up most of a direction."""
     taken = [
         float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))

@@ -14,7 +14,7 @@ DRAWS = 1000
 CURVE_POINTS = 15
 
 
-def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Unknown:
+def locate_unexplained(study: Study, fit: Fit, seed: int) -> Unknown:
     """Regress the deviations on each covariate, smoothly, and take the one that explains most.
 
     The p-value is that of the maximum over all covariates under the null hypothesis.
@@ -22,7 +22,6 @@ def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Un
     Args:
         study: the readings.
         fit: the model so far.
-        footprint: whether the pattern itself is suspected.
         seed: of the simulated deviations.
     """
     null = NullModel.around(fit, study.nuisance)
@@ -41,7 +40,6 @@ def locate_unexplained(study: Study, fit: Fit, footprint: bool, seed: int) -> Un
     shown = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
     regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
     return Unknown(
-        'footprint' if footprint else 'effect',
         covariate.name,
         float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
         {

@@ -10,8 +10,9 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import explanations
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.explanations import of_any_form, of_effects
+from paint_deposition.inference.diagnosis.model_space import CauseEvidence
+from paint_deposition.inference.diagnosis.remainder import Remainder
 from paint_deposition.inference.diagnosis.sensitivities import (
     Sensitivity,
     neutral_shapes,
@@ -95,12 +96,16 @@ class UnmeasuredPart:
             for shape in shapes
         ]
 
-    def space(self, study: Study, freedom: float) -> ModelSpace:
+    def space(self, study: Study, freedom: float) -> CauseEvidence:
         """What the diagnosis would search.
 
         Args:
             freedom: degrees of freedom of the noise estimate.
         """
         fit = self.fit(study)
-        null = NullModel.around(fit, study.nuisance)
-        return ModelSpace(null, explanations(study, fit, self.candidates), freedom)
+        remainder = Remainder.of(study, fit)
+        nature = [sizes for sizes in remainder.choices() if not sizes.is_beyond_nature]
+        usual = max(nature, key=lambda sizes: sizes.log_prior)
+        null = NullModel.around(fit, study.nuisance, remainder=remainder.covariance(usual))
+        found = [*of_effects(study, fit, self.candidates), *of_any_form(study, fit.model)]
+        return CauseEvidence(null, found, freedom)

@@ -11,8 +11,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
-from paint_deposition.inference.diagnosis.cross_validation import hold_out
-from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
+from paint_deposition.inference.diagnosis.model_space import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -65,14 +65,12 @@ class Unknown:
     """Where something shows that the library does not explain.
 
     Attributes:
-        kind: 'footprint' if the pattern itself deviates from eq. (1), else 'effect'.
         covariate: the one that the residual depends on most.
         p_value: of that dependence.
         curve: values of the covariate and mean residual there [um].
         where: in words.
     """
 
-    kind: str
     covariate: str
     p_value: float
     curve: dict[str, list[float]]
@@ -126,6 +124,7 @@ class Diagnosis:
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that were looked for, by id.
         remarks: on what was known before, a sentence each.
+        remainder: what nature leaves over; None where the fit is broken.
         proposals: places to measure and sprays that would settle the diagnosis, best first; see
             ``next_experiment.with_proposals``.
     """
@@ -142,6 +141,7 @@ class Diagnosis:
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
     library: Mapping[str, type[Effect]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
+    remainder: RemainderFigures | None = None
     proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
 
     def __repr__(self) -> str:
@@ -152,7 +152,8 @@ class Diagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""
-        return (*self.warnings, *self.study.notes)
+        left_over = (str(self.remainder),) if self.remainder else ()
+        return (*self.warnings, *self.study.notes, *left_over)
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -212,7 +213,7 @@ class Diagnosis:
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
                 'noise_floor': self.noise_floor_um,
-                'left_out': 'points',
+                'left_out': 'experiments' if self.study.has_several_parts else 'points',
             },
             'experiments': [
                 {'name': one.name, 'rmse_before_um': old.rmse_um, 'rmse_after_um': new.rmse_um}
@@ -233,6 +234,9 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
+            'remainder': self.remainder and asdict(self.remainder),
+            'footprint': self.remainder
+            and {'deviation_of_peak': self.remainder.footprint_of_peak},
             'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),

@@ -145,9 +145,18 @@ def fit_readings(
     )
 
 
-def covariance_factor(directions: np.ndarray) -> np.ndarray:
-    """(P, P) lower Cholesky factor of unit noise with deviations along directions (P, n)."""
-    return cholesky(np.eye(len(directions)) + directions @ directions.T, lower=True)
+def covariance_factor(directions: np.ndarray, more: np.ndarray | None = None) -> np.ndarray:
+    """(P, P) lower Cholesky factor of unit noise with deviations along directions (P, n).
+
+    Args:
+        directions: for unit amplitudes.
+        more: (P, P) covariance of further deviations.
+    """
+    covariance = directions @ directions.T
+    if more is not None:
+        covariance += more
+    covariance[np.diag_indices(len(covariance))] += 1.0
+    return cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
 
 
 def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:

@@ -5,6 +5,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.cluster.vq import kmeans2
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -268,11 +269,22 @@ class Study:
             for same in zip(*(rays.covariates for rays in self.rays(model)), strict=True)
         ]
 
+    @property
+    def has_several_parts(self) -> bool:
+        """Whether whole parts can be left out."""
+        return len(self.campaign.experiments) > 1
+
     def folds(self, seed: int = 0) -> np.ndarray:
-        """(P,) number of the fold in which each point is left out, all at one place together."""
-        places, place = np.unique(self.campaign.positions_m, axis=0, return_inverse=True)
-        fold = np.random.default_rng(seed).permutation(np.arange(len(places)) % FOLDS)
-        return fold[place.ravel()]
+        """(P,) number of the fold in which each point is left out.
+
+        Whole parts where there are several, else patches of the one part.
+        """
+        parts = self.campaign.experiment_of
+        if self.has_several_parts:
+            return parts % FOLDS
+        places = self.campaign.positions_m
+        _, patch = kmeans2(places / places.std(), FOLDS, minit='++', rng=seed)
+        return patch
 
     def passes(self, model: DepositionModel) -> np.ndarray:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""

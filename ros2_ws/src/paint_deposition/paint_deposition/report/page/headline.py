@@ -148,7 +148,6 @@ def _undecided(data: ReportData, diagnosis: Diagnosis) -> Headline:
 
 def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
     unknown, reason, where = diagnosis.unknown, diagnosis.reason, ''
-    footprint = unknown is not None and unknown.kind == 'footprint'
     title = 'Something shows that no known effect explains'
     remedy = (
         'Write the effect you suspect as a file of your own and add it; the charts of the '
@@ -161,17 +160,12 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
             f'{capital(in_print(unknown.where))}; most clearly against {label} '
             f'({p_words(unknown.p_value)}).'
         )
-    if footprint:
-        title = "The gun's pattern differs from the model's two Gaussians"
-        remedy = 'Spray one straight pass on a flat panel and measure across it.'
     if any(map(is_learned, diagnosis.accepted)):
         title += '; its law was learned'
         remedy = (
             'Look at the learned laws below, and name the cause if you can. The model with them '
             'predicts as the error says, within the range of the readings.'
         )
-        if footprint:
-            title = "The gun's pattern differs from the model's two Gaussians; it was learned"
     facts = (
         ('What is missing', reason),
         ('Where it shows', where),

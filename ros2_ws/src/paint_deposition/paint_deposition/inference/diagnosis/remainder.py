@@ -1,0 +1,267 @@
+"""What nature leaves over: smooth errors of every part that no law explains and no gauge made.
+
+Sprays of one setting differ from each other, alike in neighbouring places, and their shape changes
+with the setting in more ways than any law says. Each part therefore has a smooth error of its own,
+shared by parts that were painted alike as far as it is the setting's, and the footprint deviates
+from the two Gaussians of eq. (1) on all parts alike. Their sizes and lengths are not known: they
+are hyperparameters with a prior from measured sprays, over which every evidence is averaged.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.spatial.distance import cdist
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.footprint import WAVES
+from paint_deposition.effects.library.tcp_offset import TcpOffset
+from paint_deposition.inference.diagnosis.smooth_laws import RADII, Basis, footprint_basis
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.smooth_fields import smooth
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.model.eq1_pattern import PlanarPattern
+
+# Sizes that are considered, and the prior of each: its median, and the factor that is one standard
+# deviation. The footprint's is a share of its peak. Those of settings and of single parts are
+# shares of the part's thickest film, and fall with the root of the film: sprays of flat fans
+# differ by 0.5 to 5 % of the peak, a third as much where the film is a twentieth.
+FOOTPRINTS, USUAL_FOOTPRINT = (0.01, 0.03, 0.1, 0.3), (0.08, 2.5)
+SETTINGS, USUAL_SETTING = (0.004, 0.012, 0.035), (0.012, 2.0)
+PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
+# A setting that differs by this share of its thickest film: no nature does, something unknown.
+BEYOND_NATURE = 0.1
+# Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
+# footprint in steps of its radius.
+LENGTHS, FOOTPRINT_LENGTHS = (0.2, 0.6), (2.0, 6.0)
+# The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
+TAILS = 0.5
+# The flux is off by this share of itself at the most, as a standard deviation.
+MOST_OF_FLUX = 1.0
+# The pattern differs between settings by this share of what it differs between jobs, and it moves
+# sideways by this share of its root mean square radius: the measured sprays by 0.01.
+OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.008
+# Distance between parts that share no field, and step of the pattern's sideways move [m].
+FAR_M, STEP_M = 1e6, 1e-3
+# Paths that keep within this distance [m], angle of the axis [rad] and share of the time are the
+# same; they are compared at this many places.
+SAME_PATH_M, SAME_AXIS_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """One choice of the hyperparameters.
+
+    Attributes:
+        footprint: number among FOOTPRINTS.
+        setting, part: shares of the thickest film; the latter 0 where no parts were painted alike.
+        length: number among LENGTHS.
+        log_prior: of this choice, among those of nature or among those beyond it.
+    """
+
+    footprint: int
+    setting: float
+    part: float
+    length: int
+    log_prior: float
+
+    @property
+    def is_beyond_nature(self) -> bool:
+        """Whether so much can only be something unknown."""
+        return self.setting >= BEYOND_NATURE
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What nature leaves over at P points, over the noise.
+
+    Attributes:
+        footprints: for each of its sizes (P, n), the deviation that all parts share; and what the
+            amplitudes make of it, (K, n) shares of the peak at the knots of a footprint.
+        shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
+        settings, parts: for each length (P, P), covariances of fields of size one over parts
+            painted alike together, and over each by itself; of the latter only where parts were
+            painted alike.
+        is_repeated: whether any were.
+        lengths_m: of these fields [m].
+    """
+
+    footprints: tuple[tuple[np.ndarray, np.ndarray], ...]
+    shapes: np.ndarray
+    settings: tuple[np.ndarray, ...]
+    parts: tuple[np.ndarray, ...]
+    is_repeated: bool
+    lengths_m: tuple[float, ...]
+
+    @staticmethod
+    def of(study: Study, fit: Fit) -> 'Remainder':
+        """Around a fit."""
+        model, campaign = fit.model, study.campaign
+        owner = campaign.experiment_of
+        film = np.maximum(study.forward.predict_um(model), 0.0)
+        thickest = np.array([film[owner == k].max() for k in range(len(campaign.experiments))])
+        scale = np.sqrt(film * thickest[owner]) / study.sigma_um
+        group = painted_alike(campaign.experiments)
+        repeated = (np.bincount(group)[group] > 1)[owner]
+        width_m = max(_rms_radius_m(pattern) for pattern in model.patterns)
+        lengths_m = tuple(length * width_m for length in LENGTHS)
+        shapes = _shapes(study, fit, group[owner], SIDEWAYS * width_m)
+
+        def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
+            places = np.column_stack([campaign.positions_m, FAR_M * of])
+            return np.outer(size, size) * smooth(cdist(places, places) / length_m)
+
+        return Remainder(
+            _footprints(study, model),
+            shapes @ shapes.T,
+            tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
+            tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
+            bool(repeated.any()),
+            lengths_m,
+        )
+
+    def choices(self) -> list[Sizes]:
+        """All choices of the hyperparameters; the prior of those of nature sums to one."""
+        found = [
+            Sizes(
+                k, setting, part, length,
+                _log_prior(FOOTPRINTS[k], *USUAL_FOOTPRINT)
+                + (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
+                + (_log_prior(part, *USUAL_PART) if part else 0.0),
+            )
+            for k, setting, part, length in product(
+                range(len(FOOTPRINTS)), (*SETTINGS, BEYOND_NATURE),
+                PARTS if self.is_repeated else (0.0,), range(len(LENGTHS)),
+            )
+        ]  # fmt: skip
+        total = {
+            beyond: np.logaddexp.reduce(
+                [s.log_prior for s in found if s.is_beyond_nature == beyond]
+            )
+            for beyond in (False, True)
+        }
+        return [
+            replace(s, log_prior=s.log_prior - float(total[s.is_beyond_nature])) for s in found
+        ]
+
+    def covariance(self, sizes: Sizes) -> np.ndarray:
+        """(P, P) covariance of all that is left over."""
+        columns, _ = self.footprints[sizes.footprint]
+        return columns @ columns.T + self.of_parts(sizes)
+
+    def of_parts(self, sizes: Sizes) -> np.ndarray:
+        """(P, P) the same without the footprint, which all parts share."""
+        k = sizes.length
+        of_settings = self.shapes + sizes.setting**2 * self.settings[k]
+        return of_settings + sizes.part**2 * self.parts[k] if sizes.part else of_settings
+
+
+def _log_prior(value: float, usual: float, factor: float) -> float:
+    return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
+
+
+def _footprints(study: Study, model: DepositionModel) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    basis = footprint_basis(study, model)
+    flux, tails = _flux_and_tails(model.patterns, basis)
+    found = []
+    for size in FOOTPRINTS:
+        share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
+        roots = [
+            share * basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
+            for length in FOOTPRINT_LENGTHS
+        ]
+        at_knots = np.hstack([TAILS * tails, *roots])
+        columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
+        found.append((columns, flux[:, np.newaxis] * at_knots))
+    return tuple(found)
+
+
+def _flux_and_tails(
+    patterns: Sequence[PlanarPattern], basis: Basis
+) -> tuple[np.ndarray, np.ndarray]:
+    """At the K knots of a footprint: (K,) mean flux over the peak's, (K, 2) its changes.
+
+    The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
+    exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.
+    """
+    radius = np.linspace(0.0, basis.settings['reach_m'], RADII)
+    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)[:, np.newaxis]
+    flux, tails = np.zeros(RADII), np.zeros((RADII, 2))
+    for p in patterns:
+        around = p.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle)).mean(axis=0)
+        flux += around / p.peak_flux_um_per_s / len(patterns)
+        ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
+        u = np.stack([
+            (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2), radius**2 / (2.0 * p.sigma2_m**2)
+        ])  # fmt: skip
+        share = np.stack([ring, centre]) / (ring + centre)
+        change = -share * u * np.log(np.maximum(u, 1e-9))
+        tails += np.clip(change, -MOST_OF_FLUX / TAILS, MOST_OF_FLUX / TAILS).T / len(patterns)
+    mean_over_angle = np.eye(WAVES)[:, :1]
+    return np.repeat(flux, WAVES), np.kron(tails, mean_over_angle)
+
+
+def _shapes(study: Study, fit: Fit, group: np.ndarray, sideways_m: float) -> np.ndarray:
+    """(P, n) by how much pattern and place of the spray differ between groups (P,) of parts."""
+    own = (group[:, np.newaxis] == np.arange(group.max() + 1)).astype(float)
+    moved = sideways_m * _sideways(study, fit.model) / study.sigma_um[:, np.newaxis]
+    changes = [moved]
+    if own.shape[1] > 1:  # with one setting, its pattern is the model's own
+        pattern = fit.parameters.pattern
+        between = OF_JOBS * np.array([c.between_jobs for c in pattern.coordinates])
+        between[[pattern.entries(row)[0] for row in range(pattern.count)]] = 0.0
+        changes.append(fit.jacobian[:, : len(pattern)] * between)
+    return np.hstack([own[:, [k]] * change for change in changes for k in range(own.shape[1])])
+
+
+def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
+    """(P, 2) change of the readings as the pattern moves along the tool's x and y [um/m]."""
+    here = study.forward.predict_um(model)
+    offset = model.effect('tcp_offset') or TcpOffset()
+    moved = []
+    for name in ('offset_x_m', 'offset_y_m'):
+        step = -STEP_M if getattr(offset, name) > 0.0 else STEP_M
+        shifted = offset.model_copy(update={name: getattr(offset, name) + step})
+        moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
+    return np.stack(moved, axis=1)
+
+
+def _rms_radius_m(pattern: PlanarPattern) -> float:
+    """Root mean square radius of a pattern [m]."""
+    reach = pattern.r_m + 5.0 * max(pattern.sigma1_m, pattern.sigma2_m)
+    x = np.linspace(-reach, reach, 81)
+    flux = pattern.flux_um_per_s(x[:, np.newaxis], x)
+    return float(np.sqrt(np.sum(flux * (x[:, np.newaxis] ** 2 + x**2)) / flux.sum()))
+
+
+def painted_alike(experiments: Sequence[Experiment]) -> np.ndarray:
+    """(E,) number of the group of each part: those of one shape, path and setting."""
+    group = np.full(len(experiments), -1)
+    for k, experiment in enumerate(experiments):
+        same = [j for j in range(k) if _alike(experiment, experiments[j])]
+        group[k] = group[same[0]] if same else group.max() + 1
+    return group
+
+
+def _alike(first: Experiment, second: Experiment) -> bool:
+    def sameness(experiment: Experiment) -> tuple[object, ...]:
+        extent = tuple(np.round(experiment.measured_points.extent_m, 3))
+        return experiment.switched_off, experiment.brushes, extent
+
+    if sameness(first) != sameness(second):
+        return False
+    clocks = [np.cumsum(e.path.flow * e.path.dwell_s) for e in (first, second)]
+    if abs(clocks[0][-1] - clocks[1][-1]) > SAME_TIME * clocks[0][-1]:
+        return False
+    rows = [
+        np.searchsorted(clock, np.linspace(0.0, clock[-1], PLACES)).clip(0, len(clock) - 1)
+        for clock in clocks
+    ]
+    places = [e.path.position_m[r] for e, r in zip((first, second), rows, strict=True)]
+    axes = [e.path.rotation[r][:, :, 2] for e, r in zip((first, second), rows, strict=True)]
+    return bool(
+        np.abs(places[0] - places[1]).max() < SAME_PATH_M
+        and np.abs(axes[0] - axes[1]).max() < SAME_AXIS_RAD
+    )
