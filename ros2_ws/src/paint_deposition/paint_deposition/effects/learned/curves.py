@@ -16,7 +16,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
 # Scale on which the distance to an edge is resolved [m], and where it ends to matter [m].
-EDGE_SCALE_M, FARTHEST_EDGE_M = 0.01, 0.25
+EDGE_SCALE_M, FARTHEST_EDGE_M = 0.01, 0.15
 # Times since the trigger and distances from a turn matter up to here.
 LONGEST_SINCE_TRIGGER_S, FARTHEST_TURN_M = 1.0, 1.0
 SHARPEST_CURVATURE_PER_M = 12.0

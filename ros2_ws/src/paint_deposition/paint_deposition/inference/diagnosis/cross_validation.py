@@ -33,9 +33,11 @@ def nested_rmse_um(
         out = folds == fold
         found = _found_without(stages, out)
         plain = run.plain(found.fit)
-        beside = plain.with_remainder(found.space.of_parts).select(~out)
+        remainder, sizes = found.remainder, found.best.sizes
+        beside = plain.with_remainder(remainder.of_parts(sizes)).select(~out)
+        footprint = remainder.of_footprint(sizes)[np.ix_(~out, ~out)]
         kept = [option.select(~out) for option in options]
-        laws = choose_laws(beside, kept, run.study.noise.degrees_of_freedom)
+        laws = choose_laws(beside, footprint, kept, run.freedom)
         learned = [size * options[k].columns for k, size in laws]
         for count in range(MOST_LAWS + 1):
             deviation[count, out] = left_out(plain, learned[:count], out)

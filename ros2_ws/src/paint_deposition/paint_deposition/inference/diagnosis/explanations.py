@@ -92,14 +92,14 @@ def of_effects(
 
 
 def of_any_form(study: Study, model: DepositionModel) -> list[Explanation]:
-    """Smooth factors on what arrives, over each covariate that varies.
+    """Smooth factors on what arrives, over each covariate that varies but the film itself.
 
     None of them changes the film as a whole: that is the pattern's.
     """
     laws = [
         basis.random(FACTOR, length, centred=True)
         for name, law in CURVES.items()
-        if model.effect(law.id) is None
+        if name != 'film_um' and model.effect(law.id) is None
         for basis in [curve_basis(study, model, name)]
         if basis is not None
         for length in LENGTHS['covariate']

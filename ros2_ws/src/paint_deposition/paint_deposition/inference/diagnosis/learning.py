@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import NullModel, Principal
-from paint_deposition.inference.diagnosis.explanations import Explanation
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, Explanation
 from paint_deposition.inference.diagnosis.model_space import SIZES
 
 MOST_LAWS = 2
@@ -18,12 +18,15 @@ WORTH_LEARNING = 6.0
 
 
 def choose_laws(
-    null: NullModel, explanations: Sequence[Explanation], freedom: float
+    null: NullModel, footprint: np.ndarray, explanations: Sequence[Explanation], freedom: float
 ) -> list[tuple[int, float]]:
     """The laws that the readings call for, strongest first.
 
     Args:
-        null: what varies already: pattern, nuisance and the accepted laws.
+        null: what varies already: pattern, nuisance, the accepted laws, and what nature leaves
+            over of parts and settings.
+        footprint: (P, P) covariance of the deviations of a footprint. A law over a covariate must
+            say more than any footprint could.
         explanations: laws of any form, of which one for each covariate is considered.
         freedom: degrees of freedom of the noise estimate.
 
@@ -33,10 +36,12 @@ def choose_laws(
     left = {k: e for k, e in enumerate(explanations) if e.learns}
     chosen: list[tuple[int, float]] = []
     while left and len(chosen) < MOST_LAWS:
+        beside = null.with_more(footprint)
         gain, k, size = max(
             (float(value), k, float(size))
             for k, explanation in left.items()
-            for value, size in zip(by_size(null, explanation, freedom), SIZES, strict=True)
+            for of in [null if explanation.learns == FOOTPRINT else beside]
+            for value, size in zip(by_size(of, explanation, freedom), SIZES, strict=True)
         )
         if gain < WORTH_LEARNING:
             break

@@ -178,10 +178,10 @@ class ModelSpace:
         """The evidence at nature's most probable sizes, for what needs no average."""
         return self.evidences[int(self.share.argmax())]
 
-    @cached_property
-    def of_parts(self) -> np.ndarray:
-        """(P, P) remainder of parts and settings at nature's most probable sizes."""
-        return self.remainder.of_parts(self.nature[int(self.share.argmax())].sizes)
+    @property
+    def sizes(self) -> Sizes:
+        """Nature's most probable sizes."""
+        return self.nature[int(self.share.argmax())].sizes
 
     @cached_property
     def log_evidence(self) -> float:
@@ -256,7 +256,7 @@ class ModelSpace:
     @property
     def figures(self) -> RemainderFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
-        sizes, null = self.nature[int(self.share.argmax())].sizes, self.central.null
+        sizes, null = self.sizes, self.central.null
         columns, of_peak = self.remainder.footprints[sizes.footprint]
         amplitudes = null.whiten(columns).T @ null.deviation
         found = [one.sizes for one in self.nature]

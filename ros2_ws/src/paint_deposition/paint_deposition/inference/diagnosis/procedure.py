@@ -68,7 +68,7 @@ def diagnose(
     progress('refitting with what may be missing')
     stages = search.stages()
     best, groups = search.groups(stages[-1].here)
-    run.fit, run.left_over = best.fit, best.space.figures
+    run.fit, run.left_over = run.fitted_with([*best.effects.values()]), best.space.figures
     stages = [*(s for s in stages if s.here.names < best.names), Stage(best, [])]
     options = run.options
     errors_um = nested_rmse_um(stages, options)
@@ -102,12 +102,14 @@ def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray
     A law that the model cannot be fitted with is not tried again.
     """
     without: set[str] = set()
-    beside = run.plain(run.fit).with_remainder(best.space.of_parts)
+    sizes = best.best.sizes
+    beside = run.plain(run.fit).with_remainder(best.remainder.of_parts(sizes))
+    footprint = best.remainder.of_footprint(sizes)
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
         options = [option for option in run.options if option.learns not in without]
-        chosen = [(options[k], size) for k, size in choose_laws(beside, options, run.freedom)]
-        chosen = chosen[:enough]
+        laws = choose_laws(beside, footprint, options, run.freedom)[:enough]
+        chosen = [(options[k], size) for k, size in laws]
         if not chosen:
             return
         fit = run.learned(chosen)
@@ -115,12 +117,12 @@ def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray
             break
         without.add(chosen[0][0].learns)
         errors_um = nested_rmse_um(stages, run.options, without)
-    laws = [
+    learned = [
         e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
     ]
     before = run.history[-1]
-    run.record(' and '.join(laws), fit, float(errors_um[len(chosen)]))
-    run.accepted += [run.described((law,), 1.0, before) for law in laws]
+    run.record(' and '.join(learned), fit, float(errors_um[len(chosen)]))
+    run.accepted += [run.described((law,), 1.0, before) for law in learned]
 
 
 def _conclude(run: Run, best: Trial, p_value: float) -> Diagnosis:

@@ -28,21 +28,21 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 # deviation. The footprint's is a share of its peak. Those of settings and of single parts are
 # shares of the part's thickest film, and fall with the root of the film: sprays of flat fans
 # differ by 0.5 to 5 % of the peak, a third as much where the film is a twentieth.
-FOOTPRINTS, USUAL_FOOTPRINT = (0.01, 0.03, 0.1, 0.3), (0.08, 2.5)
-SETTINGS, USUAL_SETTING = (0.004, 0.012, 0.035), (0.012, 2.0)
+FOOTPRINTS, USUAL_FOOTPRINT = (0.2,), (0.2, 2.5)
+SETTINGS, USUAL_SETTING = (0.006, 0.02, 0.06), (0.02, 2.0)
 PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
-BEYOND_NATURE = 0.1
+BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
 # footprint in steps of its radius.
-LENGTHS, FOOTPRINT_LENGTHS = (0.2, 0.6), (2.0, 6.0)
+LENGTHS, FOOTPRINT_LENGTHS = (0.1, 0.2, 0.6), (2.0, 6.0)
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
 MOST_OF_FLUX = 1.0
 # The pattern differs between settings by this share of what it differs between jobs, and it moves
-# sideways by this share of its root mean square radius: the measured sprays by 0.01.
-OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.008
+# sideways by this share of its root mean square radius: the measured sprays by 0.01 to 0.03.
+OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.02
 # Distance between parts that share no field, and step of the pattern's sideways move [m].
 FAR_M, STEP_M = 1e6, 1e-3
 # Paths that keep within this distance [m], angle of the axis [rad] and share of the time are the
@@ -148,11 +148,15 @@ class Remainder:
 
     def covariance(self, sizes: Sizes) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
+        return self.of_footprint(sizes) + self.of_parts(sizes)
+
+    def of_footprint(self, sizes: Sizes) -> np.ndarray:
+        """(P, P) that of the footprint, which all parts share."""
         columns, _ = self.footprints[sizes.footprint]
-        return columns @ columns.T + self.of_parts(sizes)
+        return columns @ columns.T
 
     def of_parts(self, sizes: Sizes) -> np.ndarray:
-        """(P, P) the same without the footprint, which all parts share."""
+        """(P, P) that of settings and of parts."""
         k = sizes.length
         of_settings = self.shapes + sizes.setting**2 * self.settings[k]
         return of_settings + sizes.part**2 * self.parts[k] if sizes.part else of_settings

@@ -17,20 +17,14 @@ from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
-    law_errors,
     of_any_form,
-    of_effects,
     of_footprint,
 )
 from paint_deposition.inference.diagnosis.model_space import (
-    ModelSpace,
     RemainderFigures,
-    Weighed,
-    probable_sizes,
 )
-from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
-from paint_deposition.inference.diagnosis.testability import Testability, testability
+from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
     EffectClass,
@@ -107,11 +101,6 @@ class Run:
         return FreeParameters.of(start, *start.effects, known=self.known)
 
     @cached_property
-    def remainder(self) -> Remainder:
-        """What nature leaves over, around the fit that the run began with."""
-        return Remainder.of(self.study, self.history[0].fit)
-
-    @cached_property
     def any_form(self) -> list[Explanation]:
         """Laws of any form, for what is outside the library."""
         return of_any_form(self.study, self.history[0].model)
@@ -122,49 +111,14 @@ class Run:
         model = self.fit.model
         return [*of_any_form(self.study, model), *of_footprint(self.study, model)]
 
-    @cached_property
-    def sizes(self) -> list[Sizes]:
-        """The sizes of the remainder that matter."""
-        fit = self.history[0].fit
-        laws = list(of_effects(self.study, fit, self.candidates))
-        return probable_sizes(self.null(fit), self.remainder, laws, self.freedom)
-
     @property
     def freedom(self) -> float:
         """Degrees of freedom of the noise estimate."""
         return self.study.noise.degrees_of_freedom
 
-    def null(self, fit: Fit) -> NullModel:
-        """The model of a fit as the null hypothesis, without a remainder; its laws may be off."""
-        kept = frozenset(effect.id for effect in self.candidates_in(fit))
-        free = np.hstack([self.study.nuisance, law_errors(self.study, fit, kept)])
-        return NullModel.around(fit, free)
-
     def plain(self, fit: Fit) -> NullModel:
         """The model of a fit as it is, with nothing missing."""
         return NullModel.around(fit, self.study.nuisance)
-
-    def weighed(self, null: NullModel) -> list[Weighed]:
-        """A null hypothesis at the sizes of the remainder that matter."""
-        return [Weighed.of(null, self.remainder, sizes, self.freedom) for sizes in self.sizes]
-
-    def space(self, fit: Fit, null: NullModel | None = None) -> ModelSpace:
-        """What may be missing beside the model of a fit.
-
-        Args:
-            null: that of the fit, if it is known.
-        """
-        null = null or self.null(fit)
-        found = [*of_effects(self.study, fit, self.candidates), *self.any_form]
-        space = ModelSpace(self.weighed(null), found, self.remainder, self.freedom)
-        if self.testable is None:
-            self.testable = testability(space.central, self.seed)
-        return space
-
-    def log_evidence(self, null: NullModel) -> float:
-        """Log evidence of a refitted model, with or without something unknown beside it."""
-        space = ModelSpace(self.weighed(null), self.any_form, self.remainder, self.freedom)
-        return space.log_evidence
 
     @property
     def taken(self) -> list[Effect]:
@@ -180,6 +134,7 @@ class Run:
         effects: Sequence[Effect],
         free: np.ndarray | None = None,
         model: DepositionModel | None = None,
+        remainder: np.ndarray | None = None,
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
@@ -187,6 +142,7 @@ class Run:
             effects: with their first values.
             free: (P, n) directions over the noise that are left free beside them.
             model: to start from; default the newest.
+            remainder: (P, P) covariance of what nature leaves over, if that is allowed for.
         """
         model = model or self.fit.model
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
@@ -194,7 +150,7 @@ class Run:
         nuisance = self.study.nuisance
         if free is not None:
             nuisance = np.hstack([nuisance, free])
-        return self.study.fit(self._free(start), nuisance=nuisance)
+        return self.study.fit(self._free(start), nuisance=nuisance, remainder=remainder)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""

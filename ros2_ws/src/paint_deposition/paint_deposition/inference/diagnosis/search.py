@@ -13,20 +13,26 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_errors, of_effects
 from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
     PRIOR_EFFECT,
     SURE,
     ModelSpace,
+    Weighed,
     inclusion_of,
     log_odds,
+    probable_sizes,
 )
+from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many effects are added at most, and so many proposals are refitted each time.
 MOST_EFFECTS, TRIALS = 4, 5
+# Log evidence that two fits of one set may differ by and be the same.
+SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
 
@@ -37,14 +43,14 @@ class Trial:
 
     Attributes:
         names: of the effects.
-        fit: of the model with them.
-        space: what may be missing beside it.
-        log_weight: logarithm of its evidence, with its prior odds.
+        fit: of the model with them, what nature leaves over being allowed for.
+        sizes: of the remainder that matter.
     """
 
     run: Run
     names: frozenset[str]
     fit: Fit
+    sizes: Sequence[Sizes]
 
     @property
     def effects(self) -> dict[str, Effect]:
@@ -52,19 +58,43 @@ class Trial:
         return {effect.id: effect for effect in self.run.candidates_in(self.fit)}
 
     @cached_property
-    def null(self) -> NullModel:
-        """The model as the null hypothesis, without a remainder; its laws may be off."""
-        return self.run.null(self.fit)
+    def remainder(self) -> Remainder:
+        """What nature leaves over beside the model."""
+        return Remainder.of(self.run.study, self.fit)
+
+    @cached_property
+    def weighed(self) -> list[Weighed]:
+        """The model as the null hypothesis, its laws being off and with every size of remainder."""
+        study, freedom = self.run.study, self.run.freedom
+        free = np.hstack([study.nuisance, law_errors(study, self.fit, self.names)])
+        null = NullModel.around(self.fit, free)
+        return [Weighed.of(null, self.remainder, s, freedom) for s in self.sizes]
+
+    @cached_property
+    def best(self) -> Weighed:
+        """That with nature's most probable remainder."""
+        nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
+        return max(nature, key=lambda one: one.log_weight)
 
     @cached_property
     def log_weight(self) -> float:
-        """Logarithm of the posterior weight of this set."""
-        return self.run.log_evidence(self.null) + log_odds(PRIOR_EFFECT) * len(self.names)
+        """Logarithm of the posterior weight of this set, something unknown acting or not."""
+        run = self.run
+        space = ModelSpace(self.weighed, run.any_form, self.remainder, run.freedom)
+        return space.log_evidence + self.log_prior
+
+    @property
+    def log_prior(self) -> float:
+        """Logarithm of the prior odds of this set."""
+        return log_odds(PRIOR_EFFECT) * len(self.names)
 
     @cached_property
     def space(self) -> ModelSpace:
         """What may be missing beside it."""
-        return self.run.space(self.fit, self.null)
+        run = self.run
+        effects = of_effects(run.study, self.fit, run.candidates)
+        found = [*effects, *run.any_form]
+        return ModelSpace(self.weighed, found, self.remainder, run.freedom)
 
     @cached_property
     def proposed(self) -> tuple[str, ...]:
@@ -72,12 +102,10 @@ class Trial:
         return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
 
     def log_weight_of(self, rows: np.ndarray) -> float:
-        """The same with some of the readings (P,), at the best size of the remainder."""
-        best = max(self.run.weighed(self.null), key=lambda one: one.log_weight)
-        some = best.null.select(rows)
-        freedom = self.run.study.noise.degrees_of_freedom
-        evidence = some.log_evidence(some.deviation[:, np.newaxis], freedom)[0]
-        return float(evidence + best.sizes.log_prior + log_odds(PRIOR_EFFECT) * len(self.names))
+        """The same weight with some of the readings (P,), at the best size of the remainder."""
+        some = self.best.null.select(rows)
+        evidence = some.log_evidence(some.deviation[:, np.newaxis], self.run.freedom)[0]
+        return float(evidence + self.best.sizes.log_prior + self.log_prior)
 
 
 @dataclass(frozen=True)
@@ -105,38 +133,53 @@ class Search:
     def __init__(self, run: Run) -> None:
         self.run = run
         self._trials: dict[frozenset[str], Trial] = {}
-        self.nothing = self._refitted({})
+        laws = [*of_effects(run.study, run.fit, run.candidates)]
+        sizes = probable_sizes(
+            run.plain(run.fit), Remainder.of(run.study, run.fit), laws, run.freedom
+        )
+        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, sizes))
+        run.testable = testability(self.nothing.space.central, run.seed)
 
     def with_effect(self, parent: Trial, name: str) -> Trial:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
         names = parent.names | {name}
         if names not in self._trials:
-            self._refitted(parent.effects | {name: parent.space.by_law(name)})
+            self._refitted(parent.effects | {name: parent.space.by_law(name)}, parent)
         return self._trials[names]
 
-    def without(self, trial: Trial, name: str) -> Trial:
-        """A set with one effect less."""
-        names = trial.names - {name}
-        if names not in self._trials:
-            self._refitted({n: e for n, e in trial.effects.items() if n != name})
-        return self._trials[names]
+    def without(self, trial: Trial, *names: str) -> Trial:
+        """A set with some effects less, refitted from where the larger one has its pattern.
 
-    def _refitted(self, effects: dict[str, Effect]) -> Trial:
-        fit = self.run.fitted_with(list(effects.values())) if effects else self.run.fit
-        names = frozenset(effects)
-        self._trials[names] = Trial(self.run, names, fit)
-        return self._trials[names]
+        A pattern has several shapes that fit about as well: what only led to a better one is no
+        effect.
+        """
+        fewer = {n: e for n, e in trial.effects.items() if n not in names}
+        return self._refitted(fewer, trial)
+
+    def _refitted(self, effects: dict[str, Effect], start: Trial) -> Trial:
+        """A set fitted from the pattern, and beside the remainder, of another one."""
+        remainder = start.best.null.remainder
+        fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
+        trial = Trial(self.run, frozenset(effects), fit, start.sizes)
+        known = self._trials.get(trial.names)
+        if known is None or trial.log_weight > known.log_weight + SAME:
+            self._trials[trial.names] = trial
+        return self._trials[trial.names]
 
     def stages(self) -> list[Stage]:
         """From nothing to the best set, each with one effect more than the one before."""
         found, here = [], self.nothing
         while True:
             room = len(here.names) < MOST_EFFECTS
-            tried = [self.with_effect(here, name) for name in here.proposed if room]
-            found.append(Stage(here, tried))
-            best = found[-1].chosen()
+            stage = Stage(here, [self.with_effect(here, name) for name in here.proposed if room])
+            best = stage.chosen()
             if best is here:
-                return found
+                return [*found, stage]
+            again = self.without(best, *(best.names - here.names))
+            if again is not here:
+                here = again
+                continue
+            found.append(stage)
             here = best
 
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:

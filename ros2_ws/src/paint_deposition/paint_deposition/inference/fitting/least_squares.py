@@ -49,6 +49,8 @@ class Fit:
         converged: whether the last search ended by itself.
         nuisance: (P, n) nuisance directions that the fit allowed for, over the standard
             deviation; their amplitudes are independent and standard normal.
+        remainder: (P, P) covariance of what nature leaves over, which the fit allowed for, or
+            None if it did not.
     """
 
     parameters: FreeParameters
@@ -59,16 +61,18 @@ class Fit:
     jacobian: np.ndarray
     converged: bool
     nuisance: np.ndarray
+    remainder: np.ndarray | None = None
 
     @cached_property
     def marginal(self) -> 'Fit':
-        """The same fit with residual and Jacobian whitened by the nuisance directions, too."""
-        factor = covariance_factor(self.nuisance)
+        """The same fit with residual and Jacobian whitened by nuisance and remainder, too."""
+        factor = covariance_factor(self.nuisance, self.remainder)
         return replace(
             self,
             residual=solve_triangular(factor, self.residual, lower=True),
             jacobian=solve_triangular(factor, self.jacobian, lower=True),
             nuisance=self.nuisance[:, :0],
+            remainder=None,
         )
 
     @cached_property
@@ -108,6 +112,7 @@ def fit_readings(
     starts: int = 1,
     seed: int = 0,
     nuisance: np.ndarray | None = None,
+    remainder: np.ndarray | None = None,
 ) -> Fit:
     """Find the most probable values (maximum a posteriori).
 
@@ -118,10 +123,11 @@ def fit_readings(
             first, drawn with the given seed.
         nuisance: (P, n) nuisance directions, over the standard deviation, along which the
             readings may deviate further with unit variance; default: none.
+        remainder: (P, P) covariance of what nature leaves over; default: nothing is.
     """
     if nuisance is None:
         nuisance = np.empty((len(measured_um), 0))
-    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance)
+    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance, remainder)
     first = problem.scaled_to_mean(parameters.encode(parameters.start))
     candidates = [first]
     if starts > 1:
@@ -142,6 +148,7 @@ def fit_readings(
         derivatives(forward, parameters, best.x, sigma_um),
         bool(best.status > 0),
         nuisance,
+        remainder,
     )
 
 
@@ -217,11 +224,13 @@ class _Problem:
         sigma_um: np.ndarray,
         parameters: FreeParameters,
         nuisance: np.ndarray,
+        remainder: np.ndarray | None,
     ) -> None:
         self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
         self.parameters = parameters
-        # None spares a solve in every step where there are no nuisance directions.
-        self.lower = covariance_factor(nuisance) if nuisance.size else None
+        # None spares a solve in every step where readings deviate by noise alone.
+        noise_alone = remainder is None and not nuisance.size
+        self.lower = None if noise_alone else covariance_factor(nuisance, remainder)
         self.prior = parameters.prior
         self.low, self.high = parameters.bounds
         self._last: tuple[bytes, Terms] | None = None

@@ -152,11 +152,13 @@ class Study:
         starts: int = 1,
         seed: int = 0,
         nuisance: np.ndarray | None = None,
+        remainder: np.ndarray | None = None,
     ) -> Fit:
         """Fit these parameters to the points; see ``fit_readings``."""
         return fit_readings(
-            self.forward, self.measured_um, self.sigma_um, parameters, starts, seed, nuisance
-        )
+            self.forward, self.measured_um, self.sigma_um, parameters, starts, seed, nuisance,
+            remainder,
+        )  # fmt: skip
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].
