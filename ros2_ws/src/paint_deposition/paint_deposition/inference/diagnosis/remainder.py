@@ -105,9 +105,7 @@ class Remainder:
         scale = np.sqrt(film * thickest[owner]) / study.sigma_um
         group = painted_alike(campaign.experiments)
         repeated = (np.bincount(group)[group] > 1)[owner]
-        width_m = max(_rms_radius_m(pattern) for pattern in model.patterns)
-        lengths_m = tuple(length * width_m for length in LENGTHS)
-        shapes = _shapes(study, fit, group[owner], SIDEWAYS * width_m)
+        lengths_m = tuple(length * _width_m(model) for length in LENGTHS)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
             places = np.column_stack([campaign.positions_m, FAR_M * of])
@@ -115,12 +113,17 @@ class Remainder:
 
         return Remainder(
             _footprints(study, model),
-            shapes @ shapes.T,
+            _shapes(study, fit, group[owner]),
             tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
             bool(repeated.any()),
             lengths_m,
         )
+
+    def around(self, study: Study, fit: Fit) -> 'Remainder':
+        """The same where pattern and place of a spray vary as around another fit."""
+        group = painted_alike(study.campaign.experiments)[study.campaign.experiment_of]
+        return replace(self, shapes=_shapes(study, fit, group))
 
     def choices(self) -> list[Sizes]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
@@ -207,17 +210,17 @@ def _flux_and_tails(
     return np.repeat(flux, WAVES), np.kron(tails, mean_over_angle)
 
 
-def _shapes(study: Study, fit: Fit, group: np.ndarray, sideways_m: float) -> np.ndarray:
-    """(P, n) by how much pattern and place of the spray differ between groups (P,) of parts."""
+def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:
+    """(P, P) covariance of pattern and place of the spray between groups (P,) of parts."""
     own = (group[:, np.newaxis] == np.arange(group.max() + 1)).astype(float)
-    moved = sideways_m * _sideways(study, fit.model) / study.sigma_um[:, np.newaxis]
-    changes = [moved]
+    sideways_m = SIDEWAYS * _width_m(fit.model)
+    changes = sideways_m * _sideways(study, fit.model) / study.sigma_um[:, np.newaxis]
     if own.shape[1] > 1:  # with one setting, its pattern is the model's own
         pattern = fit.parameters.pattern
         between = OF_JOBS * np.array([c.between_jobs for c in pattern.coordinates])
         between[[pattern.entries(row)[0] for row in range(pattern.count)]] = 0.0
-        changes.append(fit.jacobian[:, : len(pattern)] * between)
-    return np.hstack([own[:, [k]] * change for change in changes for k in range(own.shape[1])])
+        changes = np.hstack([changes, fit.jacobian[:, : len(pattern)] * between])
+    return (own @ own.T) * (changes @ changes.T)
 
 
 def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
@@ -230,6 +233,11 @@ def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
         shifted = offset.model_copy(update={name: getattr(offset, name) + step})
         moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
     return np.stack(moved, axis=1)
+
+
+def _width_m(model: DepositionModel) -> float:
+    """Root mean square radius of the widest pattern [m]."""
+    return max(_rms_radius_m(pattern) for pattern in model.patterns)
 
 
 def _rms_radius_m(pattern: PlanarPattern) -> float:

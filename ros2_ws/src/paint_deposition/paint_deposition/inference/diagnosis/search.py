@@ -6,7 +6,7 @@ the remainder of nature at all its sizes, and with or without something unknown 
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -44,12 +44,14 @@ class Trial:
     Attributes:
         names: of the effects.
         fit: of the model with them, what nature leaves over being allowed for.
+        usual: what nature leaves over beside the model that the run began with.
         sizes: of the remainder that matter.
     """
 
     run: Run
     names: frozenset[str]
     fit: Fit
+    usual: Remainder
     sizes: Sequence[Sizes]
 
     @property
@@ -60,11 +62,11 @@ class Trial:
     @cached_property
     def remainder(self) -> Remainder:
         """What nature leaves over beside the model."""
-        return Remainder.of(self.run.study, self.fit)
+        return self.usual.around(self.run.study, self.fit)
 
     @cached_property
     def weighed(self) -> list[Weighed]:
-        """The model as the null hypothesis, its laws being off and with every size of remainder."""
+        """The model as the null hypothesis, its laws being off, with each size of remainder."""
         study, freedom = self.run.study, self.run.freedom
         free = np.hstack([study.nuisance, law_errors(study, self.fit, self.names)])
         null = NullModel.around(self.fit, free)
@@ -134,10 +136,9 @@ class Search:
         self.run = run
         self._trials: dict[frozenset[str], Trial] = {}
         laws = [*of_effects(run.study, run.fit, run.candidates)]
-        sizes = probable_sizes(
-            run.plain(run.fit), Remainder.of(run.study, run.fit), laws, run.freedom
-        )
-        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, sizes))
+        usual = Remainder.of(run.study, run.fit)
+        sizes = probable_sizes(run.plain(run.fit), usual, laws, run.freedom)
+        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, usual, sizes))
         run.testable = testability(self.nothing.space.central, run.seed)
 
     def with_effect(self, parent: Trial, name: str) -> Trial:
@@ -160,7 +161,7 @@ class Search:
         """A set fitted from the pattern, and beside the remainder, of another one."""
         remainder = start.best.null.remainder
         fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
-        trial = Trial(self.run, frozenset(effects), fit, start.sizes)
+        trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
         if known is None or trial.log_weight > known.log_weight + SAME:
             self._trials[trial.names] = trial
