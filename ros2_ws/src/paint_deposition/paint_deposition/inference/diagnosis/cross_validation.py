@@ -33,9 +33,8 @@ def nested_rmse_um(
         out = folds == fold
         found = _found_without(stages, out)
         plain = run.plain(found.fit)
-        remainder, sizes = found.remainder, found.best.sizes
-        beside = plain.with_remainder(remainder.of_parts(sizes)).select(~out)
-        footprint = remainder.of_footprint(sizes)[np.ix_(~out, ~out)]
+        beside = plain.with_remainder(found.remainder.of_parts(found.best.sizes)).select(~out)
+        footprint = found.remainder.of_footprint[np.ix_(~out, ~out)]
         kept = [option.select(~out) for option in options]
         laws = choose_laws(beside, footprint, kept, run.freedom)
         learned = [size * options[k].columns for k, size in laws]

@@ -178,11 +178,6 @@ class ModelSpace:
         """The evidence at nature's most probable sizes, for what needs no average."""
         return self.evidences[int(self.share.argmax())]
 
-    @property
-    def sizes(self) -> Sizes:
-        """Nature's most probable sizes."""
-        return self.nature[int(self.share.argmax())].sizes
-
     @cached_property
     def log_evidence(self) -> float:
         """Log evidence of the model at all sizes, with or without something unknown beside it."""
@@ -256,15 +251,14 @@ class ModelSpace:
     @property
     def figures(self) -> RemainderFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
-        sizes, null = self.sizes, self.central.null
-        columns, of_peak = self.remainder.footprints[sizes.footprint]
-        amplitudes = null.whiten(columns).T @ null.deviation
+        null = self.central.null
+        amplitudes = null.whiten(self.remainder.footprint).T @ null.deviation
         found = [one.sizes for one in self.nature]
         return RemainderFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.remainder.lengths_m[one.length] for one in found]),
-            float(np.abs(of_peak @ amplitudes).max()),
+            float(np.abs(self.remainder.of_peak @ amplitudes).max()),
         )
 
 

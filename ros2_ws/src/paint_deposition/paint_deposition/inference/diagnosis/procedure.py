@@ -102,9 +102,8 @@ def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray
     A law that the model cannot be fitted with is not tried again.
     """
     without: set[str] = set()
-    sizes = best.best.sizes
-    beside = run.plain(run.fit).with_remainder(best.remainder.of_parts(sizes))
-    footprint = best.remainder.of_footprint(sizes)
+    beside = run.plain(run.fit).with_remainder(best.remainder.of_parts(best.best.sizes))
+    footprint = best.remainder.of_footprint
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
         options = [option for option in run.options if option.learns not in without]

@@ -22,6 +22,7 @@ from paint_deposition.inference.diagnosis.learning import by_size
 from paint_deposition.inference.diagnosis.model_space import SIZES, SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
@@ -60,9 +61,9 @@ def refit(
     run = Run(campaign, start, candidates, seed, progress, known)
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
-    space = run.space(run.fit)
-    run.left_over = space.figures
-    p_value = space.p_value(seed)
+    search = Search(run)
+    run.left_over = search.nothing.space.figures
+    p_value = search.nothing.space.p_value(seed)
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'
@@ -75,11 +76,9 @@ def refit(
         progress(f'learning {law.id}')
         return _with_learned(run, law, p_value)
     progress(f'fitting with {added.id}')
-    fits = [run.fitted_with([shape]) for shape in run.candidates[added.id]]
-    before, best = run.history[-1], min(fits, key=lambda fit: fit.objective)
-    gain = run.log_evidence(run.null(best)) - run.log_evidence(run.null(run.fit))
-    probability = float(expit(gain))
-    run.record(added.id, best)
+    before, with_it = run.history[-1], search.with_effect(search.nothing, added.id)
+    probability = float(expit(with_it.log_weight - with_it.log_prior - search.nothing.log_weight))
+    run.record(added.id, run.fitted_with([*with_it.effects.values()]))
     run.accepted.append(run.described((added.id,), probability, before))
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '

@@ -17,25 +17,27 @@ from scipy.spatial.distance import cdist
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
-from paint_deposition.inference.diagnosis.smooth_laws import RADII, Basis, footprint_basis
+from paint_deposition.inference.diagnosis.smooth_laws import Basis, footprint_basis
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.smooth_fields import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
-# Sizes that are considered, and the prior of each: its median, and the factor that is one standard
-# deviation. The footprint's is a share of its peak. Those of settings and of single parts are
-# shares of the part's thickest film, and fall with the root of the film: sprays of flat fans
-# differ by 0.5 to 5 % of the peak, a third as much where the film is a twentieth.
-FOOTPRINTS, USUAL_FOOTPRINT = (0.2,), (0.2, 2.5)
+# The footprint deviates by this share of its peak, as a standard deviation, at any place. That is
+# wide on purpose: what a footprint could show as well is no effect, however large it is.
+FOOTPRINT = 0.2
+# Sizes that are considered for settings and single parts, as shares of the part's thickest film,
+# and the prior of each: its median, and the factor that is one standard deviation. They fall with
+# the root of the film: sprays of flat fans differ by 0.5 to 5 % of the peak, a third as much where
+# the film is a twentieth.
 SETTINGS, USUAL_SETTING = (0.006, 0.02, 0.06), (0.02, 2.0)
 PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
 BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
-# footprint in steps of its radius.
-LENGTHS, FOOTPRINT_LENGTHS = (0.1, 0.2, 0.6), (2.0, 6.0)
+# footprint in steps of its radius, of which there are so many.
+LENGTHS, FOOTPRINT_LENGTHS, RADII = (0.1, 0.2, 0.6), (2.0, 6.0), 20
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
@@ -55,13 +57,11 @@ class Sizes:
     """One choice of the hyperparameters.
 
     Attributes:
-        footprint: number among FOOTPRINTS.
         setting, part: shares of the thickest film; the latter 0 where no parts were painted alike.
         length: number among LENGTHS.
         log_prior: of this choice, among those of nature or among those beyond it.
     """
 
-    footprint: int
     setting: float
     part: float
     length: int
@@ -78,8 +78,8 @@ class Remainder:
     """What nature leaves over at P points, over the noise.
 
     Attributes:
-        footprints: for each of its sizes (P, n), the deviation that all parts share; and what the
-            amplitudes make of it, (K, n) shares of the peak at the knots of a footprint.
+        footprint: (P, n) deviations that all parts share, for amplitudes of unit variance.
+        of_peak: (K, n) what they are at the knots of a footprint, as shares of its peak.
         shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
         settings, parts: for each length (P, P), covariances of fields of size one over parts
             painted alike together, and over each by itself; of the latter only where parts were
@@ -88,7 +88,8 @@ class Remainder:
         lengths_m: of these fields [m].
     """
 
-    footprints: tuple[tuple[np.ndarray, np.ndarray], ...]
+    footprint: np.ndarray
+    of_peak: np.ndarray
     shapes: np.ndarray
     settings: tuple[np.ndarray, ...]
     parts: tuple[np.ndarray, ...]
@@ -112,7 +113,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
-            _footprints(study, model),
+            *_footprint(study, model),
             _shapes(study, fit, group[owner]),
             tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
@@ -127,16 +128,15 @@ class Remainder:
 
     def choices(self) -> list[Sizes]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
+        parts = PARTS if self.is_repeated else (0.0,)
         found = [
             Sizes(
-                k, setting, part, length,
-                _log_prior(FOOTPRINTS[k], *USUAL_FOOTPRINT)
-                + (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
+                setting, part, length,
+                (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
                 + (_log_prior(part, *USUAL_PART) if part else 0.0),
             )
-            for k, setting, part, length in product(
-                range(len(FOOTPRINTS)), (*SETTINGS, BEYOND_NATURE),
-                PARTS if self.is_repeated else (0.0,), range(len(LENGTHS)),
+            for setting, part, length in product(
+                (*SETTINGS, BEYOND_NATURE), parts, range(len(LENGTHS))
             )
         ]  # fmt: skip
         total = {
@@ -151,12 +151,12 @@ class Remainder:
 
     def covariance(self, sizes: Sizes) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
-        return self.of_footprint(sizes) + self.of_parts(sizes)
+        return self.of_footprint + self.of_parts(sizes)
 
-    def of_footprint(self, sizes: Sizes) -> np.ndarray:
+    @property
+    def of_footprint(self) -> np.ndarray:
         """(P, P) that of the footprint, which all parts share."""
-        columns, _ = self.footprints[sizes.footprint]
-        return columns @ columns.T
+        return self.footprint @ self.footprint.T
 
     def of_parts(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of settings and of parts."""
@@ -169,20 +169,17 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
     return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
 
 
-def _footprints(study: Study, model: DepositionModel) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    basis = footprint_basis(study, model)
+def _footprint(study: Study, model: DepositionModel) -> tuple[np.ndarray, np.ndarray]:
+    basis = footprint_basis(study, model, RADII)
     flux, tails = _flux_and_tails(model.patterns, basis)
-    found = []
-    for size in FOOTPRINTS:
-        share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
-        roots = [
-            share * basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
-            for length in FOOTPRINT_LENGTHS
-        ]
-        at_knots = np.hstack([TAILS * tails, *roots])
-        columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-        found.append((columns, flux[:, np.newaxis] * at_knots))
-    return tuple(found)
+    share = np.minimum(FOOTPRINT / flux, MOST_OF_FLUX)[:, np.newaxis]
+    roots = [
+        share * basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
+        for length in FOOTPRINT_LENGTHS
+    ]
+    at_knots = np.hstack([TAILS * tails, *roots])
+    columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
+    return columns, flux[:, np.newaxis] * at_knots
 
 
 def _flux_and_tails(

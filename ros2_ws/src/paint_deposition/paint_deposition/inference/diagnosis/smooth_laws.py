@@ -28,7 +28,7 @@ FAINT, OUTERMOST = 0.02, 0.01
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
 # Steps between the knots of a map [m], and of the radius of a footprint.
-MAP_STEP_M, RADII = 0.06, 20
+MAP_STEP_M, RADII = 0.06, 10
 # The pattern ends at this many of its widths beyond the ring.
 WIDTHS = 3.0
 # Distance of knots that have nothing in common.
@@ -214,12 +214,14 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
     ]
 
 
-def footprint_basis(study: Study, model: DepositionModel) -> Basis:
+def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) -> Basis:
     """Deviations of the pattern from eq. (1) at the points of a study."""
-    return footprint_along(study.rays(model), model.patterns)
+    return footprint_along(study.rays(model), model.patterns, radii)
 
 
-def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) -> Basis:
+def footprint_along(
+    parts: Sequence[Rays], patterns: Sequence[PlanarPattern], radii: int = RADII
+) -> Basis:
     """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
 
     Each harmonic of the angle is a random function of the radius by itself, the same for all
@@ -227,15 +229,16 @@ def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) ->
 
     Args:
         parts: rays of each part. patterns: those that they come from.
+        radii: how many knots from the middle to the end of the pattern.
     """
     reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
     for rays in parts:
-        radius = np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1)
+        radius = np.hypot(rays.x_m, rays.y_m) / reach * (radii - 1)
         angle = waves(rays.x_m, rays.y_m)
-        films.append(np.stack([hat_sums(rays.share * wave, radius, RADII) for wave in angle]))
-    film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
-    radius, wave = np.indices((RADII, WAVES))
+        films.append(np.stack([hat_sums(rays.share * wave, radius, radii) for wave in angle]))
+    film_um = np.concatenate(films, axis=1)  # WAVES, P, radii
+    radius, wave = np.indices((radii, WAVES))
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
     change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
