@@ -109,7 +109,7 @@ def judged(painted: Painted) -> dict:
         'p_value': diagnosis.p_value,
         'accepted': list(diagnosis.accepted),
         'classes': [[list(c.members), c.probability, c.best] for c in diagnosis.classes],
-        'unknown': unknown.kind if unknown else None,
+        'unknown': unknown.covariate if unknown else None,
         'unseen': [
             unseen_error(painted, campaign, unseen, step.model)
             for step in (diagnosis.history[0], diagnosis.history[-1])
