@@ -9,8 +9,10 @@ from typing import Any, Literal
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
+from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
 from paint_deposition.inference.diagnosis.model_space import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
@@ -196,6 +198,13 @@ class Diagnosis:
         """How the gun ran over each part, by experiment."""
         return self.comparisons[-1].geometry
 
+    def _forms(self, found: EffectClass) -> dict[str, Any]:
+        """Of a learned law the closed forms that fit it; nothing of another effect."""
+        law = self.model.effect(found.best)
+        if not isinstance(law, LearnedLaw):
+            return {}
+        return {'forms': [form.to_dict() for form in forms_of(law)]}
+
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
@@ -206,7 +215,7 @@ class Diagnosis:
             'reason': self.reason,
             'p_value': self.p_value,
             'accepted': list(self.accepted),
-            'classes': [asdict(found) for found in self.classes],
+            'classes': [asdict(found) | self._forms(found) for found in self.classes],
             'rmse_um': {
                 'before': before.rmse_um,
                 'after': after.rmse_um,
