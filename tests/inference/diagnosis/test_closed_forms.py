@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from paint_deposition.effects.learned.catalogue import LEARNED
+from paint_deposition.effects.catalogue import LEARNED
 
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 

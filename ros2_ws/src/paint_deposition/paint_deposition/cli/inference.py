@@ -340,10 +340,11 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
     yield (
-        f'RMSE {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the fitted points, '
-        f'{before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on points left out; '
-        f'gauge and texture {diagnosis.noise_floor_um:.2f} µm'
+        f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
+        f'{diagnosis.left_out} left out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
+        f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
     )
+    yield from (f'worse than before: {one}' for one in diagnosis.worse)
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'
     for amount in diagnosis.random_effects:
@@ -356,7 +357,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'next: {todo}: {separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
-    for note in diagnosis.study.notes:
+    for note in (*diagnosis.study.notes, *diagnosis.left_over):
         yield f'note: {note}'
     yield from geometry_lines(diagnosis)
     yield f'model: {output / "model.yaml"}'

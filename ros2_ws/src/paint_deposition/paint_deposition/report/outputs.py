@@ -173,7 +173,7 @@ output(
         left_out=Literal['experiments', 'points'],
     ),
     experiments=list[figures('rmse_before_um rmse_after_um', name=str)],
-    remainder=dict | None, footprint=dict | None,
+    remainder=dict | None, footprint=dict | None, worse=Words,
     detectable=dict[str, dict[str, Number]], regions=list[Region], noise=Noise,
     next=figures(measure=list[dict], spray=list[figures(what=str, separates=Words)]),
     pattern_shift=dict | None, left_out=list[dict], notes=Words,

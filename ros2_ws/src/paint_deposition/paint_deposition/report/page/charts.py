@@ -214,7 +214,12 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
-        ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
+        (
+            f'{data.diagnosis.left_out} left out',
+            [s.holdout_rmse_um for s in steps],
+            ACCENT,
+            'white',
+        ),
     ]
     traces = [
         {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},

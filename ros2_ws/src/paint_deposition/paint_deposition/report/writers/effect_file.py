@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from paint_deposition.effects.catalogue import IDS
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.files.atomic import write_text
@@ -91,7 +91,7 @@ def write_effect_file(path: Path, law: LearnedCurve, form: ClosedForm) -> Path:
     """
     value, family = VARIABLES[law.covariate]
     effect_id = re.sub(r'\W+', '_', path.stem.lower()).strip('_') or 'learned'
-    if effect_id in IDS or not effect_id[0].isalpha():
+    if effect_id in EFFECTS or not effect_id[0].isalpha():
         effect_id = f'learned_{effect_id}'
     (name, unit), knots = variable(type(law)), at_knots(law)
     filled = {
