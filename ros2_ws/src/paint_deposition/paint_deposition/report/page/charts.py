@@ -212,6 +212,7 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
         return None
     steps = data.diagnosis.history
     names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
+    left_out = f'{data.diagnosis.left_out} left out'
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
         (

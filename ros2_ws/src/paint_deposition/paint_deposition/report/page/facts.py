@@ -121,8 +121,8 @@ def _errors(diagnosis: Diagnosis, before: Step, after: Step) -> str:
     worse = f' Worse than before: {"; ".join(diagnosis.worse)}.' if diagnosis.worse else ''
     return (
         f'At {diagnosis.left_out} left out of the fit the error goes from '
-        f'{micrometres(before.holdout_rmse_um)} to {micrometres(after.holdout_rmse_um)}; the gauge '
-        f'and the texture of the film scatter by {micrometres(diagnosis.noise_floor_um)}.{worse}'
+        f'{micrometres(before.holdout_rmse_um)} to {micrometres(after.holdout_rmse_um)}; gauge '
+        f'and texture of the film scatter by {micrometres(diagnosis.noise_floor_um)}.{worse}'
     )
 
 
