@@ -20,9 +20,10 @@ from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, 
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 
-# Prior probability that a cause is missing: an effect of the library, and something outside it,
-# half of which shows over a covariate and half as a setting that differs beyond nature.
-PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.08
+# Prior probability that a cause is missing: an effect of the library; and, as one effect more,
+# something outside it, half of which shows over a covariate and half as a setting that differs
+# beyond nature.
+PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
 SIZES = np.array([0.5, 1.0, 2.0])
 # An effect acts for certain from this posterior probability of its group on.

@@ -85,6 +85,12 @@ class Trial:
         space = ModelSpace(self.weighed, run.any_form, self.remainder, run.freedom)
         return space.log_evidence + self.log_prior
 
+    @cached_property
+    def log_weight_alone(self) -> float:
+        """The same weight if nothing unknown can act."""
+        nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
+        return float(np.logaddexp.reduce(nature)) + self.log_prior
+
     @property
     def log_prior(self) -> float:
         """Logarithm of the prior odds of this set."""
@@ -112,7 +118,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class Stage:
-    """One step of the search: a set of effects, and larger ones that were tried."""
+    """One step of the search: a set of effects, and larger ones that were tried.
+
+    The search goes on as if nothing unknown could act: that follows several effects together more
+    closely than the law of the first of them.
+    """
 
     here: Trial
     tried: Sequence[Trial]
@@ -121,7 +131,7 @@ class Stage:
         """The set that the readings, or some (P,), call for: one that was tried, or this."""
 
         def weight(trial: Trial) -> float:
-            return trial.log_weight if rows is None else trial.log_weight_of(rows)
+            return trial.log_weight_alone if rows is None else trial.log_weight_of(rows)
 
         weights = [weight(trial) for trial in self.tried]
         if not weights or inclusion_of(weights, weight(self.here)) <= SURE:
@@ -163,7 +173,7 @@ class Search:
         fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
-        if known is None or trial.log_weight > known.log_weight + SAME:
+        if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:
             self._trials[trial.names] = trial
         return self._trials[trial.names]
 
@@ -184,7 +194,10 @@ class Search:
             here = best
 
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
-        """The set without effects that do not stand, and what could stand in place of each."""
+        """The set without effects that do not stand, and what could stand in place of each.
+
+        Here something unknown may have done it, too.
+        """
         while True:
             found = {name: self.group(trial, name) for name in trial.names}
             if not found or min(p for _, p in found.values()) > SURE:
