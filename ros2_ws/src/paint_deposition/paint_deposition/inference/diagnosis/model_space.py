@@ -109,12 +109,16 @@ class Weighed(NamedTuple):
     log_weight: float
 
     @staticmethod
-    def of(plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float) -> 'Weighed':
-        """Weigh one choice by its evidence and its prior."""
+    def of(
+        plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float, share: float = 1.0
+    ) -> 'Weighed':
+        """Weigh one choice by its evidence and its prior, of which this hypothesis has a share."""
         null = plain.with_remainder(remainder.covariance(sizes))
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
-        prior = log_odds(PRIOR_UNKNOWN) - np.log(2.0) if sizes.is_beyond_nature else 0.0
-        return Weighed(sizes, null, evidence + sizes.log_prior + float(prior))
+        prior = sizes.log_prior + float(np.log(share))
+        if sizes.is_beyond_nature:
+            prior += log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
+        return Weighed(sizes, null, evidence + prior)
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,7 @@ def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
     without: set[str] = set()
-    beside = run.plain(run.fit).with_remainder(best.remainder.of_parts(best.best.sizes))
+    beside = best.beside(run.fit)
     footprint = best.remainder.of_footprint
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]

@@ -31,6 +31,9 @@ from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many effects are added at most, and so many proposals are refitted each time.
 MOST_EFFECTS, TRIALS = 4, 5
+# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
+# times as far, and the prior share of each.
+LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.
@@ -68,15 +71,29 @@ class Trial:
     def weighed(self) -> list[Weighed]:
         """The model as the null hypothesis, its laws being off, with each size of remainder."""
         study, freedom = self.run.study, self.run.freedom
-        free = np.hstack([study.nuisance, law_errors(study, self.fit, self.names)])
-        null = NullModel.around(self.fit, free)
-        return [Weighed.of(null, self.remainder, s, freedom) for s in self.sizes]
+        errors = law_errors(study, self.fit, self.names)
+        found = []
+        for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
+            null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
+            found += [
+                Weighed.of(null, self.remainder, sizes, freedom, share) for sizes in self.sizes
+            ]
+        return found
 
     @cached_property
     def best(self) -> Weighed:
         """That with nature's most probable remainder."""
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
+
+    def beside(self, fit: Fit) -> NullModel:
+        """What a law that is learned must say more than: all but the footprint.
+
+        Args:
+            fit: of the model with the set.
+        """
+        null = self.run.plain(fit).with_remainder(self.remainder.of_parts(self.best.sizes))
+        return null.beside(law_errors(self.run.study, fit, self.names))
 
     @cached_property
     def log_weight(self) -> float:
