@@ -215,12 +215,7 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
     left_out = f'{data.diagnosis.left_out} left out'
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
-        (
-            f'{data.diagnosis.left_out} left out',
-            [s.holdout_rmse_um for s in steps],
-            ACCENT,
-            'white',
-        ),
+        (left_out, [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
     ]
     traces = [
         {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},
