@@ -1,14 +1,11 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
-import mmap
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
-from typing import IO, cast
 
 import lz4.frame
 import yaml
@@ -19,7 +16,6 @@ from mcap.opcode import Opcode
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
-from rosbags.interfaces import Qos
 from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
@@ -78,20 +74,25 @@ def recover(
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
             message could be read.
     """
-    files = mcap_files(Path(path))
-    _refuse_what_is_no_mcap(Path(path), files)
-    surveys = [_survey(file) for file in files]
-    information = next((s.information for s in reversed(surveys) if s.information), {})
+    path, recovery = Path(path), Recovery(Path(folder))
+    if not path.exists():
+        raise RecordingError(f'{path} does not exist')
+    files = mcap_files(path)
+    if not files:
+        raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
+    # The chunk that introduces a channel may be damaged; outside the chunks it stands again.
+    outside = [record for file in files for record, _ in _records(file, Recovery(path))]
+    information = _information(outside)
     writer = RunWriter(
         folder,
         custom_data=information.get('custom_data') or {},
         ros_distro=information.get('ros_distro'),
     )
-    recovery = Recovery(writer.folder)
     try:
         with writer:
-            for file, survey in zip(files, surveys, strict=True):
-                _copy(file, survey, writer, recovery, on_bytes, topics)
+            for file in files:
+                known = [record for record, _ in _records(file, Recovery(path))]
+                _copy(file, known, writer, recovery, on_bytes, topics)
             if not writer.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
@@ -102,142 +103,107 @@ def recover(
     return recovery
 
 
-def _refuse_what_is_no_mcap(path: Path, files: list[Path]) -> None:
-    if not path.exists():
-        raise RecordingError(f'{path} does not exist')
-    if not files:
-        raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
-    for file in files:
-        with file.open('rb') as stream:
-            if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(f'{file} is not an MCAP file; nothing to recover')
-
-
-@dataclass
-class _Survey:
-    """What a file says outside its chunks: rosbag2's newest metadata, the repeated channels."""
-
-    information: dict = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-
-    def note(self, record: McapRecord) -> None:
+def _information(records: list[McapRecord]) -> dict:
+    """What rosbag2 noted last of a run; {} where there is nothing that can be read."""
+    for record in reversed(records):
         if isinstance(record, Metadata) and record.name == 'rosbag2':
-            self.information = _mapping(record) or self.information
-        elif isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
+            try:
+                content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
+            except yaml.YAMLError:
+                continue
+            if isinstance(content, dict):
+                return content
+    return {}
 
 
-def _survey(file: Path) -> _Survey:
-    survey = _Survey()
-    with _content(file) as stream:
-        for record in _records(file, stream, []):
-            survey.note(record)
-    return survey
+def _records(
+    file: Path, recovery: Recovery, chunks: bool = False
+) -> Iterator[tuple[McapRecord, int]]:
+    """Records up to the break, which is noted, and the byte up to which the file was read.
+
+    Those of chunks are among them if they are asked for.
+    """
+    size, start = file.stat().st_size, len(MCAP0_MAGIC)
+    with file.open('rb') as stream:
+        if stream.read(start) != MCAP0_MAGIC:
+            raise RecordingError(f'{file} is not an MCAP file; nothing to recover')
+        stream.seek(0)
+        reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
+        try:
+            for record in reader.records:
+                if not isinstance(record, Chunk):
+                    yield record, stream.tell()
+                elif chunks:
+                    yield from ((inner, stream.tell()) for inner in _opened(record, recovery))
+                if isinstance(record, Footer):
+                    return
+                start = stream.tell()
+        except DAMAGE as error:
+            cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
+            stream.seek(start)
+            if chunks and (beginning := _readable_beginning(stream.read(MAX_CHUNK_BYTES))):
+                yield from ((inner, size) for inner in _opened(beginning, recovery))
+            reason = 'the end is missing' if cut else str(error)
+            recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
 
 
-@contextmanager
-def _content(file: Path) -> Iterator[mmap.mmap]:
-    """A file as bytes; a plain stream would take memory for what a damaged length asks for."""
-    with file.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as all_:
-        yield all_
-
-
-def _mapping(record: Metadata) -> dict:
+def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
     try:
-        content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
-    except yaml.YAMLError:  # damaged; an older record, or none, has to do
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def _records(file: Path, stream: mmap.mmap, breaks: list[str]) -> Iterator[McapRecord]:
-    """Records up to the break, which is noted; chunks are not opened."""
-    size = file.stat().st_size
-    reader = StreamReader(cast(IO[bytes], stream), emit_chunks=True, record_size_limit=size)
-    record_at = len(MCAP0_MAGIC)
-    try:
-        for record in reader.records:
-            yield record
-            if isinstance(record, Footer):
-                return
-            record_at = stream.tell()
-    except DAMAGE as error:
-        cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
-        stream.seek(record_at)
-        beginning = _readable_beginning(stream.read(MAX_CHUNK_BYTES))
-        if beginning:
-            yield beginning
-        reason = 'the end is missing' if cut else str(error)
-        breaks.append(f'{file.name} breaks off at byte {record_at} of {size}: {reason}')
-
-
-def _copy(
-    file: Path,
-    survey: _Survey,
-    writer: RunWriter,
-    recovery: Recovery,
-    on_bytes: Callable[[int], None],
-    topics: Collection[str],
-) -> None:
-    with _content(file) as stream:
-        position = 0
-        for record in _records(file, stream, recovery.breaks):
-            for inner in _opened(record, recovery):
-                survey.note(inner)
-                if isinstance(inner, Channel) and (not topics or inner.topic in topics):
-                    _is_kept(inner, survey, writer, recovery)
-                elif isinstance(inner, Message):
-                    # The chunk that introduced the channel may be among the damaged ones.
-                    channel = survey.channels.get(inner.channel_id)
-                    if channel is None or (topics and channel.topic not in topics):
-                        continue
-                    if _is_kept(channel, survey, writer, recovery):
-                        writer.write(channel.topic, inner.data, inner.log_time, inner.publish_time)
-            on_bytes(stream.tell() - position)
-            position = stream.tell()
-
-
-def _opened(record: McapRecord, recovery: Recovery) -> list[McapRecord]:
-    if not isinstance(record, Chunk):
-        return [record]
-    try:
-        if record.uncompressed_size > MAX_CHUNK_BYTES:
+        if chunk.uncompressed_size > MAX_CHUNK_BYTES:
             raise ValueError('no recorder makes chunks of that size')
-        return breakup_chunk(record, validate_crc=True)
+        return breakup_chunk(chunk, validate_crc=True)
     except DAMAGE:
         recovery.damaged_chunks += 1
         return []
 
 
-def _is_kept(channel: Channel, survey: _Survey, writer: RunWriter, recovery: Recovery) -> bool:
+def _copy(
+    file: Path,
+    known: list[McapRecord],
+    writer: RunWriter,
+    recovery: Recovery,
+    on_bytes: Callable[[int], None],
+    topics: Collection[str],
+) -> None:
+    schemas = {record.id: record for record in known if isinstance(record, Schema)}
+    channels = {record.id: record for record in known if isinstance(record, Channel)}
+    position = 0
+    for record, at in _records(file, recovery, chunks=True):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        if isinstance(record, Channel | Message):
+            channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
+            if channel is not None and (not topics or channel.topic in topics):
+                kept = _is_kept(channel, schemas.get(channel.schema_id), writer, recovery)
+                if kept and isinstance(record, Message):
+                    writer.write(channel.topic, record.data, record.log_time, record.publish_time)
+        on_bytes(at - position)
+        position = at
+
+
+def _is_kept(
+    channel: Channel, schema: Schema | None, writer: RunWriter, recovery: Recovery
+) -> bool:
     """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
-    schema = survey.schemas.get(channel.schema_id)
-    text = _text(schema)
-    if schema is None or text is None or channel.message_encoding != 'cdr':
+    if channel.topic in writer.counts:
+        return True
+    try:
+        text = schema.data.decode() if schema else ''
+        offered = channel.metadata.get('offered_qos_profiles', '')
+        qos = parse_qos(offered) if offered else []
+    except UnicodeDecodeError:
+        text = ''
+    except (ReaderError, KeyError, TypeError, AttributeError):
+        qos = []  # damaged; players take their default then
+    if schema is None or not text or channel.message_encoding != 'cdr':
         if channel.topic not in recovery.skipped_topics:
             recovery.skipped_topics.append(channel.topic)
         return False
-    if channel.topic not in writer.counts:
-        definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
-        writer.add_topic(RunTopic(channel.topic, schema.name, definition, _qos(channel)))
+    definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
+    writer.add_topic(RunTopic(channel.topic, schema.name, definition, qos))
     return True
-
-
-def _text(schema: Schema | None) -> str | None:
-    try:
-        return schema.data.decode() if schema else None
-    except UnicodeDecodeError:
-        return None
-
-
-def _qos(channel: Channel) -> list[Qos]:
-    try:
-        return parse_qos(channel.metadata.get('offered_qos_profiles', ''))
-    except (ReaderError, KeyError, TypeError, AttributeError):
-        return []  # damaged; players take their default then
 
 
 def _readable_beginning(record: bytes) -> Chunk | None:
@@ -263,9 +229,7 @@ def _readable_beginning(record: bytes) -> Chunk | None:
         if end + length > len(data):
             break
         end += length
-    whole = data[:end]
-    return (
-        replace(chunk, compression='', data=whole, uncompressed_crc=0, uncompressed_size=end)
-        if whole
-        else None
+    whole = replace(
+        chunk, compression='', data=data[:end], uncompressed_crc=0, uncompressed_size=end
     )
+    return whole if end else None
