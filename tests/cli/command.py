@@ -25,7 +25,7 @@ KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
     'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
-    'measure': 'measurement', 'runs': 'runs', 'sweep': 'sweep', 'line': 'line',
+    'measure': 'measurement', 'sweep': 'sweep', 'line': 'line',
 }  # fmt: skip
 
 

@@ -31,7 +31,6 @@ COMMANDS = {
     'line': ('batch', 'Many parts over days: what they share and what changes.'),
     'locate': ('locate', 'Find where the part stands, by touched points.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'runs': ('recordings', 'List what a cell has painted, part by part, with figures.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 

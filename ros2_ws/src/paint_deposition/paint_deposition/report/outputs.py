@@ -116,16 +116,6 @@ output(
 )  # fmt: skip
 output('recovery', folder=str, messages=int, topics=dict[str, int], damaged_chunks=int,
        breaks=Words, skipped_topics=Words)  # fmt: skip
-output(
-    'runs', folder=str,
-    runs=list[
-        figures(
-            'gap_s duration_s', run=str, type=str, serial=str, coat=int, since=str, until=str,
-            recording=Literal['complete', 'unfinished', 'none'], poses=int | None,
-            gaps=int | None, film=dict[str, Number], atomizers=list[dict],
-        )
-    ],
-)  # fmt: skip
 output('location', 'rms_m', part_pose=Pose, residuals_m=dict[str, float], warnings=Words)
 
 Residuals = figures(
