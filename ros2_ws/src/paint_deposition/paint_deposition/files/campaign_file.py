@@ -221,11 +221,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
 
 
 def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int | None]]:
-    """The file of each gun, what to read of it, and its brush.
-
-    Raises:
-        ReadingsError: a gun has no file.
-    """
+    """The file of each gun, what to read of it, and its brush."""
     own = {key: getattr(entry, key) for key in MotionSource.model_fields}
     motions = []
     for number, written in enumerate(entry.guns or [{}], start=1):

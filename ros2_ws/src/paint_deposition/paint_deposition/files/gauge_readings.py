@@ -204,11 +204,7 @@ def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
 def _places(
     read: ReadingTable, surface: Surface | None
 ) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words.
-
-    Raises:
-        ReadingsError: the table does not say where its rows were taken.
-    """
+    """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words."""
     table = read.table
     if read.has(*AXES):
         positions, words = read.lengths_m(AXES)

@@ -15,10 +15,8 @@ from paint_deposition.motion.part_frame import Rigid
 FEWEST_POINTS = 3
 # Points nearer to a line than this share of their spread leave the turn about it open.
 LEAST_WIDTH = 0.03
-# A misfit above this is looked into: is it one point, the unit, a mirrored axis [m]?
+# A misfit above this is warned of [m].
 NOTABLE_M = 0.002
-# So much less of the misfit must be left for a cause to be named.
-EXPLAINED = 0.25
 
 
 @dataclass(frozen=True)
@@ -55,8 +53,7 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
         points_m: (3,) by name, the same points in the part's frame; others are left out.
 
     Raises:
-        RecordingError: fewer than three points in common, points on a line, another unit, or a
-            mirrored frame.
+        RecordingError: fewer than three points in common, or points on a line.
     """
     names = [name for name in touched_m if name in points_m]
     if len(names) < FEWEST_POINTS:
@@ -75,17 +72,15 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
                 'turned about it; add a point beside it'
             )
     pose, apart = _fitted(touched, points)
-    rms = _rms(apart)
+    rms = float(np.sqrt(np.mean(apart**2)))
     warnings: tuple[str, ...] = ()
     if rms > NOTABLE_M:
-        _refuse_other_unit(touched, points)
-        mirrored = _rms(_fitted(touched, points * [-1.0, 1.0, 1.0])[1])
-        if mirrored < EXPLAINED * rms:
-            raise RecordingError(
-                f'the points are {rms * 1e3:.1f} mm off, mirrored ones {mirrored * 1e3:.1f} mm: '
-                'one of the frames is left-handed; turn the sign of one axis'
-            )
-        warnings = _wrong_point(names, touched, points, rms)
+        worst = names[int(np.argmax(apart))]
+        warnings = (
+            f'the points do not fit, {worst} is off by {apart.max() * 1e3:.1f} mm: touch it '
+            'again, and check its name, the units of both tables and that both frames are '
+            'right-handed',
+        )
     return PartPlace(pose, rms, dict(zip(names, apart.tolist(), strict=True)), warnings)
 
 
@@ -96,40 +91,3 @@ def _fitted(touched: np.ndarray, points: np.ndarray) -> tuple[Rigid, np.ndarray]
     pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
     apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
     return pose, apart
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt(np.mean(values**2)))
-
-
-def _refuse_other_unit(touched: np.ndarray, points: np.ndarray) -> None:
-    ratio = _spread_m(touched) / _spread_m(points)
-    for factor, what in ((1000.0, 'touched'), (0.001, 'listed')):
-        if abs(ratio / factor - 1.0) < 0.1:
-            raise RecordingError(
-                f'the {what} points are a thousand times farther apart than the others: they '
-                'look like millimetres; write the unit in their heading, as in x [mm]'
-            )
-
-
-def _spread_m(positions: np.ndarray) -> float:
-    return _rms(np.linalg.norm(positions - positions.mean(axis=0), axis=1))
-
-
-def _wrong_point(
-    names: list[str], touched: np.ndarray, points: np.ndarray, rms: float
-) -> tuple[str, ...]:
-    """The one point without which the others fit, if there is one."""
-    if len(names) <= FEWEST_POINTS:
-        return ()
-    without = [
-        _rms(_fitted(np.delete(touched, k, axis=0), np.delete(points, k, axis=0))[1])
-        for k in range(len(names))
-    ]
-    k = int(np.argmin(without))
-    if without[k] > EXPLAINED * rms:
-        return ()
-    return (
-        f'without {names[k]} the others fit within {without[k] * 1e3:.1f} mm RMS instead of '
-        f'{rms * 1e3:.1f} mm; touch it again, or check its name',
-    )

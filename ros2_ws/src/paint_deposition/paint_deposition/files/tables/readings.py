@@ -133,16 +133,7 @@ class ReadingTable:
         rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
-        for quantity, columns in at.items():
-            texts = [headings[k].text for k in columns]
-            stems = {re.sub(r'\d+', '', text) for text in texts}
-            if len({*texts}) < len(texts) or [h.text for h in headings].count(texts[0]) > 1:
-                raise table.error(f"two columns are called '{texts[0]}'; keep one")
-            if len(columns) > 1 and (quantity != 'thickness' or len(stems) > 1):
-                named = ', '.join(map(repr, texts))
-                raise table.error(
-                    f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
-                )
+        _refuse_rivals(table, at)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
         table, doubt = table.with_decimal(numeric, layout.decimal)
@@ -253,6 +244,21 @@ def _quantity(heading: Heading) -> str | None:
     if (words and words[-1].endswith('dicke')) or QUANTITY.get(' '.join(words)) == 'thickness':
         return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
     return QUANTITY.get(' '.join(words))
+
+
+def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
+    """Refuse several columns of one quantity; those of the thickness may differ in a number."""
+    every = [heading.text for heading in table.headings]
+    for quantity, columns in at.items():
+        texts = [every[k] for k in columns]
+        if len({*texts}) < len(texts) or every.count(texts[0]) > 1:
+            raise table.error(f"two columns are called '{texts[0]}'; keep one")
+        stems = {re.sub(r'\d+', '', text) for text in texts}
+        if len(columns) > 1 and (quantity != 'thickness' or len(stems) > 1):
+            named = ', '.join(map(repr, texts))
+            raise table.error(
+                f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
+            )
 
 
 def _has_place(at: Collection[str]) -> bool:
