@@ -87,11 +87,6 @@ output(
     geometry=figures(passes=int, sentence=str, warnings=Words), picture=str | None,
 )  # fmt: skip
 
-Driven = figures(
-    'way_m programmed_m_per_s driven_m_per_s slowest_m_per_s slower slower_at_ends film'
-)
-output('driven_speed', 'on_programme', Driven, picture=str | None,
-       passes=list[figures('', Driven, number=int)])  # fmt: skip
 output(
     'recording', path=str, triggers=Words,
     topics=list[figures(name=str, type=str, message_count=int)],

@@ -3,7 +3,7 @@
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
@@ -13,6 +13,7 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError, RecordLengthLimitExceeded
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
@@ -25,7 +26,7 @@ from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
 MAX_CHUNK_BYTES = 256 * 1024 * 1024
-RECORD_HEAD = struct.Struct('<BQ')  # opcode and length
+HEAD_BYTES = 9  # opcode and length of a record
 # What the readers raise on bytes that are not what they should be.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
@@ -38,8 +39,7 @@ class Recovery:
     """What came out of a damaged run.
 
     Attributes:
-        folder: the new run.
-        counts: messages by topic.
+        folder: the new run. counts: messages by topic.
         damaged_chunks: chunks left out because their content is broken.
         breaks: where and why reading stopped, one line a file; empty for whole files.
         skipped_topics: topics that no rosbag2 folder can hold (not CDR, or without a schema).
@@ -74,25 +74,18 @@ def recover(
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
             message could be read.
     """
-    path, recovery = Path(path), Recovery(Path(folder))
+    path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path} does not exist')
     files = mcap_files(path)
     if not files:
         raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
-    # The chunk that introduces a channel may be damaged; outside the chunks it stands again.
-    outside = [record for file in files for record, _ in _records(file, Recovery(path))]
-    information = _information(outside)
-    writer = RunWriter(
-        folder,
-        custom_data=information.get('custom_data') or {},
-        ros_distro=information.get('ros_distro'),
-    )
+    writer = RunWriter(folder)
+    recovery = Recovery(writer.folder)
     try:
         with writer:
             for file in files:
-                known = [record for record, _ in _records(file, Recovery(path))]
-                _copy(file, known, writer, recovery, on_bytes, topics)
+                _copy(file, writer, recovery, on_bytes, topics)
             if not writer.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
@@ -103,48 +96,58 @@ def recover(
     return recovery
 
 
-def _information(records: list[McapRecord]) -> dict:
-    """What rosbag2 noted last of a run; {} where there is nothing that can be read."""
-    for record in reversed(records):
-        if isinstance(record, Metadata) and record.name == 'rosbag2':
-            try:
-                content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
-            except yaml.YAMLError:
-                continue
-            if isinstance(content, dict):
-                return content
-    return {}
+def _copy(
+    file: Path,
+    writer: RunWriter,
+    recovery: Recovery,
+    on_bytes: Callable[[int], None],
+    topics: Collection[str],
+) -> None:
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    try:  # the chunk that introduces a channel may be damaged; the end of a file repeats them
+        with file.open('rb') as stream:
+            if summary := SeekingReader(
+                stream, record_size_limit=file.stat().st_size
+            ).get_summary():
+                schemas, channels = dict(summary.schemas), dict(summary.channels)
+    except DAMAGE:
+        pass
+    for record in _records(file, recovery, on_bytes):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Metadata) and record.name == 'rosbag2':
+            _take_information(record, writer)
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        if isinstance(record, Channel | Message):
+            channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
+            if channel is not None and (not topics or channel.topic in topics):
+                kept = _is_kept(channel, schemas.get(channel.schema_id), writer, recovery)
+                if kept and isinstance(record, Message):
+                    writer.write(channel.topic, record.data, record.log_time, record.publish_time)
 
 
 def _records(
-    file: Path, recovery: Recovery, chunks: bool = False
-) -> Iterator[tuple[McapRecord, int]]:
-    """Records up to the break, which is noted, and the byte up to which the file was read.
-
-    Those of chunks are among them if they are asked for.
-    """
+    file: Path, recovery: Recovery, on_bytes: Callable[[int], None]
+) -> Iterator[McapRecord]:
+    """Records up to the break, which is noted, those of chunks among them."""
     size, start = file.stat().st_size, len(MCAP0_MAGIC)
     with file.open('rb') as stream:
-        if stream.read(start) != MCAP0_MAGIC:
-            raise RecordingError(f'{file} is not an MCAP file; nothing to recover')
-        stream.seek(0)
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
-                if not isinstance(record, Chunk):
-                    yield record, stream.tell()
-                elif chunks:
-                    yield from ((inner, stream.tell()) for inner in _opened(record, recovery))
+                yield from _opened(record, recovery) if isinstance(record, Chunk) else [record]
                 if isinstance(record, Footer):
                     return
+                on_bytes(stream.tell() - start)
                 start = stream.tell()
         except DAMAGE as error:
             cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
-            stream.seek(start)
-            if chunks and (beginning := _readable_beginning(stream.read(MAX_CHUNK_BYTES))):
-                yield from ((inner, size) for inner in _opened(beginning, recovery))
             reason = 'the end is missing' if cut else str(error)
             recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
+            stream.seek(start)
+            yield from _readable_beginning(stream.read(MAX_CHUNK_BYTES))
 
 
 def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
@@ -157,30 +160,34 @@ def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
         return []
 
 
-def _copy(
-    file: Path,
-    known: list[McapRecord],
-    writer: RunWriter,
-    recovery: Recovery,
-    on_bytes: Callable[[int], None],
-    topics: Collection[str],
-) -> None:
-    schemas = {record.id: record for record in known if isinstance(record, Schema)}
-    channels = {record.id: record for record in known if isinstance(record, Channel)}
-    position = 0
-    for record, at in _records(file, recovery, chunks=True):
-        if isinstance(record, Schema):
-            schemas[record.id] = record
-        elif isinstance(record, Channel):
-            channels[record.id] = record
-        if isinstance(record, Channel | Message):
-            channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
-            if channel is not None and (not topics or channel.topic in topics):
-                kept = _is_kept(channel, schemas.get(channel.schema_id), writer, recovery)
-                if kept and isinstance(record, Message):
-                    writer.write(channel.topic, record.data, record.log_time, record.publish_time)
-        on_bytes(at - position)
-        position = at
+def _readable_beginning(record: bytes) -> Iterator[McapRecord]:
+    """The whole records in a cut chunk; its checksum covers all of it and cannot be checked.
+
+    Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
+    """
+    if record[:1] != bytes([Opcode.CHUNK]):
+        return
+    try:
+        chunk = Chunk.read(ReadDataStream(BytesIO(record[HEAD_BYTES:])))
+        data = chunk.data
+        if chunk.compression == 'zstd':
+            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
+        elif chunk.compression == 'lz4':
+            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+        reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
+        yield from reader.records
+    except DAMAGE:
+        return
+
+
+def _take_information(record: Metadata, writer: RunWriter) -> None:
+    """Custom data and distribution, as rosbag2 noted them last."""
+    try:
+        content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
+        writer.custom_data = {k: str(v) for k, v in (content.get('custom_data') or {}).items()}
+        writer.ros_distro = content.get('ros_distro') or writer.ros_distro
+    except (yaml.YAMLError, AttributeError):  # an older record, or none, has to do
+        return
 
 
 def _is_kept(
@@ -189,47 +196,15 @@ def _is_kept(
     """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
     if channel.topic in writer.counts:
         return True
-    try:
-        text = schema.data.decode() if schema else ''
-        offered = channel.metadata.get('offered_qos_profiles', '')
-        qos = parse_qos(offered) if offered else []
-    except UnicodeDecodeError:
-        text = ''
-    except (ReaderError, KeyError, TypeError, AttributeError):
-        qos = []  # damaged; players take their default then
-    if schema is None or not text or channel.message_encoding != 'cdr':
+    if schema is None or channel.message_encoding != 'cdr':
         if channel.topic not in recovery.skipped_topics:
             recovery.skipped_topics.append(channel.topic)
         return False
+    text = schema.data.decode(errors='replace')
+    try:
+        qos = parse_qos(channel.metadata.get('offered_qos_profiles', ''))
+    except (ReaderError, KeyError, TypeError, AttributeError):
+        qos = []  # damaged; players take their default then
     definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
     writer.add_topic(RunTopic(channel.topic, schema.name, definition, qos))
     return True
-
-
-def _readable_beginning(record: bytes) -> Chunk | None:
-    """An uncompressed chunk of the whole messages in a cut chunk record, None if there are none.
-
-    Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
-    Its checksum covers all of it and cannot be checked any more.
-    """
-    if record[:1] != bytes([Opcode.CHUNK]):
-        return None
-    try:
-        chunk = Chunk.read(ReadDataStream(BytesIO(record[RECORD_HEAD.size :])))
-        data = chunk.data
-        if chunk.compression == 'zstd':
-            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        elif chunk.compression == 'lz4':
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
-    except DAMAGE:
-        return None
-    end = 0
-    while end + RECORD_HEAD.size <= len(data):
-        length = RECORD_HEAD.size + RECORD_HEAD.unpack_from(data, end)[1]
-        if end + length > len(data):
-            break
-        end += length
-    whole = replace(
-        chunk, compression='', data=data[:end], uncompressed_crc=0, uncompressed_size=end
-    )
-    return whole if end else None

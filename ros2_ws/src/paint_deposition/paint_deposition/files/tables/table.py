@@ -188,8 +188,10 @@ def find_table(
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
         raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
+    # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
+    wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
     if found:
-        return found[0]
+        return (wide or found[-1:])[0]
     return max(sheets, key=lambda s: len(s.rows[0]) if s.rows else 0), None
 
 
