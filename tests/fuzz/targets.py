@@ -27,7 +27,7 @@ from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.tables.readings import Layout
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import urdf
 from workbook import write_workbook

@@ -17,7 +17,7 @@ from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.gauge_readings import MeasuringPoints
-from paint_deposition.files.tables.readings import Layout
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit

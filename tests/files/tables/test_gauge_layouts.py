@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings, write_predictions
-from paint_deposition.files.tables.readings import Layout
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 from workbook import open_document, open_row, write_workbook

@@ -15,7 +15,7 @@ from paint_deposition.files.motion_source import MotionSource, Number, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
-from paint_deposition.files.tables.readings import Layout
+from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath

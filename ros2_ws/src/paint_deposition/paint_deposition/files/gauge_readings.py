@@ -12,7 +12,8 @@ import numpy as np
 
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
-from paint_deposition.files.tables.readings import AXES, NORMALS, ON_FACE, Layout, ReadingTable
+from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
+from paint_deposition.files.tables.readings import ReadingTable
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m

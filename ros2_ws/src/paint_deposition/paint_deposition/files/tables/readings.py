@@ -1,21 +1,28 @@
-"""Tables of gauge readings and of measuring points: their columns, rows and units.
-
-Columns are known by the project's own names, by a few usual English and German headings, or as
-the user names them, see ``Layout``.
-"""
+"""Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from paint_deposition.errors import ReadingsError, did_you_mean
+from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
+from paint_deposition.files.tables.reading_columns import (
+    ALIASES,
+    AXES,
+    FILM_UNITS,
+    LENGTH_UNITS,
+    NORMALS,
+    ON_FACE,
+    Layout,
+    columns_of,
+    has_place,
+    not_found,
+)
 from paint_deposition.files.tables.sheets import Sheet, text_of
 from paint_deposition.files.tables.table import (
     Table,
@@ -24,61 +31,14 @@ from paint_deposition.files.tables.table import (
     is_comment,
     is_nothing,
     is_value,
-    shown,
 )
 
-# Columns of our own; where those of a reading are all there, no other name is looked at.
-OWN = {
-    'x': 'x_m', 'y': 'y_m', 'z': 'z_m', 'thickness': 'thickness_um', 'point': 'point',
-    'group': 'group', 'session': 'session', 'sigma': 'sigma_um',
-    'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
-}  # fmt: skip
-AXES = ('x', 'y', 'z')
-ON_FACE = ('from_left', 'height')
-NORMALS = ('nx', 'ny', 'nz')
-LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
-# Headings without their unit, numbers of repeats and accents. A word that ends in 'dicke' is a
-# thickness too.
-ALIASES = {
-    'thickness': (
-        'thickness', 'film thickness', 'coating thickness', 'film build', 'film', 'dft',
-        'reading', 'value', 'messwert',
-    ),
-    'from_left': ('from left', 'left', 'von links', 'links'),
-    'height': ('height', 'from bottom', 'hohe', 'hohe von unten', 'hoehe', 'von unten'),
-    'point': (
-        'point', 'location', 'spot', 'label', 'position', 'name', 'punkt', 'messpunkt',
-        'messstelle', 'stelle',
-    ),
-    'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
-    'group': ('group', 'gruppe'),
-    'unit': ('unit', 'units', 'einheit'),
-}  # fmt: skip
-QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
-BESIDE_AXIS = {'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', 'ist'}
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
 STATISTIC = re.compile(
     r'(mean|average|avg|mittel\w*|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
     r'lowest|highest|coefficient|vari\w*|statist\w*|number of|count|anzahl|sum|total|n|s|x)\b'
 )
-
-
-@dataclass(frozen=True)
-class Layout:
-    """What the user says of a table; what is left out is found.
-
-    Attributes:
-        columns: heading, or number from 1, of a quantity's column.
-        unit: metres in the unit of 'position' and of 'thickness'.
-        decimal: '.' or ',', or '' where it is to be found.
-        sheet: name of a workbook's sheet, or ''.
-    """
-
-    columns: Mapping[Any, str | int] = field(default_factory=dict)
-    unit: Mapping[Any, float] = field(default_factory=dict)
-    decimal: str = ''
-    sheet: str = ''
 
 
 @dataclass(frozen=True)
@@ -119,17 +79,17 @@ class ReadingTable:
         numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
 
         def known(headings: list[Heading]) -> int:
-            at = _columns(headings, layout)
-            return len(at) if ('thickness' in at if films else _has_place(at)) else 0
+            at = columns_of(headings, layout)
+            return len(at) if ('thickness' in at if films else has_place(at)) else 0
 
         sheet, header = find_table(path, ReadingsError, known, layout.sheet)
         first = 0 if numbered or header is None else header + 1
-        if header is None and not numbered:
-            raise ReadingsError(f'{path}: {_not_found(sheet, films, layout)}')
-        headings = headings_in(sheet.rows[header or 0])
+        headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        at = _columns(headings, layout)
+        at = columns_of(headings, layout)
+        if header is None and not (numbered and known(headings)):
+            raise ReadingsError(f'{path}: {not_found(sheet, films, layout)}')
         rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
@@ -210,42 +170,6 @@ class ReadingTable:
         return values[row, which] * factor, row, words
 
 
-def _columns(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
-    """The columns of each quantity under these headings; the user's, else those that are known."""
-    texts = [heading.text for heading in headings]
-    small = [text.casefold() for text in texts]
-    own = {q: [k for k, text in enumerate(texts) if text == name] for q, name in OWN.items()}
-    own = {q: columns for q, columns in own.items() if columns}
-    at: dict[str, list[int]] = {}
-    if not {*AXES, 'thickness'} <= {*own}:
-        for column, heading in enumerate(headings):
-            if quantity := _quantity(heading):
-                at.setdefault(quantity, []).append(column)
-        if {*AXES} <= {*at}:
-            at = {q: columns for q, columns in at.items() if q not in ON_FACE}
-    at |= own
-    for quantity, name in layout.columns.items():
-        wanted = name - 1 if isinstance(name, int) else -1
-        if isinstance(name, str) and name.strip().casefold() in small:
-            wanted = small.index(name.strip().casefold())
-        if not 0 <= wanted < len(headings):
-            return {}
-        at = {q: [k for k in columns if k != wanted] for q, columns in at.items()}
-        at = {q: columns for q, columns in at.items() if columns} | {quantity: [wanted]}
-    return at
-
-
-def _quantity(heading: Heading) -> str | None:
-    """What a heading names, None where it is not known."""
-    words = [word for word in heading.words if not word.isdigit()]
-    letters = ''.join(word for word in words if word not in BESIDE_AXIS)
-    if letters in (*AXES, *NORMALS):
-        return letters
-    if (words and words[-1].endswith('dicke')) or QUANTITY.get(' '.join(words)) == 'thickness':
-        return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
-    return QUANTITY.get(' '.join(words))
-
-
 def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
     """Refuse several columns of one quantity; those of the thickness may differ in a number."""
     every = [heading.text for heading in table.headings]
@@ -261,41 +185,17 @@ def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
             )
 
 
-def _has_place(at: Collection[str]) -> bool:
-    return {*AXES} <= {*at} or {*ON_FACE} <= {*at}
-
-
-def _not_found(sheet: Sheet, films: bool, layout: Layout) -> str:
-    """Why a file has no such table, and what to do."""
-    if not sheet.rows:
-        return 'there is nothing to read in it; give a table with a heading over each column'
-    headings = headings_in(sheet.rows[0])
-    texts = [heading.text for heading in headings]
-    for quantity, name in layout.columns.items():
-        if isinstance(name, str) and name not in texts:
-            remedy = did_you_mean(name, filter(None, texts), 'copy the heading')
-            return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
-    if films:
-        return (
-            f'no column is known as the thickness {shown(headings)}; call it thickness_um, or '
-            'give its heading or number with columns: {thickness: ...} in the campaign'
-        )
-    return f'no columns are known as x, y, z, or from_left, height {shown(headings)}; rename them'
-
-
 def _unit_beside(
     table: Table, at: dict[str, list[int]], sheet: Sheet, header: int
 ) -> float | None:
     """Metres in the unit of the thickness that a column, or a line above the table, has."""
     if 'unit' in at:
-        for row, text in enumerate(table.texts(at['unit'][0])):
-            if text and length_of(text) not in FILM_UNITS:
-                table.complain(row, f"the unit is '{text}'; expected µm, mil or mm")
-        units = {length_of(text) for text in table.texts(at['unit'][0]) if text}
-        if len(units) > 1:
-            table.refuse_complaints()
-            raise table.error('the thickness is in several units; give all readings in one')
-        return units.pop() if units else None
+        texts = sorted({text for text in table.texts(at['unit'][0]) if text})
+        units = {length_of(text) for text in texts}
+        if len(units) > 1 or not units <= {*FILM_UNITS}:
+            found = ', '.join(map(repr, texts))
+            raise table.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
+        return next(iter(units), None)
     for row in sheet.rows[:header]:
         cells = [part for cell in row for part in text_of(cell).split(':') if part]
         if len(cells) > 1 and words_of(cells[0]) in ((name,) for name in ALIASES['unit']):

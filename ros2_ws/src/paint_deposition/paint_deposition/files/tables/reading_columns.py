@@ -1,0 +1,120 @@
+"""Which column of a table of gauge readings, or of measuring points, holds what.
+
+Columns are known by the project's own names, by a few usual English and German headings, or as
+the user names them, see ``Layout``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from paint_deposition.errors import did_you_mean
+from paint_deposition.files.tables.headings import Heading
+from paint_deposition.files.tables.sheets import Sheet
+from paint_deposition.files.tables.table import headings_in, shown
+
+# Columns of our own; where those of a reading are all there, no other name is looked at.
+OWN = {
+    'x': 'x_m', 'y': 'y_m', 'z': 'z_m', 'thickness': 'thickness_um', 'point': 'point',
+    'group': 'group', 'session': 'session', 'sigma': 'sigma_um',
+    'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
+}  # fmt: skip
+AXES = ('x', 'y', 'z')
+ON_FACE = ('from_left', 'height')
+NORMALS = ('nx', 'ny', 'nz')
+LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
+# Headings without their unit, numbers of repeats and accents. A word that ends in 'dicke' is a
+# thickness too.
+ALIASES = {
+    'thickness': (
+        'thickness', 'film thickness', 'coating thickness', 'film build', 'film', 'dft',
+        'reading', 'value', 'messwert',
+    ),
+    'from_left': ('from left', 'left', 'von links', 'links'),
+    'height': ('height', 'from bottom', 'hohe', 'hohe von unten', 'hoehe', 'von unten'),
+    'point': (
+        'point', 'location', 'spot', 'label', 'position', 'name', 'punkt', 'messpunkt',
+        'messstelle', 'stelle',
+    ),
+    'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
+    'group': ('group', 'gruppe'),
+    'unit': ('unit', 'units', 'einheit'),
+}  # fmt: skip
+QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
+BESIDE_AXIS = {'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', 'ist'}
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the user says of a table; what is left out is found.
+
+    Attributes:
+        columns: heading, or number from 1, of a quantity's column.
+        unit: metres in the unit of 'position' and of 'thickness'.
+        decimal: '.' or ',', or '' where it is to be found.
+        sheet: name of a workbook's sheet, or ''.
+    """
+
+    columns: Mapping[Any, str | int] = field(default_factory=dict)
+    unit: Mapping[Any, float] = field(default_factory=dict)
+    decimal: str = ''
+    sheet: str = ''
+
+
+def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
+    """The columns of each quantity under these headings; the user's, else those that are known."""
+    texts = [heading.text for heading in headings]
+    small = [text.casefold() for text in texts]
+    own = {q: [k for k, t in enumerate(texts) if t == n] for q, n in OWN.items() if n in texts}
+    at: dict[str, list[int]] = {}
+    if not {*AXES, 'thickness'} <= {*own}:
+        for column, heading in enumerate(headings):
+            if quantity := _quantity(heading):
+                at.setdefault(quantity, []).append(column)
+        if {*AXES} <= {*at}:
+            at = {q: columns for q, columns in at.items() if q not in ON_FACE}
+    at |= own
+    for quantity, name in layout.columns.items():
+        wanted = name - 1 if isinstance(name, int) else -1
+        if isinstance(name, str) and name.strip().casefold() in small:
+            wanted = small.index(name.strip().casefold())
+        if not 0 <= wanted < len(headings):
+            return {}
+        at = {q: [k for k in columns if k != wanted] for q, columns in at.items()}
+        at = {q: columns for q, columns in at.items() if columns} | {quantity: [wanted]}
+    return at
+
+
+def _quantity(heading: Heading) -> str | None:
+    """What a heading names, None where it is not known."""
+    words = [word for word in heading.words if not word.isdigit()]
+    letters = ''.join(word for word in words if word not in BESIDE_AXIS)
+    if letters in (*AXES, *NORMALS):
+        return letters
+    if (words and words[-1].endswith('dicke')) or QUANTITY.get(' '.join(words)) == 'thickness':
+        return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
+    return QUANTITY.get(' '.join(words))
+
+
+def has_place(at: Collection[str]) -> bool:
+    return {*AXES} <= {*at} or {*ON_FACE} <= {*at}
+
+
+def not_found(sheet: Sheet, films: bool, layout: Layout) -> str:
+    """Why a file has no such table, and what to do."""
+    if not sheet.rows:
+        return 'there is nothing to read in it; give a table with a heading over each column'
+    headings = headings_in(sheet.rows[0])
+    texts = [heading.text for heading in headings]
+    named = {q: name for q, name in layout.columns.items() if isinstance(name, str)}
+    for quantity, name in ((q, name) for q, name in named.items() if name not in texts):
+        remedy = did_you_mean(name, filter(None, texts), 'copy the heading')
+        return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
+    if films:
+        return (
+            f'no column is known as the thickness {shown(headings)}; call it thickness_um, or '
+            'give its heading or number with columns: {thickness: ...} in the campaign'
+        )
+    return f'no columns are known as x, y, z, or from_left, height {shown(headings)}; rename them'
