@@ -198,7 +198,7 @@ def _unit_beside(
         return next(iter(units), None)
     for row in sheet.rows[:header]:
         cells = [part for cell in row for part in text_of(cell).split(':') if part]
-        if len(cells) > 1 and words_of(cells[0]) in ((name,) for name in ALIASES['unit']):
+        if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
             return length_of(cells[1])
     return None
 
