@@ -34,6 +34,7 @@ def main(names: tuple[str, ...], seconds: float, inputs: int, seed: int, place: 
         raise click.ClickException('needs atheris, which has wheels for Linux on x86-64 only')
     for threads in ('OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'NUMBA_NUM_THREADS'):
         os.environ[threads] = '1'
+    os.environ['PAINT_CACHE_DIR'] = ''
     with contextlib.redirect_stderr(io.StringIO()):  # a line for every module
         from fuzz.reading import targets
 

@@ -10,8 +10,9 @@ import numpy as np
 import trimesh
 
 from nodes.processes import NodeProcess
+from paint_deposition.files.meshes import read_mesh
 
-# Each takes a tenth of a second or more, and none is needed to paint a part.
+# Each takes a tenth of a second or more, and none is needed to paint a part that is kept.
 SLOW = ('matplotlib', 'trimesh', 'networkx')
 START = f"""
 import atexit, sys
@@ -22,8 +23,9 @@ sys.exit(deposition_simulator())
 
 
 @pytest.fixture
-def part(tmp_path):
-    """A curved sheet of 4225 vertices."""
+def part(tmp_path, monkeypatch):
+    """A curved sheet of 4225 vertices, prepared and kept."""
+    monkeypatch.setenv('PAINT_CACHE_DIR', str(tmp_path / 'cache'))
     across = np.linspace(-0.4, 0.4, 65)
     x, z = (axis.ravel() for axis in np.meshgrid(across, across))
     row, column = (axis.ravel() for axis in np.indices((64, 64)))
@@ -31,6 +33,8 @@ def part(tmp_path):
     faces = np.concatenate([np.stack([a, a + 1, a + 66], 1), np.stack([a, a + 66, a + 65], 1)])
     sheet = trimesh.Trimesh(np.stack([x, 0.1 * x**2, z], axis=1), faces, process=False)
     sheet.export(tmp_path / 'part.stl')
+    read_mesh(tmp_path / 'part.stl', max_edge_length_m=0.05)
+    assert list((tmp_path / 'cache' / 'parts').iterdir())
     return tmp_path / 'part.stl'
 
 

@@ -92,3 +92,32 @@ def test_a_new_model_without_a_brush_in_use_is_not_taken(simulator, robot, paint
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model; its brushes: 1' in node.model_problem
     assert np.array_equal(node.film.up_to_date().film_um, film)
+
+
+def between(*set_points: tuple[float, ...]):
+    """The two passes, whose states name no brush and tell these set-points one after the other."""
+    stamps = [*PLAIN.trigger_stamps_ns, PLAIN.stamps_ns[-100]]
+    told = switched(stamps, (1.0, 0), (0.0, 0), (0.8, 0), (1.0, 0))
+    return replace(PLAIN, **told, trigger_set_points=np.array(set_points))
+
+
+MIDDLE, NEARER = (280.0, 0.0, 41_000.0, 0.0), (220.0, 0.0, 47_500.0, 0.0)
+CLOSED, TOO_FAST = (0.0,) * 4, (280.0, 0.0, 52_000.0, 0.0)
+
+
+def test_live_set_points_paint_between_brushes_as_offline(simulator, robot, painted, onlooker,
+                                                          wait_until, model_file):  # fmt: skip
+    node = simulator(model_file=model_file)
+    viewer = onlooker(DIAGNOSTICS)
+    motion = between(MIDDLE, CLOSED, NEARER, MIDDLE)
+    robot(node).send(motion)
+    film = painted(node)
+    assert np.array_equal(film, offline_um(node, motion, MODEL))
+    assert film.max() > 1.0
+    wait_until(
+        lambda: (
+            (s := viewer.status(POSES))
+            and values_of(s)['gun'] == 'spraying, flow 1, brush between those calibrated'
+        ),
+        what='the brush between in the diagnostics',
+    )

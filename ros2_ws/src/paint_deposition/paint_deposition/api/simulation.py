@@ -13,6 +13,7 @@ from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.common_film import CommonFilm, require_one_finish
 from paint_deposition.film.film import Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
@@ -186,7 +187,11 @@ def simulate(
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
     given = models
-    for motion, its_model in zip(motions, models, strict=True):
+    pairs = [
+        with_interpolated_brushes(motion, its) for motion, its in zip(motions, models, strict=True)
+    ]
+    motions, models = [motion for motion, _ in pairs], [its for _, its in pairs]
+    for motion, its_model in pairs:
         require_brushes(motion, its_model)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import MeshError
+from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.edges import Edges
@@ -33,7 +34,8 @@ def read_mesh(
 
     The winding says which side is outward, toward the gun. An open surface is taken as it is; a
     closed body that is inside out is turned round, and triangles wound against their neighbours
-    are turned to the majority, both with a note in ``Surface.notes``.
+    are turned to the majority, both with a note in ``Surface.notes``. A large part is kept on
+    disk for the next time, see ``files.surface_cache``.
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
@@ -52,7 +54,15 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    return _prepared(path, scale, max_edge_length_m, down, body)
+    place = surface_cache.place_of(
+        path, scale, max_edge_length_m, None if down is None else np.asarray(down).tolist(), body
+    )
+    surface = surface_cache.find(place) if place else None
+    if surface is None:
+        surface = _prepared(path, scale, max_edge_length_m, down, body)
+        if place:
+            surface_cache.keep(place, surface)
+    return surface
 
 
 def write_mesh_ply(

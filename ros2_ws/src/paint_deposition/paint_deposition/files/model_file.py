@@ -131,6 +131,7 @@ def _model_file(content: dict[str, Any], load: Callable[[str], type[Effect]]) ->
         effects.append(Occlusion(strength=1.0))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
+    model.effects_by_pattern()  # refuses what effects cannot follow
     return ModelFile(
         model,
         _given(str, 'name', content),

@@ -12,6 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.json_files import json_text, plain
 from paint_deposition.files.version import git_version
+from paint_deposition.model.brush import BETWEEN
 
 BLOCK_BYTES = 1 << 20
 
@@ -64,7 +65,8 @@ def _in_full(model: DepositionModel) -> dict[str, Any]:
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
-    brushes = {'brushes': [plain(brush.model_dump()) for brush in model.brushes]}
+    named = (brush for brush in model.brushes if brush.number < BETWEEN)
+    brushes = {'brushes': [plain(brush.model_dump()) for brush in named]}
     return {
         **(brushes if model.brushes else {'planar': plain(model.planar.model_dump())}),
         'projection': plain(model.projection.model_dump()),

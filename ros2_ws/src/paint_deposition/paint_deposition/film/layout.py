@@ -41,19 +41,20 @@ def _constants(model: DepositionModel, planar: PlanarPattern, shadow: float) -> 
     return c
 
 
-def compiled_laws(effects: Sequence[Effect], brushes: int) -> tuple[Laws, Laws, np.ndarray]:
-    """What the kernel inlines of effects.
+def compiled_laws(effects: Sequence[Sequence[Effect]]) -> tuple[Laws, Laws, np.ndarray]:
+    """What the kernel inlines of effects, each as it is for every one of B brushes.
 
-    Flux factors and pattern scales, each with how many parameters it takes; (B, n) parameters, the
-    same for each brush, one unused number where there are none.
+    Flux factors and pattern scales, each with how many parameters it takes; (B, n) parameters, one
+    unused number where there are none.
     """
     found: list[Laws] = []
-    values: list[float] = []
+    values: list[list[float]] = [[] for _ in effects]
     for kind in ('flux_factor', 'pattern_scale'):
-        chosen = [effect for effect in effects if getattr(type(effect), kind) is not None]
-        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
-        values += [value for effect in chosen for value in effect.values()]
-    return found[0], found[1], np.array([values or [0.0]] * brushes)
+        chosen = [[e for e in each if getattr(type(e), kind) is not None] for each in effects]
+        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen[0]))
+        for row, each in zip(values, chosen, strict=True):
+            row += [value for effect in each for value in effect.values()]
+    return found[0], found[1], np.array([row or [0.0] for row in values])
 
 
 def term_constants(model: DepositionModel) -> np.ndarray:

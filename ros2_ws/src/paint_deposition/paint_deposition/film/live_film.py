@@ -3,13 +3,20 @@
 import copy
 from bisect import bisect_right, insort
 from collections.abc import Iterable
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator, Precision
+from paint_deposition.film.interpolated_brushes import (
+    uses_set_points,
+    with_brushes_of,
+    with_set_points,
+)
 from paint_deposition.film.lines_of_sight import Obstacle
+from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.pose_stream import (
     DEFAULT_LIMIT_POSES,
@@ -125,9 +132,12 @@ class LiveFilm:
             ModelError: the model does not have the brush that it sprays with.
         """
         carried = before._changes or before._carried
-        brushes = {change.brush for change in carried if change.flow > 0.0}
+        # A brush between the calibrated ones is made anew from its set-points.
+        sprayed = {change.brush for change in carried if change.flow > 0.0}
+        brushes = {brush for brush in sprayed if brush < BETWEEN}
         self.model.require_brushes(brushes)
         self._carried, self._brushes = carried, brushes
+        self._integrator.use(with_brushes_of(self.model, before.model))
         self._clear()
 
     def _clear(self) -> None:
@@ -145,9 +155,11 @@ class LiveFilm:
         """Take a change of the trigger, early, in time or late.
 
         Raises:
-            ModelError: its brush is not in the model; the change is not taken.
+            ModelError: its brush is not in the model, or its set-points lie outside the calibrated
+                ones; the change is not taken.
         """
         if change.flow > 0.0:
+            change = self._with_its_brush(change)
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
         self._carry_on(change.stamp_ns)
@@ -193,6 +205,7 @@ class LiveFilm:
         Raises:
             ModelError: the model does not have a brush that was used.
         """
+        model = with_brushes_of(model, self.model)
         always_on = self._sprays_without_trigger and self.flow is None
         model.require_brushes({ONLY_BRUSH} if always_on else self._brushes)
         builder = self._builder
@@ -210,6 +223,15 @@ class LiveFilm:
         path = away.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
+
+    def _with_its_brush(self, change: TriggerChange) -> TriggerChange:
+        """The change with the number that stands for its set-points, where those choose."""
+        if not uses_set_points(self.model, change.brush, change.set_points):
+            return change
+        model, number = with_set_points(self.model, change.set_points)
+        if model is not self.model:
+            self._integrator.use(model)
+        return replace(change, brush=number)
 
     def _begin_again(self, first_change: TriggerChange) -> None:
         log = self.log

@@ -11,6 +11,9 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Messages carry the number in 32 bits.
 MOST = 2**31 - 1
+# Numbers from here on stand for set-points between brushes; nobody else can name them. So many at
+# the most: set-points that change all the time are measured ones.
+BETWEEN, MOST_BETWEEN = MOST + 1, 200
 
 
 class SetPoints(BaseModel):
@@ -42,13 +45,14 @@ class Brush(SetPoints):
     """The pattern of eq. (1) at one setting of the atomizer.
 
     Attributes:
-        number: by which programmes choose it, 1 to MOST.
+        number: by which programmes choose it, 1 to MOST; from BETWEEN on it stands for
+            set-points.
         planar: its pattern.
         interpolated: whether the pattern follows from those of the other brushes, see
             ``brush_law``.
     """
 
-    number: int = Field(ge=1, le=MOST)
+    number: int = Field(ge=1, lt=BETWEEN + MOST_BETWEEN)
     planar: PlanarPattern
     interpolated: bool = False
 
@@ -64,8 +68,8 @@ class Brush(SetPoints):
 
 
 def listed(numbers: Iterable[int]) -> str:
-    """Numbers of brushes in words."""
-    return ', '.join(map(str, sorted(numbers)))
+    """Numbers of brushes in words; those that stand for set-points nobody knows."""
+    return ', '.join(str(number) for number in sorted(numbers) if number < BETWEEN)
 
 
 SETTINGS = ('flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')

@@ -17,11 +17,15 @@ BATCH_POSES = 256
 
 @dataclass(frozen=True)
 class TriggerChange:
-    """The flow (relative; 0 is gun off) from a time on, and the number of the brush."""
+    """The flow (relative; 0 is gun off) from a time on, and the number of the brush.
+
+    ``set_points`` are a row of those of a trajectory, or none.
+    """
 
     stamp_ns: int
     flow: float
     brush: int = ONLY_BRUSH
+    set_points: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)

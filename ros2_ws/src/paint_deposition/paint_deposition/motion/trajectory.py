@@ -61,6 +61,9 @@ class Trajectory:
             Before the first of them the gun is off.
         trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one,
             throughout.
+        trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
+            magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.
+            Empty: all are unknown.
         notes: remarks on the recording for the user, a line each.
         warnings: what is likely wrong with it, a line each with the remedy.
         source: the file it came from, for messages.
@@ -81,6 +84,7 @@ class Trajectory:
     source: str = 'trajectory'
     settings: Mapping[str, float] = field(default_factory=dict)
     trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    trigger_set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'
@@ -97,6 +101,7 @@ class Trajectory:
         for what, column, may_lack in (
             ('flow values', self.trigger_flow, False),
             ('brushes', self.trigger_brush, True),
+            ('rows of set-points', self.trigger_set_points, True),
         ):
             if len(column) != changes and not (may_lack and not len(column)):
                 raise RecordingError(
@@ -110,6 +115,10 @@ class Trajectory:
         brush = self.trigger_brush if len(self.trigger_brush) else np.zeros(len(self.trigger_flow))
         columns = (self.trigger_stamps_ns, self.trigger_flow, brush.astype(np.int64))
         return list(zip(*(column.tolist() for column in columns), strict=True))
+
+    def set_points_of(self, row: int) -> tuple[float, ...]:
+        """Those from a change of the trigger on, none where all are unknown."""
+        return tuple(map(float, self.trigger_set_points[row : row + 1].ravel()))
 
     @property
     def brushes(self) -> set[int]:

@@ -96,6 +96,7 @@ def trajectory_of(
         trigger_stamps_ns=gun.stamps_ns,
         trigger_flow=gun.flow,
         trigger_brush=gun.brush,
+        trigger_set_points=gun.set_points,
         notes=(*trajectory.notes, *gun.notes),
         settings=gun.settings,
     )
@@ -184,10 +185,12 @@ def write_pose_bag(
         )
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    state_type = STATE_TYPE if levels or trajectory.trigger_brush.any() else BOOL_TYPE
+    numbers = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
+    state_type = STATE_TYPE if levels or numbers.any() else BOOL_TYPE
     # Behind the time, what comes first of those at one time.
     entries: list[tuple[int, int, Any]] = [
-        (time_ns, 0, gun) for time_ns, *gun in trajectory.triggers
+        (time_ns, 0, (*gun, trajectory.set_points_of(row)))
+        for row, (time_ns, *gun) in enumerate(trajectory.triggers)
     ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
@@ -223,14 +226,15 @@ def _state(
     frame_id: str,
     flow: float,
     brush: int,
+    set_points: tuple[float, ...],
 ) -> object:
-    """The gun with flow, relative to the calibrated one, and brush."""
+    """The gun with flow, relative to the calibrated one, brush and set-points."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
     header = _header(types, time_ns, frame_id)
     unknown = float('nan')
-    settings = (unknown,) * 3
-    return types.types[STATE_TYPE](header, flow > 0.0, flow, *settings, brush, unknown, unknown)
+    wet, *others = set_points or (unknown,) * 4
+    return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
 
 
 def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.trajectory import numbered
@@ -29,6 +29,7 @@ class Switching:
     Attributes:
         stamps_ns: (M,) int64 times at which the flow changes; flow: (M,) from then on.
         brush: (M,) int64 number of the brush from then on; empty where it is not recorded.
+        set_points: (M, 4) as those of a trajectory; empty where none are recorded.
         settings: median of each setting in the states.
         by_log_time: whether the times are those at which messages were logged.
         notes: what was understood, a line each.
@@ -37,6 +38,7 @@ class Switching:
     stamps_ns: np.ndarray
     flow: np.ndarray
     brush: np.ndarray
+    set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
     notes: tuple[str, ...] = ()
@@ -102,13 +104,13 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
 
     States recorded before they had a brush are of the only one.
     """
-    changes: list[tuple[int, float, int]] = []
+    changes: list[tuple[int, float, int, tuple[float, ...]]] = []
     settings: dict[str, list[float]] = {}
     without_flow = 0
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
             flow = relative_flow(bool(message.data))
-            changes.append((log_time_ns, flow, ONLY_BRUSH))
+            changes.append((log_time_ns, flow, ONLY_BRUSH, (0.0,) * 4))
             continue
         stamp = stamp_ns(message.header)
         if stamp == 0:
@@ -119,17 +121,19 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
         flow = relative_flow(message.spraying, message.flow)
         without_flow += bool(message.spraying) and flow == 0.0
         brush = int(getattr(message, 'brush', ONLY_BRUSH))
-        changes.append((stamp, flow, brush))
+        changes.append((stamp, flow, brush, set_points_of(message)))
         for name in SETTINGS:
             value = getattr(message, name, np.nan)
             if message.spraying and np.isfinite(value):
                 settings.setdefault(name, []).append(value)
     changes.sort(key=lambda change: change[0])
+    set_points = np.array([points for *_, points in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return Switching(
         np.array([stamp for stamp, *_ in changes], dtype=np.int64),
-        np.array([flow for _, flow, _ in changes], dtype=float),
-        numbered([brush for *_, brush in changes]),
+        np.array([flow for _, flow, *_ in changes], dtype=float),
+        numbered([brush for _, _, brush, _ in changes]),
+        set_points if set_points.any() else np.empty((0, 4)),
         {name: float(np.median(values)) for name, values in settings.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),

@@ -13,7 +13,7 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
@@ -278,7 +278,7 @@ class AtomizerInput:
             if stamp == 0:
                 raise RecordingError('atomizer state without a stamp: stamp each state')
             flow = relative_flow(message.spraying, message.flow)
-            self._on_state(TriggerChange(stamp, flow, message.brush))
+            self._on_state(TriggerChange(stamp, flow, message.brush, set_points_of(message)))
         except PaintError as error:
             if str(error) not in self.refusals_of_states:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')

@@ -237,11 +237,11 @@ def _events(
     stamps = motion.stamps_ns[rows]
     poses = PoseBatch(stamps, motion.positions_m[rows], motion.quaternions_xyzw[rows])
     start = 0
-    for stamp_ns, flow, brush in motion.triggers:
+    for number, (stamp_ns, flow, brush) in enumerate(motion.triggers):
         if stamp_ns not in without_ns:
             end = max(start, int(np.searchsorted(stamps, stamp_ns)))
             yield from _batches(poses, start, end)
-            yield TriggerChange(stamp_ns, flow, brush)
+            yield TriggerChange(stamp_ns, flow, brush, motion.set_points_of(number))
             start = end
     yield from _batches(poses, start, len(poses))
 
