@@ -17,7 +17,6 @@ from paint_deposition.cli.options import (
     MESH,
     MESH_SCALE,
     MODEL,
-    PARETO,
     PICTURES,
     direction_option,
     file_lines,
@@ -31,7 +30,7 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
-from paint_deposition.planning.requests import PAINT_WEIGHTS, ImproveRequest
+from paint_deposition.planning.requests import ImproveRequest
 
 if TYPE_CHECKING:
     import numpy as np
@@ -50,7 +49,6 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @output_option('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
 @options_of(ImproveRequest)
-@PARETO
 @seed_option('the models drawn from what the model file knows')
 @motion_options
 @MESH_SCALE
@@ -72,7 +70,6 @@ def improve_command(
     body: str | None,
     max_edge_length_m: float,
     down: np.ndarray | None,
-    pareto: bool,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -88,19 +85,12 @@ def improve_command(
         recorded = pd.read_recording(trajectory, **motion)
         show('refining the mesh')
         surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
-        rest: dict[str, Any] = {
-            'posterior': chosen.file.posterior if chosen.file else None,
-            'rivals': [pd.read_model(path) for path in rivals],
-            'seed': seed, 'progress': show, **dict(request),
-        }  # fmt: skip
-        result = pd.improve(surface, recorded, chosen.model, **rest)
-        rest |= {'target_region': result.target_region}
-        others = [
-            pd.improve(
-                result.surface, recorded, chosen.model, **rest | {'paint_weight': weight}
-            ).points[1]
-            for weight in (PAINT_WEIGHTS if pareto else ())
-        ]
+        result = pd.improve(
+            surface, recorded, chosen.model,
+            posterior=chosen.file.posterior if chosen.file else None,
+            rivals=[pd.read_model(path) for path in rivals],
+            seed=seed, progress=show, **dict(request),
+        )  # fmt: skip
         made_from = {
             'mesh_file': str(mesh),
             'trajectory': str(trajectory),
@@ -111,7 +101,7 @@ def improve_command(
         show('writing and drawing')
         files = write_results(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
-            pictures=pictures, trade_off=others,
+            pictures=pictures,
         )  # fmt: skip
     say_all('note', [*result.surface.notes, *recorded.notes])
     say_all('warning', [*recorded.warnings, *result.warnings])

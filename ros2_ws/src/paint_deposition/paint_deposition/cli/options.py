@@ -47,10 +47,6 @@ PICTURES = click.option(
     '--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png', show_default=True,
     help='Format of the pictures.',
 )  # fmt: skip
-PARETO = click.option(
-    '--pareto', is_flag=True,
-    help='Sweep the weight of the paint and plot the Pareto front of evenness over paint.',
-)  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +17,6 @@ from paint_deposition.cli.options import (
     MESH,
     MESH_SCALE,
     MODEL,
-    PARETO,
     PART_POSE,
     PICTURES,
     FiniteRange,
@@ -34,7 +32,6 @@ from paint_deposition.cli.options import (
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import (
-    PAINT_WEIGHTS,
     GunEnvelope,
     IndexRequest,
     PlanRequest,
@@ -91,7 +88,6 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @MODEL
 @BRUSH
 @options_of(PlanRequest)
-@PARETO
 @direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @MESH_SCALE
 @BODY
@@ -128,15 +124,12 @@ def plan_command(
     frame_id: str | None,
     faces: str,
     face_angle_deg: float,
-    pareto: bool,
     pictures: str,
     as_json: bool,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     from paint_deposition.planning.clearance import contacts
 
-    if pareto and not request.optimise:
-        raise click.UsageError('--pareto weighs paint in an optimised plan; add --optimise')
     chosen, wanted = chosen_model(model_file, brush=brush), dict(request)
     model = chosen.model
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
@@ -154,11 +147,6 @@ def plan_command(
                 progress=show, **wanted,
             )  # fmt: skip
             touched = result.contacts
-        weights = PAINT_WEIGHTS if pareto else ()
-        others = [
-            pd.plan(surface, model, progress=show, **wanted | {'paint_weight': weight}).point
-            for weight in weights
-        ]
         show('writing')
         made_from = {
             'mesh': str(mesh),
@@ -168,7 +156,7 @@ def plan_command(
         }
         files = write_results(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
-            pictures=pictures, trade_off=others,
+            pictures=pictures,
         )  # fmt: skip
     say_all('note', surface.notes)
     say_all('warning', map(str, touched))
@@ -192,12 +180,6 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
                 f'the {1e3 * gun.before_m:.0f} mm before it keep clear of the part'
             )
         return
-    styles = [planned.style for planned in result.passes]
-    if len({(style.standoff_m, style.lean_rad) for style in styles}) > 1:
-        yield 'standoff and lean, pass by pass: ' + ', '.join(
-            f'{style.standoff_m * 1e3:.0f} mm {math.degrees(style.lean_rad):+.0f} deg'
-            for style in styles
-        )
     if result.plain:
         plain, paint = result.plain, result.plain.statistics
         yield (

@@ -1,4 +1,4 @@
-"""Commands on recordings: `inspect`, `recover` and `runs`."""
+"""Commands on recordings: `inspect` and `recover`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
     BODY,
     FILE,
-    FOLDER,
     JSON,
     MAX_POSE_GAP,
     MESH_SCALE,
@@ -30,7 +29,6 @@ if TYPE_CHECKING:
     import numpy as np
 
     from paint_deposition.files.recordings.bag_summary import BagSummary
-    from paint_deposition.files.recordings.cell_runs import CellRun
 
 # A picture shows no finer mesh than this.
 MAX_EDGE_LENGTH_M = 0.02
@@ -247,49 +245,3 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     for topic, count in recovery.counts.items():
         click.echo(f'{count:10d}  {topic}')
     click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
-
-
-@click.command('runs')
-@click.argument('folder', type=FOLDER)
-@JSON
-def runs_command(folder: Path, as_json: bool) -> None:
-    """List the runs in FOLDER, the output_directory of the nodes: each coat on each part.
-
-    Shown are the part, when it came, its poses, its film and whether the recording is complete.
-    """
-    from paint_deposition.files.recordings.cell_runs import read_cell_runs
-
-    runs = read_cell_runs(folder)
-    if as_json:
-        figures = {'folder': str(folder), 'runs': [asdict(run) for run in runs]}
-        click.echo(json_text(figures | {'provenance': origin()}))
-        return
-    headings = (
-        'run', 'type', 'coat', 'since', 'poses', 'gaps', 'mean µm', 'std µm', 'min', 'max',
-        'coverage', 'in target', 'cm3', 'recording',
-    )  # fmt: skip
-    rows = [headings, *(_run_row(run) for run in runs)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        click.echo('  '.join(cells).rstrip())
-
-
-def _run_row(run: CellRun) -> tuple[str, ...]:
-    def cell(value: float | None, form: str) -> str:
-        return '-' if value is None else format(value, form)
-
-    film = run.film
-    return (
-        run.run,
-        run.type or '-',
-        str(run.coat),
-        run.since[:19].replace('T', ' ') or '-',
-        cell(run.poses, 'd'),
-        cell(run.gaps, 'd'),
-        *(cell(film.get(name), '.1f') for name in ('mean_um', 'std_dev_um', 'min_um', 'max_um')),
-        cell(film.get('coverage'), '.1%'),
-        cell(film.get('within_target'), '.1%'),
-        cell(film.get('painted_volume_cm3'), '.2f'),
-        run.recording,
-    )

@@ -79,13 +79,13 @@ def amplitudes() -> list[tuple[str, str]]:
 
 
 def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
-    """The measured parts of the line's mesh among the rows of all runs, oldest first."""
+    """The measured parts among the rows of all runs, oldest first."""
     if 'measured_um' not in columns:
         return []
     rows_of: dict[str, list[int]] = {}
-    cells = zip(columns['part'], columns['measured_um'], columns['pooled'], strict=True)
-    for row, (part, value, pooled) in enumerate(cells):
-        if value is not None and pooled:
+    cells = zip(columns['part'], columns['measured_um'], strict=True)
+    for row, (part, value) in enumerate(cells):
+        if value is not None:
             rows_of.setdefault(part, []).append(row)
 
     def taken(name: str, rows: list[int]) -> np.ndarray:

@@ -171,13 +171,6 @@ class AtomizerInput:
                 self._queue(message)
         self.flush()
 
-    def held_stamps(self) -> tuple[list[int], list[int]]:
-        """Stamps of the poses and of the states that are kept [ns]."""
-        held = list(self._held or [])
-        states = [stamp_ns(kept.header) for kept in held if isinstance(kept, AtomizerState)]
-        poses = [stamp_ns(kept.header) for kept in held if isinstance(kept, PoseStamped)]
-        return poses, states
-
     # --- taking and passing on
 
     def take_waiting(self) -> None:

@@ -6,16 +6,14 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
+from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
+from paint_deposition.report.pictures.chart import colours_of, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
@@ -93,8 +91,7 @@ def draw_film(
     scale = film_scale(film_um)
     low, high = part.window(spray)
     part.dress(axes, low, high)
-    seen_um = part.spread(film_um)
-    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > painted_above_um))
+    part.draw(axes, scale.rgba(film_um, film_um > painted_above_um))
     part.draw_contours(axes, film_um, scale.low, scale.high)
     draw_tool_path(axes, spray, part.view, low, high)
     return scale
@@ -160,11 +157,12 @@ def _draw_band(
 ) -> None:
     low, high = part.window(spray)
     part.dress(row.axes, low, high)
-    seen_um = part.spread(film_um)
-    band = np.digitize(seen_um, s.band_um, right=True)
-    band[seen_um <= s.painted_above_um] = 3
-    colours = 255.0 * np.array([to_rgb(colour) for colour in (BELOW, WITHIN, HIGH, BARE)])
-    part.draw_pixels(row.axes, np.rint(colours).astype(np.uint8)[band])
+    ends, colours = [s.painted_above_um], [BARE]
+    for end, colour in zip(s.band_um, (BELOW, WITHIN), strict=True):
+        if end > ends[-1]:
+            ends.append(end)
+            colours.append(colour)
+    part.draw_bands(row.axes, film_um, ends, [*colours, HIGH])
     draw_tool_path(row.axes, spray, part.view, low, high)
 
 
@@ -225,10 +223,7 @@ def _draw_legend(
     below = LINE_IN * len(lines) + 0.3 * bare + inset[1] + 0.75
     row.write(['film [µm]'], colour=MUTED)
     bar = row.figure.colorbar(
-        ScalarMappable(
-            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
-        ),
-        cax=row.axes_below(BAR_WIDTH_IN, row.top - row.bottom - below),
+        colours_of(scale), cax=row.axes_below(BAR_WIDTH_IN, row.top - row.bottom - below)
     )
     bar.ax.tick_params(colors=MUTED, labelsize=9)
     bar.ax.spines['outline'].set_visible(False)

@@ -21,10 +21,9 @@ from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
-from paint_deposition.report.pictures.inference import (
-    write_calibration_pictures,
-    write_comparison_picture,
-)
+from paint_deposition.report.pictures.chart import save_picture
+from paint_deposition.report.pictures.comparison import comparison_figure
+from paint_deposition.report.pictures.inference import write_calibration_pictures
 from paint_deposition.report.writers.fitted_model import write_fitted
 from paint_deposition.report.writers.write import written
 
@@ -58,7 +57,7 @@ def _write_side_by_side(result: SideBySide, folder: Path, pictures: str = 'png')
     models = {name: comparison.model for name, comparison in result.by_name.items()}
     figures = folder / 'comparison.json'
     write_json(figures, result.to_dict() | _provenance(data.study, models))
-    files = [figures, write_comparison_picture(folder / f'comparison.{pictures}', data)]
+    files = [figures, save_picture(comparison_figure(data), folder / f'comparison.{pictures}')]
     for name, comparison in result.by_name.items():
         files.append(folder / f'residuals_{file_name(name)}.csv')
         write_table(files[-1], _residual_rows(comparison))
@@ -98,7 +97,7 @@ def _write_results(
     write_table(files[1], _residual_rows(last))
     return [
         *files,
-        write_comparison_picture(folder / f'comparison.{pictures}', data),
+        save_picture(comparison_figure(data), folder / f'comparison.{pictures}'),
         write_report(folder / 'report.html', data),
         *write_residual_meshes(folder, last),
     ]

@@ -13,21 +13,17 @@ from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan, TradeOffPoint
+from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import write_film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import (
     write_improvement_picture,
-    write_trade_off,
     write_uniformity,
 )
 from paint_deposition.report.writers.measuring import write_chosen_readings
-from paint_deposition.report.writers.passes import (
-    write_plan,
-    write_trade_off_table,
-)
+from paint_deposition.report.writers.passes import write_plan
 from paint_deposition.report.writers.write import input_files, with_provenance, written
 
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
@@ -59,7 +55,6 @@ def _plan(
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
-    trade_off: Sequence[TradeOffPoint] = (),
 ) -> list[Path]:
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
@@ -79,10 +74,7 @@ def _plan(
             files[-1], result.surface, result.path, geometry, 'Planned passes over the faces'
         )
         return [*files, film]
-    plain, weighed = result.plain or result, []
-    if trade_off:
-        weighed = _write_trade_off(Path(folder), plain.point, trade_off, pictures)
-    return [*files, film, *weighed]
+    return [*files, film]
 
 
 @written.register
@@ -93,29 +85,13 @@ def _improvement(
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
-    trade_off: Sequence[TradeOffPoint] = (),
 ) -> list[Path]:
     notes = {'notes': (*result.surface.notes, *result.given.notes)}
     about = with_provenance(notes | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_plan(folder, result, about, part)
     picture = Path(folder) / f'improvement.{pictures}'
-    files.append(write_improvement_picture(picture, result))
-    if trade_off:
-        files += _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
-    return files
-
-
-def _write_trade_off(
-    folder: Path,
-    given: TradeOffPoint,
-    points: Sequence[TradeOffPoint],
-    pictures: str,
-) -> list[Path]:
-    """Table and picture of other weights of the paint."""
-    picture = folder / f'pareto.{pictures}'
-    table = write_trade_off_table(folder / 'pareto.csv', points)
-    return [table, write_trade_off(picture, given, points)]
+    return [*files, write_improvement_picture(picture, result)]
 
 
 @written.register

@@ -40,8 +40,6 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         part_pose, frame_id: of a plan or an improvement, where the part stands in the robot's
             frame, [x y z qx qy qz qw], and the name of that frame; its files have their poses in
             that frame then. The first of them also of chosen points.
-        trade_off: of plan or improvement, ``Point``s of other weights of the paint, for a table
-            and a picture.
 
     Returns:
         The paths written.

@@ -1,6 +1,6 @@
 'use strict';
-// What the page shows: charts in groups, the part in panes, tables that sort, tables to download.
-const page = (() => {
+// What the page shows: charts in groups, tables that sort, tables to download.
+(async () => {
   const root = document.documentElement;
   const errors = [];
   const failed = (what, error) => {
@@ -13,7 +13,7 @@ const page = (() => {
   const content = JSON.parse(document.getElementById('content').textContent);
   const options = {
     displaylogo: false, responsive: true,
-    modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d', 'tableRotation'],
+    modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'],
     toImageButtonOptions: {format: 'png', scale: 2},
   };
   // A finger has no place to rest on: the tools would hide the chart.
@@ -101,5 +101,6 @@ const page = (() => {
     button.addEventListener('click', () => download(button.dataset.name, source.textContent));
   }
 
-  return {root, content, options, flat, make, rest, draw, drawGroup, download, failed};
+  for (const figure of content) await drawGroup(figure);
+  root.dataset.ready = '';
 })();
