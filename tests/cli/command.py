@@ -38,7 +38,6 @@ def kind_of(words: list[str]) -> str:
     if words[0] == 'inspect':
         for kind, marks in {
             'gun_on_part': ('--mesh',),
-            'driven_speed': ('--programmed',),
             'program': ('.mod', '.prg'),
             'pose_table': ('.csv', '.txt', '.tsv'),
         }.items():

@@ -85,11 +85,6 @@ output(
     geometry=figures(passes=int, sentence=str, warnings=Words), picture=str | None,
 )  # fmt: skip
 
-Driven = figures(
-    'way_m programmed_m_per_s driven_m_per_s slowest_m_per_s slower slower_at_ends film'
-)
-output('driven_speed', 'on_programme', Driven, picture=str | None,
-       passes=list[figures('', Driven, number=int)])  # fmt: skip
 output(
     'recording', path=str, triggers=Words,
     topics=list[figures(name=str, type=str, message_count=int)],
@@ -182,7 +177,7 @@ output(
 output(
     'plan_of_faces', 'margin_m sigma_n_unblended', Planned, speeds_m_per_s=list[float],
     faces=list[figures('area_m2', outward=Direction)],
-    one_raster=figures('sigma_n coverage'), gun=figures('radius_m length_m before_m'),
+    gun=figures('radius_m length_m before_m'),
     contacts=list[figures('begin_s end_s depth_m', place_m=Direction, by_gun=bool)],
 )  # fmt: skip
 output(
@@ -192,7 +187,6 @@ output(
         BeforeAfter,
         'mean_um sigma_n min_um max_um within paint_cm3 on_part_cm3 spraying_s cycle_s',
     ),
-    sigma_n_interval=figures(before=Pair, after=Pair) | None,
     binding_limits=list[figures('sigma_n', name=str)],
     passes=list[
         figures('opens_earlier_m closes_later_m opens_earlier_s closes_later_s', number=int,

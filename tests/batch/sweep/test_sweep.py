@@ -12,7 +12,7 @@ import yaml
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, installed_paint, paint
-from paint_deposition.batch.cases import FOLDER, ResultCache
+from paint_deposition.batch.cases import ResultCache
 from paint_deposition.batch.cluster import run, workers
 from paint_deposition.batch.sweep.case import computed, varied_motion
 from paint_deposition.batch.sweep.job import Job
@@ -51,7 +51,7 @@ def film_by_itself(k1: float, speed: float) -> pd.Film:
 @pytest.mark.slow
 def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
     job = Job.of(SweepFile.model_validate(TOLD), DOOR)
-    finished = ResultCache(tmp_path / FOLDER)
+    finished = ResultCache(tmp_path / 'finished')
     killed = []
 
     def kill_one(what: str, share: float) -> None:
@@ -79,7 +79,7 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
-    kept = sorted((output / FOLDER).iterdir())
+    kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
     again = json.loads(paint('sweep', sweep_file, '-o', output, '--workers', 1, '--json').stdout)
     assert again['computed'] == 1
@@ -186,7 +186,7 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
     motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
     alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
     file.unlink()
-    finished = ResultCache(tmp_path / FOLDER)
+    finished = ResultCache(tmp_path / 'finished')
     with workers(count=1) as client:
         run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()

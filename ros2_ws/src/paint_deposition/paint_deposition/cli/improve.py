@@ -118,12 +118,6 @@ def _lines(result: pd.Improvement) -> Iterator[str]:
         f'film {before.min_um:.1f} to {before.max_um:.1f} µm before, {after.min_um:.1f} to '
         f'{after.max_um:.1f} µm after; mean {before.mean_um:.1f} and {after.mean_um:.1f} µm'
     )
-    if result.sigma_n_interval:
-        (low, high), (new_low, new_high) = result.sigma_n_interval
-        yield (
-            f'with what is not known of the model: sigma_n {100 * low:.1f} to {100 * high:.1f} % '
-            f'before, {100 * new_low:.1f} to {100 * new_high:.1f} % after'
-        )
     for change in result.changes:
         yield change.sentence
     yield from result.limit_sentences

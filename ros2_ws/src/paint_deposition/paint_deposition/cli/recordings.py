@@ -40,12 +40,7 @@ MAX_EDGE_LENGTH_M = 0.02
 @click.option('--trajectory', type=FILE, help='The motion to set beside the part; or RECORDING.')
 @click.option(
     '--out', '--output', '-o', 'output', type=FILE,
-    help='Picture to draw, PNG: part, passes and tool axes from three sides; or the speeds.',
-)  # fmt: skip
-@click.option(
-    '--programmed', type=FILE,
-    help='The programme that the robot ran, a RAPID module or a table of passes: the speed '
-    'driven against the programmed one.',
+    help='Picture to draw, PNG: part, passes and tool axes from three sides.',
 )  # fmt: skip
 @model_option('Model that says where the spray goes; default: a 50 mm bell.')
 @motion_options
@@ -58,7 +53,6 @@ def inspect_command(
     recording: Path | None,
     mesh: Path | None,
     trajectory: Path | None,
-    programmed: Path | None,
     max_pose_gap_s: float,
     motion: dict[str, Any],
     as_json: bool,
@@ -72,29 +66,16 @@ def inspect_command(
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
-
-    With --programmed: the speed of the TCP along the way sprayed, pass by pass, against the
-    programmed one.
     """
     path = trajectory or recording
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
-    if programmed is not None:
-        if mesh is not None or options['model_file']:
-            raise click.UsageError(
-                '--programmed cannot be combined with --mesh or --model; run inspect twice'
-            )
-        from paint_deposition.cli.speeds import show_speeds
-
-        show_speeds(path, programmed, motion, max_pose_gap_s, options['output'], as_json)
-    elif mesh is not None:
+    if mesh is not None:
         _show_gun_on_part(mesh, path, motion, max_pose_gap_s, as_json, **options)
     else:
         gun_signal = motion.pop('gun_signal')
         if any(options[name] for name in ('output', 'model_file')) or any(motion.values()):
-            raise click.UsageError(
-                '--out, --model and how the motion is read need --mesh or --programmed'
-            )
+            raise click.UsageError('--out, --model and how the motion is read need --mesh')
         _show_contents(path, gun_signal, max_pose_gap_s, as_json)
 
 

@@ -31,7 +31,6 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.files.parquet import require_libraries
 
 if TYPE_CHECKING:
     import numpy as np
@@ -75,10 +74,6 @@ if TYPE_CHECKING:
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
-@click.option(
-    '--parquet', is_flag=True,
-    help='Also write film.parquet: the table of film.csv to the last bit, with normals and areas.',
-)  # fmt: skip
 @PICTURES
 @JSON
 def simulate_command(
@@ -94,7 +89,6 @@ def simulate_command(
     body: str | None,
     max_edge_length_m: float,
     down: np.ndarray | None,
-    parquet: bool,
     pictures: str,
     as_json: bool,
     **wanted: float,
@@ -105,8 +99,6 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
-    if parquet:
-        require_libraries('--parquet')
     with Progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions
@@ -132,9 +124,7 @@ def simulate_command(
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
-        files = write_results(
-            film, output, made_from=made_from, pictures=pictures, parquet=parquet
-        )
+        files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
     say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])

@@ -14,15 +14,13 @@ from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
 from paint_deposition.planning.passes import plan_passes, trajectory_of
 from paint_deposition.planning.placing import Placing, best_placing
-from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.plan import INDEX_SHARES, Plan
 
 # A pass more must save this share of the cost: neither the last digits of a processor nor a gain
 # that nobody would measure choose the number of passes.
 WORTH_A_PASS = 0.05
 # So many passes fewer, and more, than those of the even plan are tried.
 FEWER, MORE = 2, 1
-# Indices about an even share of the part's height.
-INDEX_SHARES = (0.7, 1.3)
 # The gun gets room to be this much faster at the ends of a pass than its mean.
 FASTER_ENDS = 1.3
 
@@ -66,8 +64,8 @@ def optimised(
 def _placed(plain: Plan, passes: int) -> Placing | None:
     """So many passes where their film at one speed is most even; None where there is no room."""
     low, high = plain.line_films.surface_map.extent_m[1].tolist()
-    index_range = tuple(share * (high - low) / passes for share in INDEX_SHARES)
-    return best_placing(plain.line_films, (low, high), index_range, passes)
+    least, most = (share * plain.plane.index_m for share in INDEX_SHARES)
+    return best_placing(plain.line_films, (low, high), (least, most), passes)
 
 
 def _along(

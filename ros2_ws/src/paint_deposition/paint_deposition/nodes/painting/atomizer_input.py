@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
-from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
@@ -23,11 +22,6 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, QosWatch, endpoint_name, of_gun
 
-RELIABILITIES = {
-    'as_offered': None,
-    'best_effort': ReliabilityPolicy.BEST_EFFORT,
-    'reliable': ReliabilityPolicy.RELIABLE,
-}
 FOLLOW_PERIOD_S = 0.1
 # Messages are taken together: to wake for each pose would cost more than to paint it.
 TAKE_PERIOD_S = 0.02
@@ -106,7 +100,6 @@ class AtomizerInput:
                 topic,
                 take,
                 depth=node.values['pose_queue_depth'],
-                reliability=RELIABILITIES[node.values['pose_reliability']],
                 # The last state holds until the next one, whenever it was published.
                 latched=message is AtomizerState,
             )

@@ -40,7 +40,6 @@ class AtomizerTopic:
         watch: makes the subscription.
         take: gets each message, in `take_waiting`.
         depth: messages that may wait.
-        reliability: to ask for whatever is offered; None: as offered.
     """
 
     def __init__(
@@ -51,19 +50,15 @@ class AtomizerTopic:
         take: Callable[[Any], None],
         *,
         depth: int,
-        reliability: ReliabilityPolicy | None = None,
         latched: bool = False,
     ) -> None:
         self._watch = watch
         self._message = message
         self._topic = topic
         self._take = take
-        self._reliability = reliability
         self._latched = latched
         self._group = Polled()
-        self._first = QoSProfile(
-            depth=depth, reliability=reliability or ReliabilityPolicy.RELIABLE
-        )
+        self._first = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
         self._subscription: Subscription | None = None
         self._subscribe(self._first)
@@ -88,7 +83,7 @@ class AtomizerTopic:
             return self._first
         profile = accepting(offered, self._first.depth)
         # More reliable in mid-stream would lose what is sent until both ends have met again.
-        if self._reliability is not None or self._profile.reliability > profile.reliability:
+        if self._profile.reliability > profile.reliability:
             profile.reliability = self._profile.reliability
         if not self._latched:
             profile.durability = DurabilityPolicy.VOLATILE

@@ -147,8 +147,6 @@ class Improvement:
         before, after: films of both motions.
         program_difference: largest difference between the films of the robot program and of the
             bag, both read back, as a share of the greatest film.
-        sigma_n_interval: 5 and 95 % quantiles of sigma_n before and after over models that the
-            search did not see; None without an uncertain model.
         odd: what is odd in how the gun runs over the part, with its likely cause.
     """
 
@@ -163,7 +161,6 @@ class Improvement:
     before: LaidFilm
     after: LaidFilm
     program_difference: float
-    sigma_n_interval: tuple[tuple[float, float], tuple[float, float]] | None = None
     odd: tuple[str, ...] = ()
 
     @property
@@ -267,7 +264,6 @@ class Improvement:
             name: {'before': value, 'after': self.after.figures()[name]}
             for name, value in self.before.figures().items()
         }
-        interval = self.sigma_n_interval
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
             **both,
@@ -275,7 +271,6 @@ class Improvement:
             'tolerance': self.tolerance,
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
-            'sigma_n_interval': interval and {'before': interval[0], 'after': interval[1]},
             'sigma_n_of_path': self.sigma_n_of_path,
             'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
             'program_difference': self.program_difference,
