@@ -219,7 +219,7 @@ output(
     pooled=figures(
         'level_sd_percent noise_factor misfit_share',
         causes=list[
-            figures('value sd probability one_part all_parts', effect=str, parameter=str,
+            figures('value sd probability all_parts', effect=str, parameter=str,
                     unit=str, members=Words)
         ],
     ) | None,

@@ -31,7 +31,7 @@ def test_files_and_figures(improved):
     assert figures['mean_um']['after'] == pytest.approx(figures['mean_um']['before'], rel=0.01)
     assert figures['program_difference'] < 2e-3
     assert [one['number'] for one in figures['passes']] == [1, 2, 3]
-    assert 'm/s between x = ' in figures['passes'][0]['sentence']
+    assert 'm/s on average' in figures['passes'][0]['sentence']
     assert {'mesh', 'trajectory'} <= {file['what'] for file in figures['provenance']['files']}
     for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
         assert (folder / name).exists()

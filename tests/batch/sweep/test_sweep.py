@@ -106,11 +106,6 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
             {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
             ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
         ),
-        ({'campaign': str(DOOR / 'campaign.yaml')}, ['speed_factor varies', 'campaign']),
-        (
-            {'campaign': str(DOOR / 'campaign.yaml'), 'grid': {'planar.K2': [0.1]}},
-            ['campaign.yaml names no model', 'give model'],
-        ),
     ],
 )
 def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path, changed, words):
@@ -137,18 +132,6 @@ def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
     done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
     done.stderr = done.stderr.splitlines()[-1]  # after the notes
     assert_refused(done, 'none of 2 cases has a result; case 1: ')
-
-
-def test_a_campaigns_own_model_is_varied(tmp_path):
-    door = yaml.safe_load((DOOR / 'campaign.yaml').read_text())['experiments'][:1]
-    door[0] |= {key: str(DOOR / door[0][key]) for key in ('mesh', 'trajectory', 'measurements')}
-    (tmp_path / 'model.yaml').write_text('planar: {K2: 0.4, r_m: 0.3}')
-    campaign = {'experiments': door, 'model': 'model.yaml'}
-    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(campaign))
-    told = {'campaign': 'campaign.yaml', 'grid': {'planar.K2': [0.1]}}
-    (case,) = Job.of(SweepFile.model_validate(told), tmp_path).cases
-    planar = case.given['model'].planar
-    assert (planar.K2, planar.r_m) == (0.1, 0.3)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):

@@ -58,7 +58,7 @@ def with_workers(command: Callable) -> Callable:
 def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, **where: Any) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
-    Each case is what `simulate` computes, or `compare` for a campaign. Finished cases are kept in
+    Each case is what `simulate` computes. Finished cases are kept in
     the folder `finished` of the output: a run that was cut off computes the rest only, and so does
     a sweep with more cases.
     """

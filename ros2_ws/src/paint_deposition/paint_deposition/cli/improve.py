@@ -4,25 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
-    BODY,
     FILE,
     JSON,
-    MESH,
-    MESH_SCALE,
     MODEL,
     PICTURES,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     motion_options,
     output_option,
+    part_options,
     say_all,
     say_results,
     seed_option,
@@ -32,12 +28,9 @@ from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import ImproveRequest
 
-if TYPE_CHECKING:
-    import numpy as np
-
 
 @click.command('improve')
-@MESH
+@part_options(0.02)
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',
@@ -51,25 +44,17 @@ if TYPE_CHECKING:
 @options_of(ImproveRequest)
 @seed_option('the models drawn from what the model file knows')
 @motion_options
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.02)
-@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @PICTURES
 @JSON
 def improve_command(
     request: ImproveRequest,
-    mesh: Path,
+    part: dict[str, Any],
     trajectory: Path,
     model_file: Path | None,
     rivals: tuple[Path, ...],
     output: Path,
     seed: int,
     motion: dict[str, Any],
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
-    down: np.ndarray | None,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -84,7 +69,7 @@ def improve_command(
         chosen = model_for(model_file, trajectory)
         recorded = pd.read_recording(trajectory, **motion)
         show('refining the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
+        surface = pd.read_mesh(**part)
         result = pd.improve(
             surface, recorded, chosen.model,
             posterior=chosen.file.posterior if chosen.file else None,
@@ -92,7 +77,7 @@ def improve_command(
             seed=seed, progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
-            'mesh_file': str(mesh),
+            'mesh_file': str(part['path']),
             'trajectory': str(trajectory),
             'model_file': str(chosen.path or ''),
             'rivals': [str(path) for path in rivals],

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import chosen_model
 from paint_deposition.cli.options import (
-    BODY,
     BRUSH,
     JSON,
-    MESH,
-    MESH_SCALE,
     MODEL,
     PART_POSE,
     PICTURES,
     FiniteRange,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     output_option,
     paint_lines,
+    part_options,
     say_all,
     say_results,
     write_results,
@@ -36,9 +32,6 @@ from paint_deposition.planning.requests import (
     IndexRequest,
     PlanRequest,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
 
 
 @click.command('recommend')
@@ -84,14 +77,10 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@MESH
+@part_options(0.02)
 @MODEL
 @BRUSH
 @options_of(PlanRequest)
-@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.02)
 @PART_POSE
 @click.option(
     '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
@@ -112,14 +101,10 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
-    mesh: Path,
+    part: dict[str, Any],
     model_file: Path | None,
     brush: int,
     output: Path,
-    down: np.ndarray | None,
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
     part_pose: list[float] | None,
     frame_id: str | None,
     faces: str,
@@ -135,7 +120,7 @@ def plan_command(
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as show:
         show('reading the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
+        surface = pd.read_mesh(**part)
         frame = frame_id if part_pose is None else 'part'
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
@@ -149,7 +134,7 @@ def plan_command(
             touched = result.contacts
         show('writing')
         made_from = {
-            'mesh': str(mesh),
+            'mesh': str(part['path']),
             'model': str(model_file or 'default'),
             'frame_id': frame_id,
             'part_pose': part_pose,

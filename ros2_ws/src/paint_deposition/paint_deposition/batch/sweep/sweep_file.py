@@ -103,7 +103,6 @@ class SweepFile(MotionSource, extra='forbid'):
 
     mesh: Text | None = Field(None, description='the name of a mesh file')
     trajectory: Text | None = Field(None, description='the name of a recording, module or table')
-    campaign: Text | None = Field(None, description='the name of a campaign file')
     model: Text | None = Field(None, description='the name of a model file')
     readings: Text | None = Field(
         None, description='the name of a file of points at which the gauge is predicted'

@@ -20,7 +20,12 @@ from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, QosWatch, endpoint_name, of_gun
+from paint_deposition.nodes.runtime.topics import (
+    PROGRESS_TOPIC,
+    endpoint_name,
+    of_gun,
+    publishers_of,
+)
 
 FOLLOW_PERIOD_S = 0.1
 # Messages are taken together: to wake for each pose would cost more than to paint it.
@@ -46,7 +51,7 @@ class AtomizerInput:
     States are passed on as they come, poses in batches of fifty or every twentieth of a second.
 
     Args:
-        node: makes publishers and timers; `watch` makes the subscriptions.
+        node: makes publishers, timers and subscriptions.
         name: of the gun, '' for the only one of a cell.
         frame: of the part, into which the poses are brought.
         on_poses, on_state: get the poses, and the states; a PaintError refuses a state.
@@ -69,13 +74,12 @@ class AtomizerInput:
     def __init__(
         self,
         node: PaintNode,
-        watch: QosWatch,
         name: str,
         frame: PartFrame,
         on_poses: Callable[[PoseBatch], None],
         on_state: Callable[[TriggerChange], None],
     ) -> None:
-        self._node, self._watch, self._frame = node, watch, frame
+        self._node, self._frame = node, frame
         self._on_poses, self._on_state = on_poses, on_state
         self.name = name
         self._pose_topic = of_gun(name, 'atomizer/pose')
@@ -95,7 +99,7 @@ class AtomizerInput:
         self.reset()
         self._topics = [
             AtomizerTopic(
-                watch,
+                node,
                 message,
                 topic,
                 take,
@@ -119,6 +123,11 @@ class AtomizerInput:
     def poses_refused(self) -> int:
         """Poses refused for their frame since the last reset."""
         return sum(self.refused_frames.values())
+
+    @property
+    def messages_lost(self) -> int:
+        """Messages that the middleware says it lost."""
+        return sum(topic.lost for topic in self._topics)
 
     def reset(self) -> None:
         """Count from zero; poses that were not passed on yet are dropped."""
@@ -203,7 +212,9 @@ class AtomizerInput:
     def _follow_publishers(self) -> None:
         for topic in self._topics:
             topic.follow_publishers()
-        publishers = sorted(map(endpoint_name, self._watch.publishers_of(self._pose_topic)))
+        publishers = sorted(
+            map(endpoint_name, publishers_of(self._node, PoseStamped, self._pose_topic))
+        )
         if len(publishers) > max(1, len(self.pose_publishers)):
             self._node.get_logger().warning(f'{self._pose_topic}: {several_guns(publishers)}')
         self.pose_publishers = publishers

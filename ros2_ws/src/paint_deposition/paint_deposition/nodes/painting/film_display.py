@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.duration import Duration
+from rclpy.event_handler import PublisherEventCallbacks
+from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -20,7 +22,7 @@ from paint_deposition.nodes.painting.film_messages import ShownFilm, stats_messa
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import QosWatch, of_gun
+from paint_deposition.nodes.runtime.topics import of_gun
 from paint_deposition.part.surface import Surface
 
 # Of one core that making and sending such a message may take.
@@ -38,9 +40,12 @@ class LargeTopic:
     ``SHARE`` of a core.
     """
 
-    def __init__(self, watch: QosWatch, message: type, topic: str, profile: QoSProfile) -> None:
-        self._watch, self._topic = watch, topic
-        self._publisher = watch.publisher(message, topic, profile)
+    def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
+        self._listeners = self._newcomers = 0
+        self._publisher = node.create_publisher(
+            message, topic, profile,
+            event_callbacks=PublisherEventCallbacks(matched=self._count_listeners),
+        )  # fmt: skip
         self._edition: int | None = None
         self._greeted = 0
         self._sent_s = self._rested_s = 0.0
@@ -48,15 +53,19 @@ class LargeTopic:
     def offer(self, edition: int, make: Callable[[], Any]) -> None:
         """Publish an edition, if it is wanted and the link is free; otherwise offer it again."""
         # Not the publisher's own count: it grows before the newcomer is counted.
-        newcomers = self._watch.newcomers[self._topic]
+        newcomers = self._newcomers
         known = edition == self._edition and newcomers == self._greeted
-        if not self._watch.listeners[self._topic] or known or not self._is_free():
+        if not self._listeners or known or not self._is_free():
             return
         began_s = time.monotonic()
         self._publisher.publish(make())
         self._sent_s = time.monotonic()
         self._rested_s = began_s + (self._sent_s - began_s) / SHARE
         self._edition, self._greeted = edition, newcomers
+
+    def _count_listeners(self, event: Any) -> None:
+        self._listeners = event.current_count
+        self._newcomers += event.total_count_change
 
     def _is_free(self) -> bool:
         now_s = time.monotonic()
@@ -76,10 +85,10 @@ class FilmDisplay:
         # Of several guns the film of each, too.
         names = node.gun_names if len(node.gun_names) > 1 else []
         self._share_topics = [of_gun(name, 'thickness/field') for name in names]
-        self._legend = node.watch.publisher(MarkerArray, 'thickness/legend', topics.LATCHED)
-        self._figures = node.watch.publisher(ThicknessStats, 'thickness/stats', topics.LATCHED)
+        self._legend = node.create_publisher(MarkerArray, 'thickness/legend', topics.LATCHED)
+        self._figures = node.create_publisher(ThicknessStats, 'thickness/stats', topics.LATCHED)
         self._large = {
-            topic: LargeTopic(node.watch, message, topic, profile)
+            topic: LargeTopic(node, message, topic, profile)
             for topic, message, profile in (
                 ('thickness/mesh', Marker, topics.LATCHED),
                 ('thickness/cloud', PointCloud2, topics.RESULTS),

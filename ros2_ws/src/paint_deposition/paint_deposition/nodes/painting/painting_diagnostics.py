@@ -55,7 +55,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses not painted while inactive': source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
-        'messages lost by the middleware': node.watch.lost_messages,
+        'messages lost by the middleware': source.messages_lost,
         'gun': _gun_in_words(film),
     }
     if not node.active:
@@ -89,15 +89,6 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if silent_s > SILENT_S:
         return Status(OK, 'waiting for poses', values)
     return Status(OK, 'painting', values)
-
-
-def topics_status(node: PaintingNode) -> Status:
-    """Publishers and subscribers that are there now and do not fit this node."""
-    found = node.watch.misfits()
-    if found:
-        listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
-        return Status(ERROR, f'not heard: {listed}', found)
-    return Status(OK, 'every type and quality of service fits')
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
@@ -153,6 +144,5 @@ def painting_tasks(
     }
     return {
         **poses,
-        'topics': lambda: topics_status(node),
         'film': lambda: film_status(node, film_values()),
     }

@@ -27,7 +27,6 @@ from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
-from paint_deposition.nodes.runtime.topics import QosWatch
 from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -52,7 +51,6 @@ class PaintingNode(ManagedNode, ABC):
         models: of the guns, as the parameters choose them.
         film: what is painted so far, by one gun or several.
         inputs: what comes from the cell, one for each gun.
-        watch: publishers and subscribers whose quality of service does not fit.
         repainting: the changed models that are being prepared, if any are.
         model_problem: why the last models that were set are not used, '' if they are.
     """
@@ -60,11 +58,9 @@ class PaintingNode(ManagedNode, ABC):
     repainting: Repainting | None = None
 
     def _configure(self) -> None:
-        self.watch = QosWatch(self)
         self.inputs = [
             AtomizerInput(
                 self,
-                self.watch,
                 name,
                 self.frame,
                 partial(self._add_poses, number),

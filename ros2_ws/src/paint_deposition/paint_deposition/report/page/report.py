@@ -22,7 +22,7 @@ from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import charts, tables
 from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.learned import footprint_figure, learned_figure, map_figure
-from paint_deposition.report.page.tables import film_rows, point_rows, points_csv, shares_in_words
+from paint_deposition.report.page.tables import film_rows, point_rows, shares_in_words
 from paint_deposition.report.pictures.chart import DOTS_PER_INCH
 from paint_deposition.report.pictures.comparison import comparison_figure, part_figure
 
@@ -70,7 +70,6 @@ def report_html(data: ReportData) -> str:
         footprint_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
-    points = point_rows(data)
     places, sprays = data.proposals
     return environment.get_template('report.html.j2').render(
         data=data,
@@ -79,8 +78,7 @@ def report_html(data: ReportData) -> str:
         head=list(data.study.campaign.head.items()),
         film=film_rows(data),
         cpk=CPK_MEANS,
-        points=points,
-        points_csv=points_csv(points).replace('<', ' '),
+        points=point_rows(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),

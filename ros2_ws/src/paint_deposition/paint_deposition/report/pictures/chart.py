@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -18,14 +18,9 @@ DOTS_PER_INCH = 150
 MM = 1e3
 
 
-def new_figure(
-    width_in: float, height_in: float, layout: Literal['constrained'] | None = 'constrained'
-) -> Figure:
-    """An empty figure that draws into memory, without pyplot's global state.
-
-    Finding the constrained layout takes as long as drawing: many axes are better placed by hand.
-    """
-    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout)
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that draws into memory, without pyplot's global state."""
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout='constrained')
     FigureCanvasAgg(figure)
     return figure
 

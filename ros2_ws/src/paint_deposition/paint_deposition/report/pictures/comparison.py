@@ -84,7 +84,8 @@ def comparison_figure(data: ReportData) -> Figure:
     rows = -(-len(profiles) // columns)
     width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
     height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
-    figure = new_figure(width_in, height_in, layout=None)
+    figure = new_figure(width_in, height_in)
+    figure.set_layout_engine('none')  # with so many axes it would take as long as to draw them
     cells = figure.add_gridspec(
         rows, columns, left=LEFT_IN / width_in, right=1.0 - RIGHT_IN / width_in,
         bottom=BOTTOM_IN / height_in, top=1.0 - TOP_IN / height_in,

@@ -21,9 +21,6 @@ from paint_deposition.report.style import INK, MUTED
 MARGIN_IN_PARTS = 1.0
 # Whether a triangle is hidden is seen from a place so far above it [m].
 LIFT_M = 1e-3
-# Light from above left; how much a lean of the surface brightens or darkens it.
-LIGHT, CONTRAST = (-0.45, 0.75), 0.9
-GREY, DARKEST, BRIGHTEST = 0.78, 0.25, 1.0
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
 WAY_OFF = '#3a4048'
@@ -39,7 +36,6 @@ class PartPicture:
         flat_m: (V, 2) places of the vertices in the picture [m].
         faces: (F, 3) triangles that look at the viewer, the farthest first.
         seen: (F,) bool, those of them with nothing before their middle.
-        normals: (V, 3) of the surface.
         edges_m: (E, 2, 2) visible creases and free edges in the picture [m].
     """
 
@@ -47,7 +43,6 @@ class PartPicture:
     flat_m: np.ndarray
     faces: np.ndarray
     seen: np.ndarray
-    normals: np.ndarray
     edges_m: np.ndarray
 
     @staticmethod
@@ -61,7 +56,7 @@ class PartPicture:
         above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
         seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
         edges = flat[_borders(faces[seen])]
-        return PartPicture(view, flat, faces, seen, surface.normals, edges)
+        return PartPicture(view, flat, faces, seen, edges)
 
     @property
     def low_m(self) -> np.ndarray:
@@ -98,12 +93,6 @@ class PartPicture:
         levels = [least - 1.0, *ends_um, most + 1.0]
         axes.tricontourf(triangles, film_um, levels, colors=colours)
         self._draw_edges(axes)
-
-    def draw_relief(self, axes: Axes) -> None:
-        """The bare part in grey, lit from above left."""
-        lean = self.normals @ (LIGHT[0] * self.view.right + LIGHT[1] * self.view.up)
-        grey = 255.0 * np.clip(GREY * (1.0 + CONTRAST * lean), DARKEST, BRIGHTEST)
-        self.draw(axes, np.column_stack([grey, grey, grey, np.full(len(grey), 255.0)]))
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""

@@ -5,17 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.files.provenance import origin
-from paint_deposition.film.colour_scales import residual_scale
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.comparison.residual_field import spread_over_surface
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.study import Study
@@ -90,7 +85,7 @@ def _provenance(
 def _write_results(
     folder: Path, name: str, figures: dict[str, Any], data: ReportData, pictures: str
 ) -> list[Path]:
-    """Figures, the last model's residuals as a table and as meshes, picture and report."""
+    """Figures, the last model's residuals as a table, picture and report."""
     last = data.comparisons[-1]
     files = [folder / name, folder / 'residuals.csv']
     write_json(files[0], figures | _provenance(last.study, last.model))
@@ -99,7 +94,6 @@ def _write_results(
         *files,
         save_picture(comparison_figure(data), folder / f'comparison.{pictures}'),
         write_report(folder / 'report.html', data),
-        *write_residual_meshes(folder, last),
     ]
 
 
@@ -123,32 +117,6 @@ def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
                 *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
                 str(int(used)),
             ]
-
-
-def write_residual_meshes(folder: Path, comparison: Comparison) -> list[Path]:
-    """Write ``residual_<experiment>.ply``: vertex colours and property ``residual_um``.
-
-    Residual = measured minus predicted, interpolated between readings; grey and NaN where no
-    reading is near. All experiments share one scale of colours.
-    """
-    campaign = comparison.study.campaign
-    fields = []
-    for number, experiment in enumerate(campaign.experiments):
-        at = experiment.measured_points
-        residual_um = comparison.points.residual_um[campaign.experiment_of == number]
-        surface = experiment.surface
-        fields.append(spread_over_surface(surface, at.positions_m, at.normals, residual_um))
-    everything = np.concatenate(fields)
-    scale = residual_scale(everything[np.isfinite(everything)])
-    paths: list[Path] = []
-    for experiment, field in zip(campaign.experiments, fields, strict=True):
-        path = folder / f'residual_{file_name(experiment.name)}.ply'
-        if path in paths:
-            path = path.with_stem(f'{path.stem}_{len(paths) + 1}')
-        colours = scale.rgba(field, np.isfinite(field))
-        write_mesh_ply(path, experiment.surface, colours, residual_um=field)
-        paths.append(path)
-    return paths
 
 
 def file_name(name: str) -> str:

@@ -9,11 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.provenance import origin
-from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
@@ -98,17 +96,16 @@ def _chosen_readings(
 ) -> list[Path]:
     """Figures, ``points.csv`` to be filled in and read as gauge readings, and a robot's poses.
 
-    With ``part_pose`` the poses are in the robot's frame, and the module defines its work object.
+    With ``part_pose`` the poses are in the robot's frame.
     """
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
-    files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv', 'points.mod')]
+    files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv')]
     positions, quaternions = result.positions_m, _gauge_quaternions(result)
     write_json(files[0], result.to_dict() | about)
     write_table(files[1], _points(result))
     write_table(files[2], _poses(result.names, positions, quaternions, part))
-    write_text(files[3], gauge_module_text(positions, quaternions, part))
     return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
 
 

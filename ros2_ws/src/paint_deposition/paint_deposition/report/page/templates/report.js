@@ -1,5 +1,5 @@
 'use strict';
-// What the page shows: charts in groups, tables that sort, tables to download.
+// What the page shows: charts in groups, tables that sort.
 (async () => {
   const root = document.documentElement;
   const errors = [];
@@ -88,18 +88,6 @@
     };
     body.append(...[...body.rows].sort(order));
   });
-
-  const download = (name, text) => {
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(new Blob([text], {type: 'text/csv'}));
-    link.download = name;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  };
-  for (const button of document.querySelectorAll('button[data-table]')) {
-    const source = document.getElementById(button.dataset.table);
-    button.addEventListener('click', () => download(button.dataset.name, source.textContent));
-  }
 
   for (const figure of content) await drawGroup(figure);
   root.dataset.ready = '';
