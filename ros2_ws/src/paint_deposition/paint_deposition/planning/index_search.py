@@ -6,7 +6,6 @@ Minima of the curve, how many passes cover a width, and how long they take.
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -25,8 +24,6 @@ from paint_deposition.model.eq4_eq5_uniformity import (
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
-# Passes that are kept for requests that differ in tolerance or width only.
-PASSES_KEPT = 64
 # Share by which the film at the part's edge may fall below the least film inside.
 EDGE_LOSS = 0.05
 FEWEST_POINTS, MOST_POINTS = 121, 601
@@ -72,7 +69,6 @@ class PassSetup:
             return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
-    @lru_cache(maxsize=PASSES_KEPT)  # noqa: B019  (a setup is a few numbers)
     def parallel_passes(
         self, model: DepositionModel, speed_m_per_s: float, fineness: float = 1.0
     ) -> ParallelPasses:

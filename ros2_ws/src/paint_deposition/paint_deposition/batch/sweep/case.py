@@ -19,7 +19,7 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
-FILM, PREDICTED = 'film_um', 'predicted_um'
+PREDICTED = 'predicted_um'
 WARNINGS = 'warnings'
 Columns = dict[str, list[Any]]
 
@@ -33,7 +33,7 @@ def computed(
     """The figures of a case, one row; a case without a film says why in the column ``error``.
 
     Args:
-        given: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``, ``keep_films``.
+        given: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
         surface: the part. trajectory: the motion; None: passes are planned.
         readings: places at which the gauge is predicted, or None.
     """
@@ -70,8 +70,6 @@ def _painted(
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()
-    if given['keep_films']:
-        figures[FILM] = film.film_um.tolist()
     return figures
 
 

@@ -180,5 +180,4 @@ class Job:
             'passes': passes if planned else {},
             'target_um': file.target_um,
             'tolerance_um': file.tolerance_um,
-            'keep_films': file.keep_films,
         }

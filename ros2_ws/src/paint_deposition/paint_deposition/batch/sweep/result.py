@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from paint_deposition.batch.cases import ResultCache
-from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
+from paint_deposition.batch.sweep.case import PREDICTED, WARNINGS
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.variations import DRAW
 from paint_deposition.files.json_files import write_json
@@ -145,11 +145,9 @@ class Sweep:
 def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
     """Write tables, figures and the picture; returns the paths."""
     names = sweep.table.column_names
-    lists = [name for name in (FILM, PREDICTED) if name in names]
+    lists = [PREDICTED] if PREDICTED in names else []
     files = [write_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
-    if FILM in names:
-        files.append(write_parquet(folder / 'films.parquet', sweep.table.select(['case', FILM])))
-    if PREDICTED in names:
+    if lists:
         files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())

@@ -113,7 +113,6 @@ class SweepFile(MotionSource, extra='forbid'):
     target_um: Number = Field(0.0, ge=0.0, le=1e4, description='film wanted [um]')
     tolerance_um: Number = Field(0.0, ge=0.0, le=1e4, description='what it may differ [um]')
     passes: Passes = Field(Passes(), description='keys that say how passes are planned')
-    keep_films: bool = Field(False, description='whether films.parquet holds every film')
     grid: Annotated[dict[str, Any], AfterValidator(_grid)] = Field(
         {}, description='values by name'
     )

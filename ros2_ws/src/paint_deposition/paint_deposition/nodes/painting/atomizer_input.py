@@ -22,9 +22,7 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import (
     PROGRESS_TOPIC,
-    endpoint_name,
     of_gun,
-    publishers_of,
 )
 
 FOLLOW_PERIOD_S = 0.1
@@ -34,14 +32,6 @@ BATCH_PERIOD_S = 0.05
 POSES_A_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
 NO_FLOW = 'states that spray with flow 0'
-
-
-def several_guns(publishers: list[str]) -> str:
-    """What it means that more than one publishes the poses."""
-    return (
-        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as '
-        'the motion of one gun; give each gun a topic or a namespace of its own'
-    )
 
 
 class AtomizerInput:
@@ -61,7 +51,6 @@ class AtomizerInput:
         refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
         sprays: whether the newest state says that the gun sprays; False before any.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
-        pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: why the last was.
         unpainted: poses that came while the node was not active.
@@ -89,7 +78,6 @@ class AtomizerInput:
         self.sprays = False
         self.speed = SpeedNow()
         self.programmed_m_per_s = 0.0
-        self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._flushed_s = -math.inf
         self._stamps: list[int] = []
@@ -212,12 +200,6 @@ class AtomizerInput:
     def _follow_publishers(self) -> None:
         for topic in self._topics:
             topic.follow_publishers()
-        publishers = sorted(
-            map(endpoint_name, publishers_of(self._node, PoseStamped, self._pose_topic))
-        )
-        if len(publishers) > max(1, len(self.pose_publishers)):
-            self._node.get_logger().warning(f'{self._pose_topic}: {several_guns(publishers)}')
-        self.pose_publishers = publishers
 
     # --- poses
 

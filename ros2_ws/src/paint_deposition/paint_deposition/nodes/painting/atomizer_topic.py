@@ -12,7 +12,7 @@ from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from paint_deposition.nodes.runtime.topics import accepting, publishers_of
+from paint_deposition.nodes.runtime.topics import accepting
 
 # More than a publisher keeps for those who come late.
 REMEMBERED = 1000
@@ -84,9 +84,8 @@ class AtomizerTopic:
             self._drain(self._subscription)
 
     def _best(self) -> QoSProfile:
-        offered = [
-            info.qos_profile for info in publishers_of(self._node, self._message, self._topic)
-        ]
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        offered = [info.qos_profile for info in publishers]
         if not offered:
             return self._first
         profile = accepting(offered, self._first.depth)

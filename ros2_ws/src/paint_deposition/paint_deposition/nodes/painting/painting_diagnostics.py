@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
-from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.topics import of_gun
@@ -52,7 +51,6 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         if source.programmed_m_per_s > 0.0
         else 'unknown',
         'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
-        'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses not painted while inactive': source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
         'messages lost by the middleware': source.messages_lost,
@@ -82,8 +80,6 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     wrong += sorted(source.refusals_of_states)
     if values['gun'] == NO_BRUSH and counts.received:
         wrong.insert(0, NO_BRUSH)
-    if len(source.pose_publishers) > 1:
-        wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     if silent_s > SILENT_S:

@@ -1,10 +1,9 @@
-"""Names and quality of service of the topics, and who publishes them."""
+"""Names and quality of service of the topics."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -54,11 +53,3 @@ def weaker_policies(offered: QoSProfile, wanted: QoSProfile) -> list[str]:
 def endpoint_name(info: TopicEndpointInfo) -> str:
     """The full name of the node at a topic's other end."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
-
-
-def publishers_of(node: Node, message: type, topic: str) -> list[TopicEndpointInfo]:
-    """Who publishes messages of this type on a topic."""
-    package, kind = message.__module__.split('.')[:2]
-    expected = f'{package}/{kind}/{message.__name__}'
-    publishers = node.get_publishers_info_by_topic(topic)
-    return [info for info in publishers if info.topic_type == expected]
