@@ -11,6 +11,7 @@ from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
+from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
@@ -42,7 +43,7 @@ class LargeTopic:
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
         self._listeners = self._newcomers = 0
-        self._publisher = node.create_publisher(
+        self._publisher: Publisher = node.create_publisher(
             message, topic, profile,
             event_callbacks=PublisherEventCallbacks(matched=self._count_listeners),
         )  # fmt: skip

@@ -49,7 +49,7 @@ def colour_bar(figure: FigureBase, axes: Sequence[Axes], label: str, scale: Colo
         colours_of(scale), ax=list(axes), location='bottom', shrink=0.6, aspect=30, pad=0.04
     )
     bar.set_label(label, color=MUTED)
-    bar.outline.set_visible(False)
+    bar.ax.spines['outline'].set_visible(False)
 
 
 def colours_of(scale: ColourScale) -> ScalarMappable:

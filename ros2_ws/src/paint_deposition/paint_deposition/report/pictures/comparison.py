@@ -69,10 +69,10 @@ def part_figure(data: ReportData, index: int) -> Figure:
 
 
 def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:
-    at = part.view.flat(place.position_m)
-    axes.plot(*at, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
+    x, y = part.view.flat(place.position_m).tolist()
+    axes.plot(x, y, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
     axes.annotate(
-        str(number), at, xytext=(5, 5), textcoords='offset points', fontsize=10, color='white',
+        str(number), (x, y), xytext=(5, 5), textcoords='offset points', fontsize=10, color='white',
         path_effects=HALO, zorder=6,
     )  # fmt: skip
 

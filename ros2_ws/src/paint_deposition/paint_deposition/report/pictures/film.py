@@ -174,7 +174,7 @@ def _draw_legend(
     bar = axes.figure.colorbar(colours_of(scale), ax=axes, aspect=25, pad=0.02)
     bar.set_label('film [µm]', color=MUTED)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.outline.set_visible(False)
+    bar.ax.spines['outline'].set_visible(False)
     beside = axes.figure.add_subplot(place)
     beside.set_axis_off()
     if np.any(film_um <= s.painted_above_um):

@@ -88,7 +88,7 @@ class PartPicture:
         self, axes: Axes, film_um: np.ndarray, ends_um: list[float], colours: list[str]
     ) -> None:
         """The part with a colour for each band of the film, (V,) at the vertices [um]."""
-        triangles = Triangulation(*self.flat_m.T, self.faces[self.seen])
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
         least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
         levels = [least - 1.0, *ends_um, most + 1.0]
         axes.tricontourf(triangles, film_um, levels, colors=colours)
@@ -100,7 +100,7 @@ class PartPicture:
         levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
         if not len(levels) or not self.seen.any():
             return
-        triangles = Triangulation(*self.flat_m.T, self.faces[self.seen])
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
         lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
