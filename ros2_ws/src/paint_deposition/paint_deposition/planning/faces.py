@@ -7,8 +7,9 @@ least squares, since the film is linear in it.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise, permutations, product
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -38,6 +39,8 @@ MARGINS = (0.0, 0.35, 0.7, 1.0)
 # By how much longer or shorter the gun may stay on a pass than evenness on its face alone asks,
 # and what a change by that much is worth in film, as a share.
 DWELL, RELUCTANCE = (0.5, 2.0), 0.02
+# All orders are tried for so many faces; of more, each time the nearest is next.
+MOST_TRIED = 6
 # Between faces the gun is drawn back so far [m], by the first that keeps it clear of the part.
 RETREATS_M = (0.1, 0.2, 0.4, 0.8)
 
@@ -162,21 +165,20 @@ def _with_dwell(laid: _Laid, dwell: np.ndarray, request: PlanRequest) -> tuple[F
 
 
 def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
-    """From the first on, each time the face that begins nearest; it may run the other way round.
+    """The faces with least travel between them; a face may run the other way round.
 
     Faces whose passes all run one way are not turned.
     """
-    order, left = [faces[0]], list(faces[1:])
-    while left:
-        ways = [
-            (float(np.linalg.norm(way.start_m - order[-1].end_m)), number, way)
-            for number, face in enumerate(left)
-            for way in ((face,) if face.style.one_way else (face, face.reversed()))
-        ]
-        _, number, nearest = min(ways, key=lambda one: one[0])
-        order.append(nearest)
-        del left[number]
-    return tuple(order)
+    if len(faces) > MOST_TRIED:
+        return _nearest_next(faces)
+    ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
+    tried = (
+        tuple(either[k] for k in order)
+        for either in product(*ways)
+        for order in permutations(range(len(faces)))
+    )
+    # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
+    return min(tried, key=lambda order: round(_travel_m(order), 6))
 
 
 def motion_over(
@@ -258,3 +260,20 @@ def _reversed(planned: PlannedPass) -> PlannedPass:
         on_m=length - planned.off_m,
         off_m=length - planned.on_m,
     )
+
+
+def _travel_m(faces: Iterable[FacePasses]) -> float:
+    return sum(
+        float(np.linalg.norm(after.start_m - before.end_m)) for before, after in pairwise(faces)
+    )
+
+
+def _nearest_next(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+    """From the first on, each time the face that begins nearest."""
+    order, left = [faces[0]], list(faces[1:])
+    while left:
+        end_m = order[-1].end_m
+        nearest = min(left, key=lambda face: float(np.linalg.norm(face.start_m - end_m)))
+        order.append(nearest)
+        left = [face for face in left if face is not nearest]
+    return tuple(order)
