@@ -1,6 +1,6 @@
 """The command `paint`, in this process as a rule and as a process where that is the point.
 
-Figures that a command prints as JSON are held against `report/outputs.py` every time.
+Figures that a command prints as JSON are held against `cli/outputs.py` every time.
 """
 
 import io
@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from booth import LOOKING_ALONG_Y
+from cli.outputs import OUTPUTS
 from paint_deposition.cli.main import run
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.report.outputs import OUTPUTS
 from scenes import straight_pass
 
 TRIGGER = ('--state-topic', '/atomizer/state')

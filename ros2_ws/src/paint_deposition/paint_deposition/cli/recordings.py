@@ -1,4 +1,4 @@
-"""Commands on recordings: `inspect`, `recover` and `runs`."""
+"""Commands on recordings: `inspect` and `recover`."""
 
 from __future__ import annotations
 
@@ -11,14 +11,12 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
-    BODY,
     FILE,
     JSON,
     MAX_POSE_GAP,
-    MESH_SCALE,
-    direction_option,
     model_option,
     motion_options,
+    part_options,
     say_all,
 )
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
@@ -26,17 +24,12 @@ from paint_deposition.files.json_files import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from paint_deposition.files.recordings.bag_summary import BagSummary
-
-# A picture shows no finer mesh than this.
-MAX_EDGE_LENGTH_M = 0.02
 
 
 @click.command('inspect')
 @click.argument('recording', type=FILE, required=False)
-@click.option('--mesh', type=FILE, help='A part to set beside the motion.')
+@part_options(0.02, required=False)
 @click.option('--trajectory', type=FILE, help='The motion to set beside the part; or RECORDING.')
 @click.option(
     '--out', '--output', '-o', 'output', type=FILE,
@@ -44,14 +37,11 @@ MAX_EDGE_LENGTH_M = 0.02
 )  # fmt: skip
 @model_option('Model that says where the spray goes; default: a 50 mm bell.')
 @motion_options
-@MESH_SCALE
-@BODY
-@direction_option('--down', 'Gravity in the mesh frame; default: as guessed.')
 @MAX_POSE_GAP
 @JSON
 def inspect_command(
     recording: Path | None,
-    mesh: Path | None,
+    part: dict[str, Any],
     trajectory: Path | None,
     max_pose_gap_s: float,
     motion: dict[str, Any],
@@ -70,8 +60,8 @@ def inspect_command(
     path = trajectory or recording
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
-    if mesh is not None:
-        _show_gun_on_part(mesh, path, motion, max_pose_gap_s, as_json, **options)
+    if part['path'] is not None:
+        _show_gun_on_part(part, path, motion, max_pose_gap_s, as_json, **options)
     else:
         gun_signal = motion.pop('gun_signal')
         if any(options[name] for name in ('output', 'model_file')) or any(motion.values()):
@@ -143,7 +133,7 @@ def _bag_contents(summary: BagSummary) -> str:
 
 
 def _show_gun_on_part(
-    mesh: Path,
+    part: dict[str, Any],
     path: Path,
     motion: dict[str, Any],
     max_pose_gap_s: float,
@@ -151,15 +141,13 @@ def _show_gun_on_part(
     *,
     output: Path | None,
     model_file: Path | None,
-    mesh_scale: float,
-    body: str | None,
-    down: np.ndarray | None,
 ) -> None:
     """Print how the gun ran over a part and what is odd, and draw it if a picture is wanted."""
+    mesh = part['path']
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down, body)
+        surface = pd.read_mesh(**part)
         model = model_for(model_file, path).model
         seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:

@@ -1,14 +1,13 @@
-"""The gun's motion: over its part from three sides."""
+"""The gun's motion over its part, from three sides."""
 
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.colors import to_rgb
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
-from matplotlib.tri import Triangulation
 
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.motion.path import SprayPath
@@ -16,6 +15,7 @@ from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, save_picture
+from paint_deposition.report.pictures.part import draw_triangles
 from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
 
@@ -131,10 +131,9 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
     order = np.argsort(depth)
     # The back of a sheet is seen from some sides: it is darker.
     light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
-    colours = np.clip(np.array(to_rgb(PART_COLOUR)) * light[:, None], 0.0, 1.0)
+    colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
     flat = view.flat(surface.vertices_m)
-    triangles = Triangulation(flat[:, 0], flat[:, 1], surface.faces[order])
-    axes.add_collection(TriMesh(triangles, facecolors=colours, edgecolors='none'))
+    draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
     axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
     if np.ptp(flat, axis=0).max() < SMALL * size_m:
         axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
