@@ -182,7 +182,7 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
 @pytest.mark.parametrize(
     ('values', 'message'),
     [
-        ({'urdf_file': ''}, 'urdf_file is empty: give the robot'),
+        ({'urdf_file': ''}, 'urdf_file and base_link are empty: give the robot, or the frame'),
         ({'urdf_file': 'nowhere.urdf'}, 'cannot read nowhere.urdf'),
         ({'flow': '/flow'}, 'flow is given without a trigger'),
         ({'trigger': '/io > many'}, "trigger is '/io > many': give a topic"),

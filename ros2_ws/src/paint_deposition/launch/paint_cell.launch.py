@@ -35,10 +35,17 @@ ARGUMENTS = (
     ('allow_user_effects', 'false', 'Run the Python code of effect files that a model names'),
     ('urdf', '', 'Robot whose joint states give the poses; empty: none [path]'),
     ('joint_topic', 'joint_states', "The robot's joint states, with urdf [topic]"),
+    ('base_frame', '', 'Frame in which tf gives the poses of tip_frame; empty: none [name]'),
+    (
+        'tip_frame',
+        '',
+        "Frame that carries the gun, with base_frame; empty: tool0. The TCP's offset in it is "
+        'tcp_offset of the parameter file [name]',
+    ),
     (
         'trigger',
         '',
-        'What opens the gun, with urdf: /gun, or "/io.level > 12" [topic]',
+        'What opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" [topic]',
     ),
     ('bag', '', 'Bag to replay into the cell; empty: poses come from the robot [path]'),
     ('pose_topic', '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"),
@@ -92,8 +99,12 @@ def wanted(given):
     """The parameters that the arguments give each node, by its name."""
     if not Path(given['parameters']).is_file():
         raise ValueError(f'parameters: there is no file {given["parameters"]}')
-    if given['trigger'] and not given['urdf']:
-        raise ValueError('trigger is given without urdf, with which it goes')
+    if given['urdf'] and given['base_frame']:
+        raise ValueError('urdf and base_frame are given: the poses come from joints or from tf')
+    if given['tip_frame'] and not given['base_frame']:
+        raise ValueError('tip_frame is given without base_frame: name the frame of the poses')
+    if given['trigger'] and not (given['urdf'] or given['base_frame']):
+        raise ValueError('trigger is given without urdf or base_frame, with which it goes')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
@@ -111,6 +122,12 @@ def wanted(given):
         nodes['atomizer_source'] = {
             'urdf_file': given['urdf'],
             'joint_topic': given['joint_topic'],
+            'trigger': given['trigger'],
+        }
+    elif given['base_frame']:
+        nodes['atomizer_source'] = {
+            'base_link': given['base_frame'],
+            'tip_link': given['tip_frame'],
             'trigger': given['trigger'],
         }
     if given['bag']:

@@ -1,15 +1,13 @@
-"""Node `atomizer_source`: poses and states of the gun from a robot's joints and signals."""
+"""Node `atomizer_source`: poses and states of the gun from what a robot's driver publishes."""
 
 from __future__ import annotations
 
 import importlib
 import math
-import time
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -18,10 +16,11 @@ from rclpy.time import Time
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.files.recordings.joint_states import USUAL_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, JointPoses, TfPoses
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH, accepting
@@ -29,8 +28,6 @@ from paint_deposition.nodes.runtime.topics import POSE_DEPTH, accepting
 # Who comes late must know whether the gun is open; who is slow must miss no change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
-SILENT_S = 2.0
-QUEUE_DEPTH = 5000
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # (topic, message, what the middleware says of it)
 TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
@@ -38,12 +35,14 @@ SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 1
 
 SOURCE = fixed(
     'the subscriptions are made with it when the node starts; restart the node',
-    urdf_file=NodeParameter('', 'The robot, URDF, whose joint states give the poses [path]'),
+    urdf_file=NodeParameter(
+        '', 'The robot, URDF, whose joint states give the poses; empty: tf gives them [path]'
+    ),
     tip_link=NodeParameter(
-        '', 'Link that carries the bell; empty: tool0, else the last one [name]'
+        '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
     ),
     base_link=NodeParameter(
-        '', 'Link in whose frame the poses are; empty: the root of urdf_file [name]'
+        '', 'Link or frame in which the poses are; empty: the root of urdf_file [name]'
     ),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
     tcp_offset=NodeParameter(
@@ -74,9 +73,9 @@ SOURCE = fixed(
 
 
 class AtomizerSource(PaintNode):
-    """Publishes `atomizer/pose` from a robot's joints, and `atomizer/state` from signals.
+    """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
-    A pose has the stamp of the joint state that it was computed from. A signal
+    A pose has the stamp of the joint state or transform that it was computed from. A signal
     counts from the stamp of its message, or else from the time at which it was sent.
     """
 
@@ -90,15 +89,14 @@ class AtomizerSource(PaintNode):
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
-        # The joints and the signals that nobody was found to publish yet.
+        # The joints and the signals that have no publisher yet.
         self._missing: dict[str, TakeMessage] = {}
-        self._missing[self.values['joint_topic']] = self._take_joints
+        self._motion = self._motion_of_robot()
         for signal in self._signals.values():
             self._missing[signal.topic] = self._take_signals
         self._values: dict[str, float] = {}
         self._published: tuple[bool, float, int, float | None] | None = None
-        self._poses = self._incomplete = 0
-        self._heard_s = time.monotonic()
+        self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
         self._find_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._find_topics)
@@ -106,8 +104,11 @@ class AtomizerSource(PaintNode):
         self._diagnostics = Diagnostics(self, tasks)
 
     def _check(self, values: Mapping[str, Any]) -> None:
-        if not values['urdf_file']:
-            raise PaintError(f'{self.get_name()}: urdf_file is empty: give the robot')
+        if not values['urdf_file'] and not values['base_link']:
+            raise PaintError(
+                f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
+                'frame in which tf knows its tip'
+            )
         alone = [name for name in SIGNALS[1:] if values[name] and not values['trigger']]
         if alone:
             raise PaintError(f'{alone[0]} is given without a trigger: name what opens the gun')
@@ -117,31 +118,32 @@ class AtomizerSource(PaintNode):
 
     def _prepare(self) -> None:
         values = self.values
-        self._robot = Robot.read(
-            Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
-        )
+        self._robot = None
+        if values['urdf_file']:
+            self._robot = Robot.read(
+                Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
+            )
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.of(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
 
-    def _take_joints(self, _topic: str, message: Any, info: Mapping[str, Any]) -> None:
-        """Publish the pose of a joint state, which must have all joints."""
-        known = dict(zip(message.name, message.position, strict=False))
-        if any(name not in known for name in self._robot.moving):
-            self._incomplete += 1
-            return
-        self._heard_s = time.monotonic()
-        stamp, sent_ns = stamp_ns(message.header), info['source_timestamp']
+    def _motion_of_robot(self) -> JointPoses | TfPoses:
+        values = self.values
+        if self._robot is None:
+            tip = values['tip_link'] or USUAL_TIP
+            return TfPoses(self, values['base_link'], tip, self._publish_pose)
+        joints = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
+        self._missing[values['joint_topic']] = joints.take
+        return joints
+
+    def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
             self._clock_offset_s = (sent_ns - stamp) * 1e-9
-        joints = np.array([[known[name] for name in self._robot.moving]])
-        positions, quaternions = self._robot.poses(joints)
-        tip = Rigid.of([*positions[0], *quaternions[0]])
         x, y, z, qx, qy, qz, qw = (tip @ self._tcp).values
         pose = PoseStamped()
-        pose.header.frame_id = self._robot.base
+        pose.header.frame_id = self._motion.base
         pose.header.stamp = Time(nanoseconds=stamp).to_msg()
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z = x, y, z
@@ -202,25 +204,20 @@ class AtomizerSource(PaintNode):
             return
         self._published = new
         state = AtomizerState(spraying=on, flow=flow, brush=brush, programmed_speed_m_per_s=speed)
-        state.header.frame_id = self._robot.base
+        state.header.frame_id = self._motion.base
         state.header.stamp = Time(nanoseconds=stamp).to_msg()
         self._state_publisher.publish(state)
 
     # --- health
 
     def _robot_status(self) -> Status:
-        robot = self._robot
+        found = self._motion.status()
         values = {
-            'poses': f"of '{robot.tip}' in '{robot.base}'",
+            'poses': f"of '{self._motion.tip}' in '{self._motion.base}'",
             'published': self._poses,
-            'robot': robot.path,
-            'joint states without all joints': self._incomplete,
+            **found.values,
         }
-        if self._incomplete and not self._poses:
-            return Status(ERROR, f'no joint state has all of {" ".join(robot.moving)}', values)
-        if time.monotonic() - self._heard_s > SILENT_S:
-            return Status(WARN, f'no joint states on {self.values["joint_topic"]}', values)
-        return Status(OK, 'following the robot', values)
+        return Status(found.level, found.message, values)
 
     def _signals_status(self) -> Status:
         values = {

@@ -1,0 +1,191 @@
+"""The pose of a robot's tip, from its joint states or from tf."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.time import Time
+from sensor_msgs.msg import JointState
+
+from paint_deposition.errors import PaintError, did_you_mean
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
+
+# (stamp [ns], pose of the tip, when it was sent [ns] or 0)
+TakePose = Callable[[int, Rigid, int], None]
+SILENT_S = 2.0
+QUEUE_DEPTH = 5000
+# Transforms that are so much older than the newest are of a stream that begins again [ns].
+ANOTHER_STREAM_NS = 1_000_000_000
+
+
+class JointPoses:
+    """Computes a pose of frame `tip` in `base` from each joint state, which must have all joints.
+
+    `topic` is that of the joint states, for messages; `take_pose` gets each pose.
+    """
+
+    def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
+        self.base, self.tip = robot.base, robot.tip
+        self._robot = robot
+        self._topic = topic
+        self._take_pose = take_pose
+        self._poses = self._incomplete = 0
+        self._heard_s = time.monotonic()
+
+    def take(self, _topic: str, message: JointState, info: Mapping[str, Any]) -> None:
+        """Take a joint state."""
+        positions_by_name = dict(zip(message.name, message.position, strict=False))
+        if any(name not in positions_by_name for name in self._robot.moving):
+            self._incomplete += 1
+            return
+        self._heard_s = time.monotonic()
+        values = np.array([[positions_by_name[name] for name in self._robot.moving]])
+        positions, quaternions = self._robot.poses(values)
+        tip = Rigid.of([*positions[0], *quaternions[0]])
+        self._poses += 1
+        self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
+
+    def status(self) -> Status:
+        """Whether joint states come, and have all joints."""
+        values = {
+            'robot': self._robot.path,
+            'joint states without all joints': self._incomplete,
+        }
+        if self._incomplete and not self._poses:
+            joints = ' '.join(self._robot.moving)
+            return Status(ERROR, f'no joint state has all of {joints}', values)
+        if time.monotonic() - self._heard_s > SILENT_S:
+            return Status(WARN, f'no joint states on {self._topic}', values)
+        return Status(OK, 'following the robot', values)
+
+
+class TfPoses:
+    """Gives a pose for each stamp of a transform that moves between two frames.
+
+    A pose waits until all transforms on the way are known at its time or later; tf2 interpolates
+    those that come at other times.
+
+    Args:
+        node: to subscribe with.
+        base, tip: frame of the poses, and whose they are.
+        take_pose: gets each pose, in the order of their stamps.
+
+    Raises:
+        PaintError: tf2 is not installed.
+    """
+
+    def __init__(self, node: PaintNode, base: str, tip: str, take_pose: TakePose) -> None:
+        try:
+            import tf2_ros
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            raise PaintError(
+                f'{node.get_name()}: poses from tf need tf2_ros, which is not installed; install '
+                'tf2_ros_py of your ROS distribution, or give urdf_file'
+            ) from None
+        self.base, self.tip = base.lstrip('/'), tip.lstrip('/')
+        self._take_pose = take_pose
+        self._tf2 = tf2_ros
+        self._buffer = tf2_ros.Buffer()
+        self._parents: dict[str, str] = {}
+        # Stamps of the transforms over time that may lie on the way, by the child's frame.
+        self._waiting: deque[tuple[int, str]] = deque(maxlen=QUEUE_DEPTH)
+        self._newest_ns: dict[str, int] = {}
+        self._passed_ns = 0
+        self._unknown = 0
+        self._heard_s = time.monotonic()
+        latched = DurabilityPolicy.TRANSIENT_LOCAL
+        node.create_subscription(
+            TFMessage, '/tf_static', self._take_static, QoSProfile(depth=100, durability=latched)
+        )
+        node.create_subscription(TFMessage, '/tf', self._take, QoSProfile(depth=QUEUE_DEPTH))
+
+    def _take_static(self, message: Any) -> None:
+        for transform in message.transforms:
+            self._connect(transform)
+            self._buffer.set_transform_static(transform, 'tf')
+
+    def _take(self, message: Any, info: Mapping[str, Any]) -> None:
+        for transform in message.transforms:
+            child, stamp = self._connect(transform), stamp_ns(transform.header)
+            if stamp < self._newest_ns.get(child, 0) - ANOTHER_STREAM_NS:
+                self._begin_again()
+            self._buffer.set_transform(transform, 'tf')
+            self._newest_ns[child] = max(stamp, self._newest_ns.get(child, 0))
+            self._waiting.append((stamp, child))
+        self._pass_on(info['source_timestamp'])
+
+    def _connect(self, transform: Any) -> str:
+        child = transform.child_frame_id.lstrip('/')
+        self._parents[child] = transform.header.frame_id.lstrip('/')
+        return child
+
+    def _begin_again(self) -> None:
+        self._buffer.clear()  # static transforms stay
+        self._waiting.clear()
+        self._newest_ns.clear()
+        self._passed_ns = 0
+
+    def _upward(self, frame: str) -> list[str]:
+        """A frame, its parent and so on up to the root."""
+        way = [frame]
+        while way[-1] in self._parents and len(way) <= len(self._parents):
+            way.append(self._parents[way[-1]])
+        return way
+
+    @property
+    def _moving(self) -> set[str]:
+        """The frames on the way that move in their parents; none while no way is known."""
+        from_tip, from_base = self._upward(self.tip), self._upward(self.base)
+        if from_tip[-1] != from_base[-1]:
+            return set()
+        return (set(from_tip) ^ set(from_base)) & self._newest_ns.keys()
+
+    def _pass_on(self, sent_ns: int) -> None:
+        moving = self._moving
+        if not moving:
+            return
+        known_ns = min(self._newest_ns[child] for child in moving)
+        on_the_way = [(at_ns, child) for at_ns, child in self._waiting if child in moving]
+        later = [(at_ns, child) for at_ns, child in on_the_way if at_ns > known_ns]
+        self._waiting = deque(later, maxlen=QUEUE_DEPTH)
+        due = {at_ns for at_ns, _ in on_the_way if self._passed_ns < at_ns <= known_ns}
+        for stamp in sorted(due):
+            self._passed_ns = stamp
+            try:
+                found = self._buffer.lookup_transform(self.base, self.tip, Time(nanoseconds=stamp))
+            except self._tf2.TransformException:
+                self._unknown += 1
+                continue
+            t, q = found.transform.translation, found.transform.rotation
+            self._heard_s = time.monotonic()
+            self._take_pose(stamp, Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w]), sent_ns)
+
+    def status(self) -> Status:
+        """Whether a way leads from the tip to the base, and its transforms come."""
+        frames = sorted({*self._parents, *self._parents.values()})
+        values = {
+            'frames': ' '.join(frames) or 'none',
+            'frames that move on the way': ' '.join(sorted(self._moving)) or 'none',
+            'times at which tf knew no pose': self._unknown,
+        }
+        if not frames:
+            return Status(WARN, 'no transforms on /tf', values)
+        for name in (self.tip, self.base):
+            if name not in frames:
+                known = did_you_mean(name, frames)
+                return Status(ERROR, f"tf has no frame '{name}'; {known}", values)
+        if not self._moving:
+            reason = f"no transforms that move lead from '{self.tip}' to '{self.base}'"
+            return Status(ERROR, reason, values)
+        if time.monotonic() - self._heard_s > SILENT_S:
+            return Status(WARN, 'no new transforms of the robot on /tf', values)
+        return Status(OK, 'following the robot', values)
