@@ -18,7 +18,6 @@ from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     of_any_form,
-    of_footprint,
 )
 from paint_deposition.inference.diagnosis.model_space import (
     RemainderFigures,
@@ -104,12 +103,6 @@ class Run:
     def any_form(self) -> list[Explanation]:
         """Laws of any form, for what is outside the library."""
         return of_any_form(self.study, self.history[0].model)
-
-    @cached_property
-    def options(self) -> list[Explanation]:
-        """Laws of any form that may be learned beside the newest model."""
-        model = self.fit.model
-        return [*of_any_form(self.study, model), *of_footprint(self.study, model)]
 
     @property
     def freedom(self) -> float:
