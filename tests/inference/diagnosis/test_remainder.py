@@ -227,7 +227,7 @@ def test_which_parts_were_painted_alike():
     part = on_panel()
     path = part.path
     near, far = (
-        replace(part, path=path.with_(position_m=path.position_m + [away_m, 0.0, 0.0]))
+        replace(part, path=path.with_(position_m=np.add(path.position_m, [away_m, 0.0, 0.0])))
         for away_m in (0.002, 0.05)
     )
     off = replace(part, switched_off=frozenset(['voltage']))
