@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def test_the_set_found_is_the_one_planted(search, stages):
     assert [len(stage.here.names) for stage in stages] == [0, 1, 2]
     assert stages[0].here is search.nothing
     assert stages[-1].here.names == PLANTED
-    for stage, following in zip(stages, stages[1:], strict=False):
+    for stage, following in pairwise(stages):
         assert stage.chosen() is following.here
         assert following.here.log_weight > stage.here.log_weight
     assert stages[-1].chosen() is stages[-1].here
