@@ -16,7 +16,7 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM
-from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
+from paint_deposition.inference.fitting.study import FOLDS, TEXTURE_SHARE, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import PlanarPattern
