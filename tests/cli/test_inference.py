@@ -217,6 +217,34 @@ def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
     assert effect.id == 'wake_loss'
 
 
+@pytest.mark.slow
+def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(tmp_path):
+    """Both panel and door: it is put into the model in place of the law, and compared."""
+    file, output = tmp_path / 'my_incidence.py', tmp_path / 'out'
+    done = paint('refit', CAMPAIGN, '--add', 'learned:incidence_deg', '--as-effect', file,
+                 '-o', output)  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    content = json.loads((output / 'diagnosis.json').read_text())
+    best, *_ = content['classes'][0]['forms']
+    assert best['formula'] in done.stdout
+    model = yaml.safe_load((output / 'model.yaml').read_text())
+    values = {name: found['value'] for name, found in best['parameters'].items()}
+    own = {key: model[key] for key in ('planar', 'projection')}
+    own['effects'] = [{'file': str(file), **values}]
+    (tmp_path / 'own.yaml').write_text(yaml.safe_dump(own))
+    done = paint('compare', CAMPAIGN, '--model', output / 'model.yaml', '--model',
+                 tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    learned, own = (
+        [float(r['residual_um']) for r in table(tmp_path / f'both/residuals_{name}.csv')]
+        for name in ('model', 'own')
+    )
+    assert sum(r**2 for r in own) < 1.3 * sum(r**2 for r in learned)
+    again = paint('refit', CAMPAIGN, '--add', 'learned:incidence_deg', '--as-effect', file,
+                  '-o', output)  # fmt: skip
+    assert_refused(again, 'my_incidence.py is there already', 'give another name')
+
+
 # --- bad input
 
 
@@ -228,6 +256,10 @@ def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
         (('refit', CAMPAIGN, '--add', 'air_drft'), ("'air_drft'", "did you mean 'air_drift'?")),
         (('refit', CAMPAIGN, '--add', 'mine.py'), ('mine.py',)),
         (('refit', CAMPAIGN), ("Missing option '--add'",)),
+        (
+            ('refit', CAMPAIGN, '--add', 'edge_build', '--as-effect', 'a.py'),
+            ('learned:COVARIATE',),
+        ),
         (('diagnose', CAMPAIGN, '--effect-file', 'mine.py'), ('mine.py',)),
     ],
 )

@@ -28,6 +28,7 @@ from paint_deposition.cli.options import (
     write_results,
 )
 from paint_deposition.cli.progress import Progress
+from paint_deposition.errors import PaintError
 
 OUTPUT = output_option('the results')
 MODEL = model_option("Model to start from; default: the campaign's, else that of a 50 mm bell.")
@@ -214,13 +215,19 @@ def diagnose_command(effect_files: tuple[Path, ...], **given: Any) -> None:
     help="Effect to add: an id, a Python file with one of your own, or a law to learn over a "
     "covariate, as learned:time_s; 'none' refits only.",
 )  # fmt: skip
+@click.option(
+    '--as-effect', 'effect_file', type=click.Path(path_type=Path, dir_okay=False),
+    metavar='FILE.py',
+    help='Python file to make: the law learned, in the most probable closed form that fits '
+    'within its band, as an effect of your own.',
+)  # fmt: skip
 @MODEL
 @OUTPUT
 @SEED
 @PART_POSE
 @PICTURES
 @JSON
-def refit_command(effect: str, **given: Any) -> None:
+def refit_command(effect: str, effect_file: Path | None, **given: Any) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
@@ -233,11 +240,46 @@ def refit_command(effect: str, **given: Any) -> None:
         added = None
     else:
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
+    _require_place_for(effect_file, effect, added)
 
     def refitted(data: pd.Campaign, *start: Any, **options: Any) -> pd.Diagnosis:
         return pd.refit(data, added, *start, **options)
 
-    _diagnose(Progress('refit'), refitted, **given)
+    _diagnose(Progress('refit'), refitted, effect_file=effect_file, **given)
+
+
+def _require_place_for(effect_file: Path | None, effect: str, added: Any) -> None:
+    """Refuse what cannot become an effect file, before anything is computed."""
+    from paint_deposition.effects.learned.curves import LearnedCurve
+
+    if effect_file is None:
+        return
+    if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
+        raise click.UsageError(
+            f'--as-effect is for a law learned over one covariate, and --add is {effect}; give '
+            '--add learned:COVARIATE, as learned:time_s'
+        )
+    if effect_file.suffix != '.py':
+        raise click.UsageError(f'--as-effect {effect_file}: give a name that ends in .py')
+    if effect_file.exists():
+        raise click.UsageError(f'--as-effect {effect_file} is there already; give another name')
+
+
+def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
+    """Write the law learned last as an effect, and say how to use it."""
+    from paint_deposition.effects.learned.curves import LearnedCurve
+    from paint_deposition.inference.diagnosis.closed_forms import forms_of
+    from paint_deposition.report.writers.effect_file import effect_entry, write_effect_file
+
+    law = next(iter(diagnosis.model.effects[::-1]), None)
+    forms = forms_of(law)
+    if not forms or not isinstance(law, LearnedCurve):
+        raise PaintError(
+            f'--as-effect {effect_file}: no closed form of few parameters fits the law within '
+            'its band; use the curve itself, which stands in model.yaml if the fit was sound'
+        )
+    write_effect_file(effect_file, law, forms[0])
+    return f'effect file: {forms[0].formula}; in a model {{{effect_entry(forms[0], effect_file)}}}'
 
 
 def _diagnose(
@@ -250,6 +292,7 @@ def _diagnose(
     part_pose: list[float] | None,
     pictures: str,
     as_json: bool,
+    effect_file: Path | None = None,
 ) -> None:
     with progress as show:
         data, start = read_inputs(campaign, model_file, show, part_pose)
@@ -263,13 +306,18 @@ def _diagnose(
     say_geometry(diagnosis)
     say_all('warning', diagnosis.warnings)
     words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
-    say_results(files, as_json, _diagnosis_lines(diagnosis, output), model=words)
+    lines = [*_diagnosis_lines(diagnosis, output)]
+    if effect_file:
+        lines.append(_write_as_effect(diagnosis, effect_file))
+    say_results(files, as_json, lines, model=words)
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
+    from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.effects.learned.law import LearnedLaw
     from paint_deposition.report.words import (
         effect_name,
+        form_words,
         learned_words,
         probability_words,
         separation_words,
@@ -286,14 +334,17 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         if isinstance(law, LearnedLaw):
             shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
             yield f'    {effect_name(law.id)}: {shape}'
+            if isinstance(law, LearnedCurve) and law.sd:
+                yield f'    {form_words(law)}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
     yield (
-        f'RMSE {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the fitted points, '
-        f'{before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on points left out; '
-        f'gauge and texture {diagnosis.noise_floor_um:.2f} µm'
+        f'RMSE {before.holdout_rmse_um:.2f} -> {after.holdout_rmse_um:.2f} µm on '
+        f'{diagnosis.left_out} left out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
+        f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
     )
+    yield from (f'worse than before: {one}' for one in diagnosis.worse)
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'
     for amount in diagnosis.random_effects:
@@ -306,7 +357,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'next: {todo}: {separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
-    for note in diagnosis.study.notes:
+    for note in (*diagnosis.study.notes, *diagnosis.left_over):
         yield f'note: {note}'
     yield from geometry_lines(diagnosis)
     yield f'model: {output / "model.yaml"}'

@@ -50,6 +50,15 @@ def output(name: str, numbers: str = '', /, *bases: Any, **fields: Any) -> Any:
     return OUTPUTS[name]
 
 
+Interval = figures('value low high')
+
+
+class WithForms(Figures):
+    """A learned law also has the closed forms that fit it."""
+
+    forms: list[figures('probability', formula=str, parameters=dict[str, Interval])] | None = None
+
+
 Model = figures(projection=dict, effects=list[figures(id=str)], sha256=Sha256)
 Provenance = figures(
     package_version=str, git_version=str, campaign=str, models=dict[str, Model],
@@ -156,15 +165,15 @@ output(
     'diagnosis', 'p_value', reason=str, accepted=Words, unknown=dict | None, not_testable=Words,
     verdict=Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken'],
     classes=list[
-        figures('probability', members=Words, best=str, holdout_rmse_um=dict[str, Number],
-                parameters=dict[str, figures('value low high')])
+        figures('probability', WithForms, members=Words, best=str, parameters=dict[str, Interval],
+                holdout_rmse_um=dict[str, Number])
     ],
     rmse_um=figures(
         'before after holdout_before holdout_after noise_floor',
         left_out=Literal['experiments', 'points'],
     ),
     experiments=list[figures('rmse_before_um rmse_after_um', name=str)],
-    remainder=dict | None, footprint=dict | None,
+    remainder=dict | None, footprint=dict | None, worse=Words,
     detectable=dict[str, dict[str, Number]], regions=list[Region], noise=Noise,
     next=figures(measure=list[dict], spray=list[figures(what=str, separates=Words)]),
     pattern_shift=dict | None, left_out=list[dict], notes=Words,

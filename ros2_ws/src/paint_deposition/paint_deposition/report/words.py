@@ -12,6 +12,7 @@ from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
 from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
@@ -36,6 +37,7 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
     'tool_y_m': ('Place in the pattern, y', 'm'),
     'film_um': ('Film predicted', 'µm'),
 }
+FORMS_SHOWN = 3
 SUPERSCRIPTS = str.maketrans('-+0123456789', '⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹')
 SYMBOLS = {
     'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
@@ -142,7 +144,23 @@ def learned_range(law: LearnedLaw) -> str:
         return f'{name}: neutral farther than {reach} from the axis on the model plane.'
     _, ends, unit = learned_words(law)[1]
     words = f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
-    return words + _band_words(law) if isinstance(law, LearnedCurve) and law.sd else words
+    if not (isinstance(law, LearnedCurve) and law.sd):
+        return words
+    return f'{words}{_band_words(law)} {form_words(law)}'
+
+
+def form_words(law: LearnedCurve) -> str:
+    """The closed forms that fit a curve, with their values and probabilities, as sentences."""
+    forms = [
+        f'{form.formula} with '
+        + joined([f'{name} {number(found.value)}' for name, found in form.parameters.items()])
+        + f' ({percent(form.probability)})'
+        for form in forms_of(law)
+    ]
+    if not forms:
+        return 'No closed form of few parameters fits within its band.'
+    more = f'; {len(forms) - FORMS_SHOWN} more fit' if len(forms) > FORMS_SHOWN else ''
+    return f'Closed forms within its band: {"; ".join(forms[:FORMS_SHOWN])}{more}.'
 
 
 def _band_words(law: LearnedCurve) -> str:

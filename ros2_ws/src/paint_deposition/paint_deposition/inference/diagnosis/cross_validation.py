@@ -33,7 +33,7 @@ def nested_rmse_um(
         out = folds == fold
         found = _found_without(stages, out)
         plain = run.plain(found.fit)
-        beside = plain.with_remainder(found.remainder.of_parts(found.best.sizes)).select(~out)
+        beside = found.beside(found.fit).select(~out)
         footprint = found.remainder.of_footprint[np.ix_(~out, ~out)]
         kept = [option.select(~out) for option in options]
         laws = choose_laws(beside, footprint, kept, run.freedom)

@@ -20,9 +20,10 @@ from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, 
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 
-# Prior probability that a cause is missing: an effect of the library, and something outside it,
-# half of which shows over a covariate and half as a setting that differs beyond nature.
-PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.08
+# Prior probability that a cause is missing: an effect of the library; and, as one effect more,
+# something outside it, half of which shows over a covariate and half as a setting that differs
+# beyond nature.
+PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
 SIZES = np.array([0.5, 1.0, 2.0])
 # An effect acts for certain from this posterior probability of its group on.
@@ -108,12 +109,16 @@ class Weighed(NamedTuple):
     log_weight: float
 
     @staticmethod
-    def of(plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float) -> 'Weighed':
-        """Weigh one choice by its evidence and its prior."""
+    def of(
+        plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float, share: float = 1.0
+    ) -> 'Weighed':
+        """Weigh one choice by its evidence and its prior, of which this hypothesis has a share."""
         null = plain.with_remainder(remainder.covariance(sizes))
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
-        prior = log_odds(PRIOR_UNKNOWN) - np.log(2.0) if sizes.is_beyond_nature else 0.0
-        return Weighed(sizes, null, evidence + sizes.log_prior + float(prior))
+        prior = sizes.log_prior + float(np.log(share))
+        if sizes.is_beyond_nature:
+            prior += log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
+        return Weighed(sizes, null, evidence + prior)
 
 
 @dataclass(frozen=True)

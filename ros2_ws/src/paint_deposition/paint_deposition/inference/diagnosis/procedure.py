@@ -26,6 +26,7 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass,
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.residuals import is_worse
 
 # Significance level of the test that something is missing.
 ALPHA = 0.05
@@ -99,10 +100,10 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
 def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray) -> None:
     """Add as few laws of any form as improve the prediction of readings left out.
 
-    A law that the model cannot be fitted with is not tried again.
+    A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
     without: set[str] = set()
-    beside = run.plain(run.fit).with_remainder(best.remainder.of_parts(best.best.sizes))
+    beside = best.beside(run.fit)
     footprint = best.remainder.of_footprint
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
@@ -112,7 +113,11 @@ def _learn(run: Run, best: Trial, stages: Sequence[Stage], errors_um: np.ndarray
         if not chosen:
             return
         fit = run.learned(chosen)
-        if fit.objective <= run.fit.objective:
+        parts = zip(
+            *(run.study.residuals_by_experiment(f.predicted_um) for f in (run.fit, fit)),
+            strict=True,
+        )
+        if fit.objective <= run.fit.objective and not any(is_worse(*part) for part in parts):
             break
         without.add(chosen[0][0].learns)
         errors_um = nested_rmse_um(stages, run.options, without)

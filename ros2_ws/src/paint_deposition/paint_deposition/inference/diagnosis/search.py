@@ -31,6 +31,9 @@ from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many effects are added at most, and so many proposals are refitted each time.
 MOST_EFFECTS, TRIALS = 4, 5
+# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
+# times as far, and the prior share of each.
+LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.
@@ -68,9 +71,14 @@ class Trial:
     def weighed(self) -> list[Weighed]:
         """The model as the null hypothesis, its laws being off, with each size of remainder."""
         study, freedom = self.run.study, self.run.freedom
-        free = np.hstack([study.nuisance, law_errors(study, self.fit, self.names)])
-        null = NullModel.around(self.fit, free)
-        return [Weighed.of(null, self.remainder, s, freedom) for s in self.sizes]
+        errors = law_errors(study, self.fit, self.names)
+        found = []
+        for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
+            null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
+            found += [
+                Weighed.of(null, self.remainder, sizes, freedom, share) for sizes in self.sizes
+            ]
+        return found
 
     @cached_property
     def best(self) -> Weighed:
@@ -78,12 +86,27 @@ class Trial:
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
+    def beside(self, fit: Fit) -> NullModel:
+        """What a law that is learned must say more than: all but the footprint.
+
+        Args:
+            fit: of the model with the set.
+        """
+        null = self.run.plain(fit).with_remainder(self.remainder.of_parts(self.best.sizes))
+        return null.beside(law_errors(self.run.study, fit, self.names))
+
     @cached_property
     def log_weight(self) -> float:
         """Logarithm of the posterior weight of this set, something unknown acting or not."""
         run = self.run
         space = ModelSpace(self.weighed, run.any_form, self.remainder, run.freedom)
         return space.log_evidence + self.log_prior
+
+    @cached_property
+    def log_weight_alone(self) -> float:
+        """The same weight if nothing unknown can act."""
+        nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
+        return float(np.logaddexp.reduce(nature)) + self.log_prior
 
     @property
     def log_prior(self) -> float:
@@ -112,7 +135,11 @@ class Trial:
 
 @dataclass(frozen=True)
 class Stage:
-    """One step of the search: a set of effects, and larger ones that were tried."""
+    """One step of the search: a set of effects, and larger ones that were tried.
+
+    The search goes on as if nothing unknown could act: that follows several effects together more
+    closely than the law of the first of them.
+    """
 
     here: Trial
     tried: Sequence[Trial]
@@ -121,7 +148,7 @@ class Stage:
         """The set that the readings, or some (P,), call for: one that was tried, or this."""
 
         def weight(trial: Trial) -> float:
-            return trial.log_weight if rows is None else trial.log_weight_of(rows)
+            return trial.log_weight_alone if rows is None else trial.log_weight_of(rows)
 
         weights = [weight(trial) for trial in self.tried]
         if not weights or inclusion_of(weights, weight(self.here)) <= SURE:
@@ -163,7 +190,7 @@ class Search:
         fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
-        if known is None or trial.log_weight > known.log_weight + SAME:
+        if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:
             self._trials[trial.names] = trial
         return self._trials[trial.names]
 
@@ -184,7 +211,10 @@ class Search:
             here = best
 
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
-        """The set without effects that do not stand, and what could stand in place of each."""
+        """The set without effects that do not stand, and what could stand in place of each.
+
+        Here something unknown may have done it, too.
+        """
         while True:
             found = {name: self.group(trial, name) for name in trial.names}
             if not found or min(p for _, p in found.values()) > SURE:

@@ -9,8 +9,10 @@ from typing import Any, Literal
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
+from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
 from paint_deposition.inference.diagnosis.model_space import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
@@ -20,7 +22,7 @@ from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.residuals import is_worse, root_mean_square
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -152,8 +154,12 @@ class Diagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""
-        left_over = (str(self.remainder),) if self.remainder else ()
-        return (*self.warnings, *self.study.notes, *left_over)
+        return (*self.warnings, *self.study.notes, *self.left_over)
+
+    @property
+    def left_over(self) -> tuple[str, ...]:
+        """What nature leaves over, in a sentence; nothing where the fit is broken."""
+        return (str(self.remainder),) if self.remainder else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -170,6 +176,22 @@ class Diagnosis:
     def random_effects(self) -> tuple[Amount, ...]:
         """Estimated levels of parts and zeros of gauge sessions."""
         return amounts(self.history[-1].fit, self.study.random_effects)
+
+    @property
+    def left_out(self) -> str:
+        """What is left out in turn for the error that was not fitted: parts or patches."""
+        return 'parts' if self.study.has_several_parts else 'patches'
+
+    @cached_property
+    def worse(self) -> tuple[str, ...]:
+        """Parts, rows and columns that the newest model predicts worse, a phrase each."""
+        pairs = zip(self.comparisons[0].misfits, self.comparisons[-1].misfits, strict=True)
+        return tuple(
+            f'{new.experiment}{"" if new.kind == "experiment" else f", {new.label}"}: '
+            f'{old.residuals.rmse_um:.2f} -> {new.residuals.rmse_um:.2f} µm'
+            for old, new in pairs
+            if new.kind in ('experiment', 'group') and is_worse(old.residuals, new.residuals)
+        )
 
     @property
     def posterior(self) -> Posterior:
@@ -196,6 +218,13 @@ class Diagnosis:
         """How the gun ran over each part, by experiment."""
         return self.comparisons[-1].geometry
 
+    def _forms(self, found: EffectClass) -> dict[str, Any]:
+        """Of a learned law the closed forms that fit it; nothing of another effect."""
+        law = self.model.effect(found.best)
+        if not isinstance(law, LearnedLaw):
+            return {}
+        return {'forms': [form.to_dict() for form in forms_of(law)]}
+
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
@@ -206,14 +235,14 @@ class Diagnosis:
             'reason': self.reason,
             'p_value': self.p_value,
             'accepted': list(self.accepted),
-            'classes': [asdict(found) for found in self.classes],
+            'classes': [asdict(found) | self._forms(found) for found in self.classes],
             'rmse_um': {
                 'before': before.rmse_um,
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
                 'noise_floor': self.noise_floor_um,
-                'left_out': 'experiments' if self.study.has_several_parts else 'points',
+                'left_out': 'experiments' if self.left_out == 'parts' else 'points',
             },
             'experiments': [
                 {'name': one.name, 'rmse_before_um': old.rmse_um, 'rmse_after_um': new.rmse_um}
@@ -223,6 +252,7 @@ class Diagnosis:
                     strict=True,
                 )
             ],
+            'worse': list(self.worse),
             'unknown': None if self.unknown is None else asdict(self.unknown),
             'not_testable': list(self.not_testable),
             'detectable': self.detectable,

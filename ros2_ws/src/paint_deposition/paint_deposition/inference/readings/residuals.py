@@ -95,3 +95,9 @@ class Residuals:
             'chi_square_per_reading': self.chi_square_per_reading,
             'p_value': self.p_value,
         }
+
+
+def is_worse(before: Residuals, after: Residuals) -> bool:
+    """Whether a model is further off the same readings by more than their noise explains."""
+    noise_um = root_mean_square(before.sigma_um)
+    return after.rmse_um > before.rmse_um + noise_um * np.sqrt(2.0 / len(before))

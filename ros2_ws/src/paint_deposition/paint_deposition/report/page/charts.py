@@ -212,9 +212,10 @@ def history_figure(data: ReportData) -> dict[str, Any] | None:
         return None
     steps = data.diagnosis.history
     names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
+    left_out = f'{data.diagnosis.left_out} left out'
     bars = [
         ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
-        ('points left out', [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
+        (left_out, [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
     ]
     traces = [
         {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},

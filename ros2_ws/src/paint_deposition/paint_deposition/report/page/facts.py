@@ -89,7 +89,7 @@ def learned(data: ReportData, diagnosis: Diagnosis, what: str) -> str:
         return ''
     laws = [f'a {row["name"].removeprefix("learned ")} ({_values(row)})' for row in rows]
     before, after = diagnosis.history[-2:]
-    return f'{what} was learned as {joined(laws)}. {_errors(data, before, after)}'
+    return f'{what} was learned as {joined(laws)}. {_errors(diagnosis, before, after)}'
 
 
 def left_out(data: ReportData) -> str:
@@ -114,14 +114,15 @@ def changes(data: ReportData, diagnosis: Diagnosis) -> str:
         for row in accepted_rows(data)
         if not is_learned(row['id'])
     )
-    return added and f'{added} {_errors(data, diagnosis.history[0], diagnosis.history[-1])}'
+    return added and f'{added} {_errors(diagnosis, diagnosis.history[0], diagnosis.history[-1])}'
 
 
-def _errors(data: ReportData, before: Step, after: Step) -> str:
+def _errors(diagnosis: Diagnosis, before: Step, after: Step) -> str:
+    worse = f' Worse than before: {"; ".join(diagnosis.worse)}.' if diagnosis.worse else ''
     return (
-        f'At points left out of the fit the error goes from {micrometres(before.holdout_rmse_um)} '
-        f'to {micrometres(after.holdout_rmse_um)}; the gauge and the texture of the film scatter '
-        f'by {micrometres(data.study.noise_floor_um)}.'
+        f'At {diagnosis.left_out} left out of the fit the error goes from '
+        f'{micrometres(before.holdout_rmse_um)} to {micrometres(after.holdout_rmse_um)}; gauge '
+        f'and texture of the film scatter by {micrometres(diagnosis.noise_floor_um)}.{worse}'
     )
 
 

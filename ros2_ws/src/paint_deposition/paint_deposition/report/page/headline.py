@@ -244,7 +244,10 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     left_out = [f'{step.holdout_rmse_um:.2f}' for step in diagnosis.history]
     found = [
         (f'RMSE, {label}', errors[0] if len(errors) > 1 else '', errors[-1], 'µm')
-        for label, errors in (('fitted points', fitted), ('points left out', left_out))
+        for label, errors in (
+            ('fitted points', fitted),
+            (f'{diagnosis.left_out} left out', left_out),
+        )
     ]
     found.append(floor)
     named = [

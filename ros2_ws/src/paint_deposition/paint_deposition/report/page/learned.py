@@ -14,6 +14,8 @@ from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR
 from paint_deposition.effects.learned.place import LearnedMap, places_m
+from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
+from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.kernel.laws import Ray
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.layout import (
@@ -86,6 +88,11 @@ def _traces(law: LearnedCurve, library: Mapping[str, type[Effect]]) -> tuple[str
         dashed = {'color': INK, 'width': 1.5, 'dash': 'dash'}
         traces.append(scatter(_shown(law, values), curve, 'lines', line=dashed, **hover))
         title += f'; dashed: law of {effect_name(effect.id)}'
+    for form in forms_of(law)[:1]:
+        dotted = {'color': INK, 'width': 1.5, 'dash': 'dot'}
+        curve = form(variable_at(law, values))
+        traces.append(scatter(_shown(law, values), curve, 'lines', line=dotted, **hover))
+        title += f'; dots: {form.formula} ({percent(form.probability)})'
     return title, traces
 
 

@@ -1,0 +1,90 @@
+"""A learned law written as an effect: it loads, is absent at its defaults, and gives its film."""
+
+import numpy as np
+import pytest
+from paint_deposition.effects.catalogue import LEARNED
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.files.model_file import read_model
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis.closed_forms import forms_of
+from paint_deposition.report.writers.effect_file import effect_entry, write_effect_file
+from small_campaign import small_campaign
+
+KNOTS, SD = 12, 0.02
+RANGES = {
+    'incidence_deg': (0.0, 70.0), 'standoff_ratio': (0.7, 1.6), 'time_s': (0.0, 40.0),
+    'spray_pass': (0.0, 7.0), 'stroke_end_m': (0.0, 0.5), 'since_trigger_s': (0.0, 1.0),
+    'speed_m_per_s': (0.1, 0.5), 'curvature_per_m': (-4.0, 4.0), 'edge_distance_m': (0.0, 0.25),
+    'film_um': (0.0, 60.0), 'across_m': (-0.5, 0.5),
+}  # fmt: skip
+SHAPES = {
+    'rising': lambda u: 0.9 + 0.3 * u,
+    'levelling off': lambda u: 1.2 - 0.4 * np.exp(-u / 0.25),
+    'stepping': lambda u: 0.8 + 0.4 / (1.0 + np.exp((0.5 - u) / 0.08)),
+    'falling as a power': lambda u: (1.0 + u) ** -0.7,
+}
+
+
+def learned(covariate: str, shape: str = 'rising', kind: str = 'factor'):
+    low, high = RANGES.get(covariate, (0.0, 1.0))
+    law = LEARNED[covariate](low=low, high=high, learned=(0.0,) * KNOTS)
+    u = (law.knots - law.knots[0]) / np.ptp(law.knots)
+    h = SHAPES[shape](u) - 1.0
+    scale = 10.0 if kind == 'addition' else 1.0
+    return type(law)(
+        low=low, high=high, kind=kind, learned=tuple(scale * h), sd=(scale * SD,) * KNOTS
+    )
+
+
+@pytest.fixture(scope='module')
+def door(tmp_path_factory):
+    folder = tmp_path_factory.mktemp('campaign')
+    return small_campaign(folder, experiments=('door',)).experiments[0]
+
+
+def film_um(experiment, model: DepositionModel) -> np.ndarray:
+    """What the gauge shows at the readings."""
+    painted = FilmIntegrator(experiment.measured_points, model, 'double')
+    painted.add(experiment.path)
+    return painted.gauge_um
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('covariate', 'shape', 'kind'),
+    [
+        *((covariate, 'rising', 'factor') for covariate in CURVES),
+        *(('standoff_ratio', shape, 'factor') for shape in SHAPES),
+        *(('time_s', shape, 'factor') for shape in SHAPES),
+        *(('edge_distance_m', shape, 'addition') for shape in SHAPES),
+    ],
+)
+def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
+    covariate, shape, kind, door, tmp_path
+):
+    law = learned(covariate, shape, kind)
+    forms = forms_of(law)
+    assert forms
+    plain = film_um(door, DepositionModel())
+    wanted = film_um(door, DepositionModel(effects=(law,)))
+    for number, form in enumerate(forms):
+        file = write_effect_file(tmp_path / f'my_law_{number}.py', law, form)
+        effect = load_effect_file(file)
+        assert effect().is_neutral
+        assert film_um(door, DepositionModel(effects=(effect(),))) == pytest.approx(plain)
+        entry = effect_entry(form, file.name)
+        (tmp_path / 'model.yaml').write_text(f'effects: [{{{entry}}}]\n')
+        assert entry in file.read_text().replace('"', '')
+        model = read_model(tmp_path / 'model.yaml')
+        band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
+        # Rays beyond the range of the readings are few: there the law itself fades to neutral.
+        assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
+
+
+def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):
+    law = learned('time_s')
+    file = write_effect_file(tmp_path / 'air_drift.py', law, forms_of(law)[0])
+    assert load_effect_file(file).id == 'learned_air_drift'
