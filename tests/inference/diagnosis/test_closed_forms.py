@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from paint_deposition.effects.catalogue import LEARNED
 
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.inference.diagnosis.closed_forms import fitting_forms, forms_of
 
 KNOTS = 14

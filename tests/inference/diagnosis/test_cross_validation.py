@@ -104,6 +104,9 @@ class LinearTrial(Trial):
     def weighed(self):
         return [Weighed.of(self.fit, self.usual, size, np.inf) for size in self.sizes]
 
+    def beside(self, fit):
+        return fit.with_remainder(self.usual.of_parts(self.best.sizes))
+
 
 def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> LinearTrial:
     """On readings of noise that a change (P,) moved, with an effect of each form (P,)."""

@@ -39,7 +39,7 @@ CHANCE = 0.01
 PLACE, FILM = np.linspace(0.0, 3.0, READINGS), 40.0
 SMALL, LARGE, BEYOND = (Sizes(share, 0.0, 1, 0.0) for share in (0.006, 0.06, BEYOND_NATURE))
 # A change that neighbours share, and one that they do not, of one length.
-WAVE = np.sin(4.0 * PLACE)
+WAVE = np.sin(2.0 * PLACE)
 JAGGED = np.linalg.norm(WAVE) * np.linalg.qr(
     np.random.default_rng(2).normal(size=(READINGS, 1))
 )[0].ravel()  # fmt: skip

@@ -183,7 +183,9 @@ def test_points_at_one_place_are_left_out_together(spotted):
 
 def test_of_one_part_patches_are_left_out(spotted):
     """A neighbour would tell what the model cannot."""
-    study = Study.of(spotted)
+    one = spotted.experiments[0]
+    readings = Readings.of(grid_m(), np.full(len(grid_m()), 20.0))
+    study = Study.of(Campaign((Experiment.of('panel', PANEL, one.path, readings),)))
     folds, places_m = study.folds(), study.campaign.positions_m
     assert len(np.unique(folds)) == FOLDS
     centres_m = np.array([places_m[folds == k].mean(axis=0) for k in range(FOLDS)])
