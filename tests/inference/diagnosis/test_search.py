@@ -126,7 +126,7 @@ def test_nothing_is_added_where_nothing_acts(clean):
 def misled(search: Search) -> Trial:
     """A fit without effects that has come to rest in a wrong pattern."""
     run = search.run
-    wrong = search.nothing.fit.model.planar.model_copy(update={'r_m': 0.02, 'sigma1_m': 0.2})
+    wrong = search.nothing.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
     model = search.nothing.fit.model.model_copy(update={'planar': wrong})
     study, parameters = run.study, search.nothing.fit.parameters
     vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
@@ -146,7 +146,7 @@ def test_without_an_effect_the_better_of_two_fits_is_kept(clean):
     assert clean.without(more, 'flow_drift') is good
     clean._trials[frozenset()] = bad
     again = clean.without(more, 'flow_drift')
-    assert again.log_weight_alone == pytest.approx(good.log_weight_alone, abs=3.0)
+    assert again.log_weight_alone == pytest.approx(good.log_weight_alone, abs=SAME)
     clean._trials[frozenset()] = good
 
 
@@ -157,6 +157,5 @@ def test_what_only_led_to_a_better_pattern_is_no_effect(clean):
     stages = clean.stages()
     clean._trials, clean.nothing = trials, good
     assert stages[-1].here.names == frozenset()
-    assert stages[-1].here.log_weight == pytest.approx(good.log_weight, abs=3.0)
+    assert stages[-1].here.log_weight == pytest.approx(good.log_weight, abs=SAME)
     assert bad.log_weight < good.log_weight - 10.0
-    assert bad.space.p_value(seed=0) < 0.05
