@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from paint_deposition.effects.catalogue import LEARNED
 
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.user_effects import load_effect_file

@@ -32,6 +32,8 @@ from paint_deposition.inference.readings.residuals import is_worse
 ALPHA = 0.05
 # Effects that are at least this probable are listed, and this many named where none is sure.
 WORTH_LISTING, NAMED = 0.05, 3
+# Errors this many times as large as the noise of gauge and texture need a word.
+BEYOND_NOISE = 1.3
 # Share by which learned laws must lower the error on readings left out.
 LEAST_GAIN = 0.02
 
@@ -64,8 +66,7 @@ def diagnose(
     run.left_over = nothing.figures
     p_value = nothing.p_value(seed)
     if p_value >= ALPHA:
-        reason = 'The readings agree with the model to within the noise of the gauge.'
-        return run.diagnosis(p_value, 'none_missing', reason)
+        return run.diagnosis(p_value, 'none_missing', _agrees(run))
     progress('refitting with what may be missing')
     stages = search.stages()
     best, groups = search.groups(stages[-1].here)
@@ -157,6 +158,19 @@ def _others(run: Run, best: Trial) -> tuple[EffectClass, ...]:
         fit = run.fitted_with([*run.taken, run.candidates[cause][0]])
         found.append(run.described((cause,), probability, run.history[-1], fit))
     return tuple(found)
+
+
+def _agrees(run: Run) -> str:
+    """In what sense nothing is missing."""
+    rmse_um, noise_um = run.history[0].rmse_um, run.study.noise_floor_um
+    if rmse_um < BEYOND_NOISE * noise_um:
+        return 'The readings agree with the model to within the noise of the gauge.'
+    return (
+        f'The model misses the readings by {rmse_um:.2f} µm, where gauge and texture scatter by '
+        f'{noise_um:.2f}: no more than a footprint that differs from eq. (1), or the usual '
+        'variation between sprays, would. Another part sprayed otherwise would show more; refit '
+        'with --add learned:footprint to predict this setting better.'
+    )
 
 
 def _in_words(found: EffectClass) -> str:

@@ -7,6 +7,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.fitting.condensing import MANY, condensed, thinned
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.fitting.outliers import (
     FEWEST,
@@ -34,6 +35,8 @@ def clean_and_fit(
 ) -> tuple[Study, Fit]:
     """A campaign prepared for inference without its outliers, and the pattern fitted to it.
 
+    Readings by the thousand are condensed first, see ``condensing``.
+
     Args:
         start: first guess of the pattern; its effects are refitted, too.
         effects: those whose amplitudes may be varied later.
@@ -41,6 +44,9 @@ def clean_and_fit(
     Raises:
         ReadingsError: readings in another unit, with the remedy.
     """
+    if len(campaign) > MANY:
+        rough = _fitted(Study.of(thinned(campaign, seed), effects), start, starts, seed, known)
+        campaign = condensed(campaign, rough.model)
     study = Study.of(campaign, effects)
     fit = _fitted(study, start, starts, seed, known)
     if len(study) < FEWEST or not fit.predicted_um.any():

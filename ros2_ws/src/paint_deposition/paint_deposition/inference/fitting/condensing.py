@@ -1,0 +1,134 @@
+"""Scans and other readings by the thousand, condensed to the means of small cells.
+
+A few hundred cells show all that is wider than a cell, and the film of a pass is. What is averaged
+is how far the readings are off a roughly fitted model, so that the bend of the film within a cell
+does not count. Within a cell they scatter by the gauge's noise and the film's finest texture: that
+is how well its mean is known. What is coarser than a cell is not averaged out.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.fitting.forward import Forward
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.readings import Readings
+
+# Points in all from which on readings are condensed, and cells that they are condensed to.
+MANY, CELLS = 600, 500
+# Halvings of the range of edges in which that of the cells is searched.
+HALVINGS = 30
+# The scatter is estimated about planes through so many neighbours on average, five at the least.
+NEIGHBOURS, LEAST = 12, 5
+
+
+def thinned(campaign: Campaign, seed: int) -> Campaign:
+    """The campaign with as many of its points as there may be cells."""
+    points = np.random.default_rng(seed).choice(len(campaign), CELLS, replace=False)
+    return campaign.without(~np.isin(campaign.means.owner, points))
+
+
+def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
+    """The campaign with cells for points.
+
+    Args:
+        campaign: with many points.
+        model: roughly fitted to it.
+
+    Raises:
+        ReadingsError: readings so far apart that they do not show how they scatter.
+    """
+    predicted_um = Forward(campaign, model.effects).predict_um(model)[campaign.means.owner]
+    off_um = campaign.readings.thickness_um - predicted_um
+    owner = campaign.experiment_of[campaign.means.owner]
+    cells = Campaign(
+        tuple(
+            _in_cells(part, off_um[owner == k], int(np.ceil(CELLS * len(part) / len(campaign))))
+            for k, part in enumerate(campaign.experiments)
+        )
+    )
+    film_um = Forward(cells, model.effects).predict_um(model) + cells.means.mean_um
+    made = []
+    for k, part in enumerate(cells.experiments):
+        readings = replace(part.readings, thickness_um=film_um[cells.experiment_of == k])
+        made.append(_measured(part, readings))
+    return replace(campaign, experiments=tuple(made))
+
+
+def _measured(part: Experiment, readings: Readings) -> Experiment:
+    return Experiment.of(
+        part.name, part.surface, part.path, readings, part.files, part.settings,
+        part.switched_off, part.frame_id,
+    )  # fmt: skip
+
+
+def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
+    """A part with so many cells at the most, and (N,) how far readings are off as the film."""
+    readings, points = part.readings, part.measured_points
+    kind = np.unique([readings.session, readings.group], axis=1, return_inverse=True)[1].ravel()
+    place_m, normals = (
+        values[part.means.owner] for values in (points.positions_m, points.normals)
+    )
+    cell = _cells(place_m, kind, most)
+    count, first = np.bincount(cell), np.unique(cell, return_index=True)[1]
+
+    def mean(values: np.ndarray) -> np.ndarray:
+        return np.stack([np.bincount(cell, v) / count for v in values.T], axis=-1)
+
+    near = _cells(place_m, kind, max(len(readings) // NEIGHBOURS, 1))
+    stated_um = np.nan_to_num(readings.sigma_um)
+    noise_um = max(_scatter_um(place_m, off_um, near), float(np.sqrt(np.mean(stated_um**2))))
+    if noise_um == 0.0:
+        raise ReadingsError(
+            f'{readings.source}: {len(readings)} readings lie too far apart to show the noise of '
+            'the gauge; state it in a column sigma_um'
+        )
+    understood = (
+        f'{readings.understood or readings.source}; {len(readings)} readings in {len(count)} '
+        f'cells, each off its neighbours by {noise_um:.2f} µm'
+    )
+    return _measured(
+        part,
+        Readings(
+            mean(place_m),
+            np.bincount(cell, off_um) / count,
+            np.array([f'cell {k + 1}' for k in range(len(count))]),
+            readings.group[first],
+            noise_um / np.sqrt(count),
+            mean(normals),
+            readings.source,
+            readings.session[first],
+            understood,
+        ),
+    )
+
+
+def _cells(place_m: np.ndarray, kind: np.ndarray, most: int) -> np.ndarray:
+    """(N,) cell of each reading: cubes, of one kind (N,) each, as small as their number allows."""
+
+    def numbered(edge_m: float) -> np.ndarray:
+        boxes = np.floor((place_m - place_m.min(axis=0)) / edge_m).astype(np.int64)
+        keys = np.column_stack([boxes, kind])
+        return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
+
+    small, large = 1e-5, 2.0 * float(np.ptp(place_m, axis=0).max()) + 1e-3
+    for _ in range(HALVINGS):
+        edge_m = float(np.sqrt(small * large))
+        small, large = (edge_m, large) if numbered(edge_m).max() >= most else (small, edge_m)
+    return numbered(large)
+
+
+def _scatter_um(place_m: np.ndarray, off_um: np.ndarray, near: np.ndarray) -> float:
+    """Standard deviation about planes through neighbours (N,), pooled; 0 if none shows it."""
+    squares, freedom = 0.0, 0
+    order = np.argsort(near, kind='stable')
+    for rows in np.split(order, np.cumsum(np.bincount(near))[:-1]):
+        if len(rows) < LEAST:
+            continue
+        design = np.column_stack([np.ones(len(rows)), place_m[rows] - place_m[rows].mean(axis=0)])
+        amounts, _, rank, _ = np.linalg.lstsq(design, off_um[rows], rcond=1e-6)
+        left = off_um[rows] - design @ amounts
+        squares, freedom = squares + float(left @ left), freedom + len(rows) - int(rank)
+    return float(np.sqrt(squares / freedom)) if freedom else 0.0
