@@ -211,10 +211,10 @@ def test_no_probability_is_printed_as_certain(probability, text):
     assert percent(probability) == text
 
 
-def test_the_file_says_what_others_rely_on(found, nothing_found):
+def test_the_file_says_what_others_rely_on(refitted, nothing_found):
     place = Place(np.array([0.1, 0.2, 0.3]), 'door', 'tells them apart')
     spray = Spray('the same passes at half the flow', ('air_drift', 'tcp_tilt'), 4.2, 0.6)
-    content = json.loads(json_text(found.to_dict()))
+    content = json.loads(json_text(refitted.to_dict()))
     assert content['verdict'] == 'effect_missing'
     assert isinstance(content['p_value'], float)
     assert content['accepted'] == ['faraday_shielding']
