@@ -8,6 +8,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.remainder import Remainder
 from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -90,6 +91,13 @@ def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
     at = np.arange(knots)[:, np.newaxis] / spread
     basis = Basis(CURVES['height_fraction'], {}, hat_weights(place, knots), at, 1.0 / spread)
     return basis.random(1.0, length)
+
+
+def no_remainder(count: int) -> Remainder:
+    """Nothing that nature leaves over at so many readings."""
+    none = np.zeros((count, count))
+    lengths_m = (0.02, 0.05, 0.1)
+    return Remainder(none[:, :1], none[:1, :1], none, 3 * (none,), 3 * (none,), False, lengths_m)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

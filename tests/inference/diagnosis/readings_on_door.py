@@ -34,3 +34,20 @@ def on_door(**options) -> Experiment:
 
 def on_panel(name: str = 'panel') -> Experiment:
     return replace(measured(panel(0.4, 0.04), 'panel'), name=name)
+
+
+def plate_with_a_back() -> Experiment:
+    """A panel with a reading on its other side."""
+    front = panel(0.4, 0.04)
+    back = front.vertices_m - [0.0, 0.002, 0.0], front.faces[:, ::-1] + len(front.vertices_m)
+    plate = Surface.from_triangles(
+        np.concatenate([front.vertices_m, back[0]]), np.concatenate([front.faces, back[1]]), 0.04
+    )
+    part = measured(plate, 'panel')
+    behind = part.readings.positions_m[0] - [0.0, 0.002, 0.0]
+    readings = Readings.of(
+        np.vstack([part.readings.positions_m, behind]),
+        np.append(part.readings.thickness_um, 0.0),
+        normals=np.vstack([part.readings.normals, -part.readings.normals[0]]),
+    )
+    return Experiment.of('plate', plate, part.path, readings)

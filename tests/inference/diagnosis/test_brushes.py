@@ -41,7 +41,8 @@ def test_the_hidden_effect_is_named_and_the_error_falls(with_rim, tmp_path):
     gain = found['classes'][0]['parameters']['gain']
     assert gain['low'] <= truth['hidden'][0]['amplitude'] <= gain['high']
     error = found['rmse_um']
-    assert error['holdout_after'] < 0.85 * error['holdout_before']
+    # Whole patches are left out, where the edge is and where it is not.
+    assert error['holdout_after'] < 0.97 * error['holdout_before']
     assert error['after'] < error['noise_floor'] < error['before']
     model = read_model_file(tmp_path / 'd/model.yaml').model
     narrower = [brush.planar.r_m + brush.planar.sigma1_m for brush in model.brushes]

@@ -1,7 +1,6 @@
 """Leaving out points by moving the fit linearly is refitting, where the model is linear."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -9,25 +8,20 @@ import pytest
 from inference.diagnosis.linear import (
     KNOWN,
     PARAMETERS,
-    bounds,
     fit_linear,
     linear_fit,
+    no_remainder,
     null_of,
     smooth_curves,
 )
-from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis import learning
-from paint_deposition.inference.diagnosis.cross_validation import (
-    Stage,
-    hold_out,
-    left_out,
-    nested_rmse_um,
-)
-from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
+from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out, left_out
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
-from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
+from paint_deposition.inference.diagnosis.model_space import Weighed
+from paint_deposition.inference.diagnosis.remainder import Sizes
+from paint_deposition.inference.diagnosis.search import Stage, Trial
 from paint_deposition.inference.diagnosis.smooth_laws import RandomLaw
 from paint_deposition.inference.readings.residuals import root_mean_square
 
@@ -66,18 +60,20 @@ def test_readings_left_out_are_predicted_worse_than_fitted_ones():
     assert worse == 20
 
 
-# Choosing causes and laws without the points left out.
+# Choosing effects and laws without the points left out.
 
 POINTS, SIGMA_UM, KNOTS = 80, 0.7, 8
 FOLDS = np.arange(POINTS) // 8
 PLACE = np.linspace(0.0, KNOTS - 1.0, POINTS)
 FORM = np.where(np.arange(POINTS) % 4 == 0, 2.0, 0.2)
+OTHER = np.where(np.arange(POINTS) % 5 == 0, 2.0, -0.3)
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
+NOTHING_LEFT = no_remainder(POINTS)
 
 
 @dataclass(frozen=True)
 class Points:
-    """What the nested search reads of a study."""
+    """Readings in folds."""
 
     sigma_um: np.ndarray
 
@@ -85,73 +81,130 @@ class Points:
         return FOLDS
 
 
+@dataclass(frozen=True)
+class LinearRun:
+    """A run whose models are exactly linear: a fit is the null model that it stands for."""
+
+    study: Points
+    freedom: float = np.inf
+    any_form: tuple[Explanation, ...] = ()
+
+    def plain(self, fit: NullModel) -> NullModel:
+        return fit
+
+
+class LinearTrial(Trial):
+    """A set of effects on such a run, beside which nature leaves nothing over."""
+
+    @property
+    def remainder(self):
+        return self.usual
+
+    @property
+    def weighed(self):
+        return [Weighed.of(self.fit, self.usual, size, np.inf) for size in self.sizes]
+
+    def beside(self, fit):
+        return fit.with_remainder(self.usual.of_parts(self.best.sizes))
+
+
+def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> LinearTrial:
+    """On readings of noise that a change (P,) moved, with an effect of each form (P,)."""
+    base = null_of(linear_fit(np.random.default_rng(seed), POINTS))
+    effects = [2.0 * form[:, np.newaxis] for form in forms]
+    null = NullModel.of(np.hstack([base.columns, *effects]), base.raw + change)
+    study = Points(np.full(POINTS, SIGMA_UM) if sigma_um is None else sigma_um)
+    names = frozenset(f'effect {k}' for k in range(len(forms)))
+    return LinearTrial(LinearRun(study), names, null, NOTHING_LEFT, [Sizes(0.0, 0.0, 0, 0.0)])
+
+
+def stages_of(change: np.ndarray, **options) -> list[Stage]:
+    """The search from nothing on to the effect and to another one beside it."""
+    nothing, edge, both = (trial(change, *forms, **options)
+                           for forms in ((), (FORM,), (FORM, OTHER)))  # fmt: skip
+    found = [Stage(nothing, [edge]), Stage(edge, [both]), Stage(both, [])]
+    last = next(k for k, stage in enumerate(found) if stage.chosen() is stage.here)
+    return found[: last + 1]
+
+
 def learnable(random: RandomLaw) -> Explanation:
     columns = random.change_um
     return Explanation(UNKNOWN, columns, np.zeros(columns.shape[1]), 1.0, random=random)
 
 
-def space_of(change: np.ndarray, seed: int = 0, more: Sequence[Explanation] = ()) -> ModelSpace:
-    """Edge build and curves over the place, on readings of noise that a change (P,) moved."""
-    base = null_of(linear_fit(np.random.default_rng(seed), POINTS))
-    null = NullModel.of(base.columns, base.raw + change)
-    law = Sensitivity(EdgeBuild(), ('peak',), FORM[:, np.newaxis], *bounds([1]))
-    edge = Explanation(EdgeBuild.id, law.columns, law.sides, 1.0, law)
-    curves = learnable(smooth_curves(PLACE, KNOTS, 0.5))
-    return ModelSpace(null, [edge, curves, *more], np.inf)
+CURVES = [learnable(smooth_curves(PLACE, KNOTS, 0.5))]
 
 
-def nested(space: ModelSpace) -> np.ndarray:
+def nested(stages, options=CURVES, without=()) -> np.ndarray:
     """By the number of laws learned, in standard deviations of the noise."""
-    study = Points(np.full(POINTS, SIGMA_UM))
-    return nested_rmse_um([Stage(space, space.null)], study) / SIGMA_UM
+    return nested_rmse_um(stages, options, without) / SIGMA_UM
+
+
+@pytest.mark.parametrize(('change', 'found'), [(0.0, 0), (2.0, 1)])
+def test_errors_are_those_of_the_set_that_the_other_points_call_for(change, found):
+    stages = stages_of(change * FORM)
+    assert len(stages) == found + 1
+    expected = root_mean_square(hold_out(stages[found].here.fit, FOLDS))
+    assert nested(stages)[0] == pytest.approx(expected, rel=1e-12)
+
+
+def test_a_fold_that_calls_for_another_set_does_not_go_on():
+    """The effect shows in one fold alone: without its points nobody would look for more."""
+    here = FOLDS == 3
+    stages = stages_of(4.0 * FORM * here)
+    nothing, edge, *_ = [stage.here for stage in stages]
+    deviation = hold_out(edge.fit, FOLDS)
+    deviation[here] = left_out(nothing.fit, [], here)
+    assert nested(stages)[0] == pytest.approx(root_mean_square(deviation), rel=1e-12)
+    assert stages[0].chosen(~here) is nothing
+    assert stages[0].chosen() is edge
 
 
 def test_on_noise_the_nested_errors_are_larger_than_the_fitted_one():
     for seed in range(5):
         fitted = linear_fit(np.random.default_rng(seed), POINTS).residual
-        assert nested(space_of(np.zeros(POINTS), seed)).min() > root_mean_square(fitted)
+        assert nested(stages_of(0.0 * FORM, seed=seed)).min() > root_mean_square(fitted)
 
 
 def test_what_acts_lowers_the_nested_error_to_the_noise():
     """The effect by its law; the wave, which no law has, by one learned curve."""
-    assert nested(space_of(2.0 * FORM))[0] == pytest.approx(1.0, abs=0.25)
-    without, *with_laws = nested(space_of(WAVE))
+    assert nested(stages_of(2.0 * FORM))[0] == pytest.approx(1.0, abs=0.25)
+    without, *with_laws = nested(stages_of(WAVE))
     assert without > 1.7
     assert with_laws == pytest.approx([1.0] * MOST_LAWS, abs=0.3)
-    without, *with_laws = nested(space_of(WAVE + 2.0 * FORM))
+    without, *with_laws = nested(stages_of(WAVE + 2.0 * FORM))
     assert max(with_laws) < 0.8 * without
+    # A covariate that is left out is not learned.
+    kept_out = nested(stages_of(WAVE), without=(CURVES[0].learns,))
+    assert kept_out == pytest.approx([kept_out[0]] * (1 + MOST_LAWS))
+
+
+def test_a_law_must_say_more_than_any_footprint_could():
+    wave = replace(NOTHING_LEFT, footprint=3.0 * CURVES[0].columns)
+    stages = [replace(one, here=replace(one.here, usual=wave)) for one in stages_of(WAVE)]
+    assert nested(stages[-1:]) == pytest.approx([nested(stages_of(WAVE))[0]] * (1 + MOST_LAWS))
 
 
 def test_laws_chosen_on_all_points_flatter_and_nested_ones_do_not(monkeypatch):
     """On noise alone, of thirty laws that explain nothing, the best one must be learned."""
     monkeypatch.setattr(learning, 'WORTH_LEARNING', -np.inf)
     folds = [fold == FOLDS for fold in np.unique(FOLDS)]
+    nothing_else = np.zeros((POINTS, POINTS))
     without, chosen_on_all, chosen_inside = [], [], []
     for seed in range(24):
         random = np.random.default_rng([7, seed])
         none = [learnable(smooth_curves(random.permutation(PLACE), KNOTS, 0.5)) for _ in range(30)]
-        space = space_of(np.zeros(POINTS), seed, none)
-        ((k, size),) = learning.choose_laws(space.null, space.explanations, np.inf)
-        columns = [size * space.explanations[k].columns]
-        errors = np.concatenate([left_out(space.null, columns, out) for out in folds])
+        one = trial(np.zeros(POINTS), seed=seed)
+        ((k, size),) = learning.choose_laws(one.fit, nothing_else, none, np.inf)
+        columns = [size * none[k].columns]
+        errors = np.concatenate([left_out(one.fit, columns, out) for out in folds])
         chosen_on_all.append(root_mean_square(errors))
-        before, after, *_ = nested(space)
+        before, after, *_ = nested([Stage(one, [])], none)
         without.append(before)
         chosen_inside.append(after)
     gain, nested_gain = np.subtract(without, chosen_on_all), np.subtract(without, chosen_inside)
     assert gain.mean() > 3.0 * gain.std() / np.sqrt(len(gain))
     assert nested_gain.mean() < 0.0
-
-
-@pytest.mark.parametrize('goes_on', [True, False])
-def test_the_search_goes_on_where_the_other_points_call_for_the_same(goes_on):
-    """Of two stages, each fold reaches the second if it accepts what was accepted at the first."""
-    first, second = space_of(2.0 * FORM), space_of(np.zeros(POINTS))
-    accepted = frozenset([EdgeBuild.id] if goes_on else [])
-    both = [Stage(first, first.null, accepted), Stage(second, second.null)]
-    errors = nested_rmse_um(both, Points(np.ones(POINTS)))
-    assert errors == pytest.approx(nested(second if goes_on else first), rel=1e-12)
-    assert nested(first) != pytest.approx(nested(second), rel=1e-3)
 
 
 def test_a_point_left_out_has_no_part_in_its_own_prediction():
@@ -160,11 +213,14 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction():
     Then the error there is that of before plus what was added, and its square is a parabola.
     """
     out = FOLDS == 3
-    only_there = Points(out.astype(float))
+    nothing, edge = (), (FORM,)
 
     def square(added: float) -> np.ndarray:
-        space = space_of(WAVE + 2.0 * FORM + added * out)
-        return POINTS * nested_rmse_um([Stage(space, space.null)], only_there) ** 2
+        here, tried = (
+            trial(WAVE + 2.0 * FORM + added * out, *forms, sigma_um=out.astype(float))
+            for forms in (nothing, edge)
+        )
+        return POINTS * nested_rmse_um([Stage(here, [tried]), Stage(tried, [])], CURVES) ** 2
 
     curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
     assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)

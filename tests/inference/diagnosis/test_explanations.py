@@ -1,25 +1,29 @@
-"""Errors of the laws of accepted effects: smooth, in proportion to what the effects do."""
+"""What may be missing, and by how much the laws of effects that act may be off."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from booth import MODEL, panel
+from booth import MODEL
 from inference.diagnosis.linear import linear_fit
-from inference.diagnosis.readings_on_door import measured, on_door, study_of
+from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.fog_gradient import FogGradient
-from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.overspray_fog import OversprayFog
-from paint_deposition.inference.diagnosis.explanations import LAW_ERROR, law_errors
+from paint_deposition.inference.diagnosis.explanations import (
+    LAW_ERROR,
+    UNKNOWN,
+    law_errors,
+    of_any_form,
+    of_effects,
+    of_footprint,
+)
+from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.part.surface import Surface
 
 EDGE = EdgeBuild(gain=0.3, length_m=0.05)
 
@@ -53,7 +57,7 @@ def test_without_effects_no_law_is_off(study):
     assert errors(study, EDGE, kept=()).shape == (len(study), 0)
 
 
-@pytest.mark.parametrize('effect', [EdgeBuild(), GaugeZero()], ids=lambda effect: effect.id)
+@pytest.mark.parametrize('effect', [EdgeBuild(), OversprayFog()], ids=lambda effect: effect.id)
 def test_an_effect_that_does_nothing_has_no_error(study, effect):
     assert not errors(study, effect).any()
 
@@ -63,7 +67,6 @@ def test_an_effect_that_does_nothing_has_no_error(study, effect):
     [
         (OversprayFog(fog_um=2.0), OversprayFog(fog_um=4.0)),
         (FogGradient(fog_um=2.0), FogGradient(fog_um=4.0)),
-        (GaugeZero(offset_um=1.0), GaugeZero(offset_um=2.0)),
     ],
     ids=lambda effect: effect.id,
 )
@@ -72,10 +75,16 @@ def test_the_error_is_in_proportion_to_the_effect(study, effect, twice):
     np.testing.assert_allclose(errors(study, twice), 2.0 * errors(study, effect), rtol=1e-9)
 
 
-@pytest.mark.parametrize('effect', [OversprayFog(fog_um=3.0), GaugeGain(gain=0.08)], ids=repr)
-def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, effect):
-    expected = LAW_ERROR * np.abs(change_um(study, effect)) / study.sigma_um
-    assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
+def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study):
+    fog = OversprayFog(fog_um=3.0)
+    expected = LAW_ERROR * np.abs(change_um(study, fog)) / study.sigma_um
+    assert size(errors(study, fog)) == pytest.approx(expected, rel=0.03)
+
+
+@pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)
+def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
+    assert errors(study, effect.typical()).shape == (len(study), 0)
+    assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
 
 
 def test_over_two_covariates_the_error_is_as_large_as_over_one(study):
@@ -114,22 +123,40 @@ def test_an_effect_that_was_switched_off_has_no_error_on_that_part(study):
 
 def test_a_reading_where_no_paint_lands_has_no_error_of_a_free_law():
     """On the back of a plate the model predicts exactly 0: nothing there is a share of a film."""
-    front = panel(0.4, 0.04)
-    back = front.vertices_m - [0.0, 0.002, 0.0], front.faces[:, ::-1] + len(front.vertices_m)
-    plate = Surface.from_triangles(
-        np.concatenate([front.vertices_m, back[0]]), np.concatenate([front.faces, back[1]]), 0.04
-    )
-    part = measured(plate, 'panel')
-    behind = part.readings.positions_m[0] - [0.0, 0.002, 0.0]
-    readings = Readings.of(
-        np.vstack([part.readings.positions_m, behind]),
-        np.append(part.readings.thickness_um, 0.0),
-        normals=np.vstack([part.readings.normals, -part.readings.normals[0]]),
-    )
-    study = study_of(Experiment.of('plate', plate, part.path, readings))
+    study = study_of(plate_with_a_back())
     film_um = study.forward.predict_um(MODEL)
     assert film_um[-1] == 0.0 < film_um[:-1].min()
     assert type(EDGE).free_law == 'factor'
     found = size(errors(study, EDGE))
     assert found[-1] == pytest.approx(0.0)
     assert found[:-1].max() > 0.05
+
+
+def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
+    """How much paint there is in all is the pattern's."""
+    for found in (of_any_form(study, MODEL), of_footprint(study, MODEL)):
+        assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
+        for explanation in found:
+            assert explanation.cause == UNKNOWN
+            assert explanation.learns not in ('', 'film_um')
+            film_um = explanation.columns * study.sigma_um[:, np.newaxis]
+            assert np.abs(film_um.sum(axis=0)).max() < 1e-9 * np.abs(film_um).sum()
+            assert not explanation.sides.any()
+    rows = np.arange(len(study)) % 2 == 0
+    part = explanation.select(rows)
+    assert (part.learns, part.random) == (explanation.learns, explanation.random)
+    assert np.array_equal(part.columns, explanation.columns[rows])
+
+
+def test_what_the_model_has_is_not_looked_for():
+    study = study_of(on_panel())
+    fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=MODEL.with_effect(EDGE))
+    candidates = {name: neutral_shapes(EFFECTS[name])
+                  for name in ('edge_build', 'corner_slowdown', 'fog_gradient')}  # fmt: skip
+    found = list(of_effects(study, fit, candidates))
+    assert {explanation.cause for explanation in found} == {'corner_slowdown', 'fog_gradient'}
+    for cause in ('corner_slowdown', 'fog_gradient'):
+        own = [explanation for explanation in found if explanation.cause == cause]
+        assert len(own) == len(candidates[cause])
+        assert sum(explanation.share for explanation in own) == pytest.approx(1.0)
+        assert all(e.columns is e.law.columns and e.learns == '' for e in own)

@@ -11,7 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, FOOTPRINT_SHARE, LENGTHS
+from paint_deposition.inference.diagnosis.explanations import FACTOR, FOOTPRINT, LENGTHS
 from paint_deposition.inference.diagnosis.next_experiment import (
     EDGE_MARGIN_M,
     SPACING_M,
@@ -19,7 +19,7 @@ from paint_deposition.inference.diagnosis.next_experiment import (
     with_proposals,
 )
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_along, footprint_kinds
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_along
 from paint_deposition.inference.diagnosis.sprays import MENU, together
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.inference.fitting.forward import Forward
@@ -77,7 +77,7 @@ def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit)
     # Its amplitudes are not free: what they need of their prior is separation, too.
     assert predicted.precision == pytest.approx(1.0 / 9.0)
     basis = footprint_along(study.rays(fit.model), fit.model.patterns)
-    random = basis.random(FOOTPRINT_SHARE, LENGTHS[FOOTPRINT][0], footprint_kinds()[-1])
+    random = basis.random(FACTOR, LENGTHS[FOOTPRINT][0])
     law = random.learned(1e-3 * predicted.amounts)
     film_um = [
         Forward(study.campaign, (law,)).predict_um(
@@ -167,13 +167,11 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     alone = EffectClass(('air_drift',), 0.6, 'air_drift')
     group = replace(alone, members=('air_drift', 'tcp_offset', 'tcp_tilt'))
     other = EffectClass(('fog_gradient',), 0.3, 'fog_gradient')
-    unknown = Unknown('effect', 'tool_x_m', 0.01, {}, '')
-    footprint = replace(unknown, kind='footprint')
+    unknown = Unknown('tool_x_m', 0.01, {}, '')
     for diagnosis, expected in (
         (diagnosed(study, fit, group, other), ('air_drift', 'tcp_offset', 'tcp_tilt')),
         (diagnosed(study, fit, alone, other), ('air_drift', 'fog_gradient')),
         (diagnosed(study, fit, alone, unknown=unknown), ('air_drift', 'unknown')),
-        (diagnosed(study, fit, alone, unknown=footprint), ('air_drift',)),
     ):
         # The pattern may always be another one.
         assert rivals_of(diagnosis, EFFECTS).names == (*expected, 'footprint')

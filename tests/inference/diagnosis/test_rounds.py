@@ -6,43 +6,27 @@ for dozens of them.
 
 import numpy as np
 import pytest
-from scipy.stats import binom, kstest
+from scipy.stats import binom
 
-from inference.fitting.panels import PANEL, passes, readings_at
+from inference.fitting.panels import gauged
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.gauge_zero import GaugeZero
 from paint_deposition.effects.library.overspray_fog import OversprayFog
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis import run
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.inference.fitting.study import TEXTURE_SHARE
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.motion.path_builder import spray_path
 
 pytestmark = pytest.mark.slow
 
 BASE = DepositionModel()
-PATH, _ = spray_path(passes((0.3, 1.1, 0.7, 1.5), samples=80))
 LIBRARY = {effect.id: effect for effect in (FogGradient, FlowDrift, AirDrift)}
 CAMPAIGNS = 30
 # Probability that a correct rate fails one of these bounds with other seeds.
 CHANCE = 0.01
-
-
-def gauged(model: DepositionModel, seed: int, columns: int = 3) -> Campaign:
-    """A panel painted by a model, two readings a point, with noise and texture as assumed."""
-    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.03, 1.97, 20))
-    points_m = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
-    integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
-    integrator.add(PATH)
-    texture = np.random.default_rng([seed, 1]).normal(1.0, TEXTURE_SHARE, x.size)
-    readings = readings_at(points_m, integrator.gauge_um * texture, noise_um=0.7, seed=seed)
-    return Campaign((Experiment.of('panel', PANEL, PATH, readings),))
 
 
 @pytest.fixture(scope='module')
@@ -97,11 +81,12 @@ def test_effects_that_cannot_be_told_apart_are_one_group(monkeypatch):
 
 @pytest.mark.slow
 def test_size_of_the_procedure(monkeypatch):
-    """False alarms come at the stated level, and p-values are uniform where nothing is missing."""
+    """False alarms come at the stated level at the most, as nature may leave something over."""
     monkeypatch.setattr(run, 'STARTS', 1)
     found = [diagnose(gauged(BASE, seed), BASE, LIBRARY) for seed in range(CAMPAIGNS)]
     p_values = np.array([diagnosis.p_value for diagnosis in found])
-    assert kstest(p_values, 'uniform').pvalue > CHANCE
+    for level in (0.05, 0.2, 0.5):
+        assert np.count_nonzero(p_values <= level) <= binom.isf(CHANCE, CAMPAIGNS, level)
     alarms = sum(diagnosis.verdict != 'none_missing' for diagnosis in found)
     assert alarms == np.count_nonzero(p_values < ALPHA)
     assert alarms <= binom.isf(CHANCE, CAMPAIGNS, ALPHA)

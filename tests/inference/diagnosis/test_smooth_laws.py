@@ -15,7 +15,6 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     bases_over,
     curve_basis,
     footprint_basis,
-    footprint_kinds,
     map_bases,
 )
 from paint_deposition.inference.fitting.study import Study
@@ -93,23 +92,24 @@ def test_no_law_is_shorter_than_its_knots_resolve():
     assert np.array_equal(at_once.at_knots, resolved.at_knots)
 
 
-def test_where_a_law_is_to_be_zero_it_is():
-    among = np.arange(9) > 3
-    random = basis_on_a_line().random(1.0, 1.0, among)
-    assert not random.at_knots[~among].any()
-    assert random.at_knots[among].any(axis=1).all()
+def test_a_law_may_leave_the_film_as_a_whole_as_it_is():
+    """Beside a pattern of which the level is free that part of it would say nothing."""
+    basis = replace(basis_on_a_line(), film_um=np.diag(np.arange(1.0, 10.0)))
+    free, centred = basis.random(0.2, 1.0), basis.random(0.2, 1.0, centred=True)
+    assert np.abs(free.change_um.sum(axis=0)).max() > 0.1
+    assert np.abs(centred.change_um.sum(axis=0)).max() < 1e-12
+    # Its form is the same.
+    np.testing.assert_allclose(np.diff(centred.at_knots, axis=0), np.diff(free.at_knots, axis=0))
 
 
-def test_harmonics_of_a_footprint_are_independent_and_absent_at_the_centre(study):
-    basis = footprint_basis(study, MODEL)
-    *orders, everything = footprint_kinds()
-    assert np.array_equal(np.sum(orders, axis=0).astype(bool), everything)
-    assert [int(kind[:5].sum()) for kind in orders] == [1, 0, 0]
-    random = basis.random(1.0, 2.0, everything)
+def test_harmonics_of_a_footprint_are_independent(study):
+    random = footprint_basis(study, MODEL).random(1.0, 2.0)
     covariance = random.at_knots @ random.at_knots.T
     wave = np.arange(len(covariance)) % 5
     assert np.abs(covariance[wave[:, np.newaxis] != wave]).max() < 1e-9
     assert covariance[10, 5] == pytest.approx(np.exp(-0.5 / 2.0**2), abs=0.03)
+    # The same law over twice the knots is resolved as finely.
+    assert len(footprint_basis(study, MODEL, radii=20).knots) == 2 * len(covariance)
 
 
 def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():

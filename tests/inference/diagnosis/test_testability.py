@@ -10,9 +10,9 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space, testability
-from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.model_space import ModelSpace
+from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.inference.diagnosis.model_space import CauseEvidence
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.diagnosis.testability import LEVEL, POWER
 
@@ -37,7 +37,7 @@ def null() -> NullModel:
 
 @pytest.fixture
 def found() -> list[Explanation]:
-    """Three effects and two shapeless causes, all of which may answer to what one effect does."""
+    """Three effects and two laws of any form, all of which may answer to what one effect does."""
     random = np.random.default_rng(5)
     alike = random.normal(size=READINGS)
     return [
@@ -45,8 +45,8 @@ def found() -> list[Explanation]:
         law(EdgeBuild(), 0.7 * alike, 1),
         law(FaradayShielding(), 0.9 * alike + 0.8 * random.normal(size=READINGS), 1),
         *(
-            Explanation(cause, 0.3 * random.normal(size=(READINGS, count)), np.zeros(count), 1.0)
-            for cause, count in ((UNKNOWN, 6), (FOOTPRINT, 4))
+            Explanation(UNKNOWN, 0.3 * random.normal(size=(READINGS, count)), np.zeros(count), 0.5)
+            for count in (6, 4)
         ),
     ]
 
@@ -56,28 +56,35 @@ def found() -> list[Explanation]:
 def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, null, found, monkeypatch):
     """Through the test that the diagnosis makes, on readings that the effect has moved."""
     monkeypatch.setattr(model_space, 'DRAWS', 500)
-    space = ModelSpace(null, found, freedom)
+    space = CauseEvidence(null, found, freedom)
     _, detectable = testability.testability(space, seed=3)
-    random = np.random.default_rng(6)
+    limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - LEVEL)
+    noise = simulated(READINGS, freedom, RUNS, seed=6)
     for explanation in found[1:3]:
-        effect, (name,) = explanation.cause, explanation.sensitivity.names
-        typical = type(explanation.sensitivity.effect).parameters()[name]['typical']
-        amount = detectable[effect][name] / typical
-        seen = 0
-        for _ in range(RUNS):
-            # Readings whose noise is off by as much as its estimate may be.
-            scale = 1.0 if np.isinf(freedom) else (random.chisquare(freedom) / freedom) ** -0.5
-            raw = null.lower @ (scale * random.normal(size=len(null.raw)))
-            moved = NullModel.of(null.columns, raw + amount * explanation.law[:, 0])
-            trial = ModelSpace(moved, found, freedom)
-            trial._simulated = space._simulated
-            seen += trial.p_value(3) < LEVEL
+        effect, (name,) = explanation.cause, explanation.law.names
+        typical = type(explanation.law.effect).parameters()[name]['typical']
+        change = detectable[effect][name] / typical * null.whiten(explanation.columns)
+        seen = np.count_nonzero(space.evidence(noise + change) > limit)
         low, high = binom.interval(1.0 - 2.0 * CHANCE, RUNS, POWER)
         assert low <= seen <= high, effect
+
+
+@pytest.mark.parametrize('remainder', [0.0, 4.0])
+def test_what_nature_leaves_over_makes_less_detectable(null, found, remainder):
+    """It is part of the null hypothesis, along a direction in which an effect shows."""
+    along = found[1].columns
+    beside = null.with_remainder(remainder * along @ along.T)
+    detectable = [
+        testability.testability(CauseEvidence(one, found, np.inf), seed=3)[1]
+        for one in (null, beside)
+    ]
+    before, after = (one.get('edge_build', {}).get('gain', np.inf) for one in detectable)
+    assert np.isfinite(before)
+    assert after > 1.3 * before if remainder else after == before
 
 
 def test_what_hides_in_the_pattern_is_not_testable(null):
     """A direction that the pattern takes up whole shows nothing, however strong."""
     hidden = null.columns[:, 0] / np.linalg.norm(null.columns[:, 0])
-    space = ModelSpace(null, [law(EdgeBuild(), hidden, 1)], np.inf)
+    space = CauseEvidence(null, [law(EdgeBuild(), hidden, 1)], np.inf)
     assert testability.testability(space, seed=0) == (('edge_build',), {})

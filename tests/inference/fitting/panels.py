@@ -4,6 +4,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.fitting.study import TEXTURE_SHARE
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path_builder import spray_path
@@ -79,6 +80,18 @@ def column(low_m=0.1, high_m=1.9, count=40, x_m=0.0) -> np.ndarray:
     """(N, 3) points up the panel."""
     z = np.linspace(low_m, high_m, count)
     return np.stack([np.full(count, x_m), np.zeros(count), z], axis=1)
+
+
+def gauged(model: DepositionModel, seed: int, columns: int = 3) -> Campaign:
+    """A panel painted by a model, two readings a point, with noise and texture as assumed."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.03, 1.97, 20))
+    points_m = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+    path, _ = spray_path(passes((0.3, 1.1, 0.7, 1.5), samples=80))
+    integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
+    integrator.add(path)
+    texture = np.random.default_rng([seed, 1]).normal(1.0, TEXTURE_SHARE, x.size)
+    readings = readings_at(points_m, integrator.gauge_um * texture, noise_um=0.7, seed=seed)
+    return Campaign((Experiment.of('panel', PANEL, path, readings),))
 
 
 def painted_by(

@@ -16,7 +16,7 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM
-from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study
+from paint_deposition.inference.fitting.study import FOLDS, TEXTURE_SHARE, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -137,6 +137,11 @@ def test_nuisance_directions_are_allowed_for(forward, exact):
     truth = parameters.encode(TRUTH)
     assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
     assert lenient.marginal.chi_square < 0.2 * strict.chi_square
+    # What nature leaves over is the same as a covariance.
+    remainder = nuisance @ nuisance.T
+    same = fit_readings(forward, wrong, sigma, parameters, remainder=remainder)
+    assert same.vector == pytest.approx(lenient.vector, abs=1e-6)
+    assert same.objective == pytest.approx(lenient.objective)
 
 
 def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
@@ -163,6 +168,8 @@ def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
     assert study.nuisance[:18] == pytest.approx(here)
     film = study.measured_um * study.sigma_um
     assert (film @ study.nuisance[:, :2]).sum() == pytest.approx(0.0)
+    # Each is left out as a whole.
+    assert np.array_equal(study.folds(), study.campaign.experiment_of)
 
 
 def test_points_at_one_place_are_left_out_together(spotted):
@@ -172,6 +179,18 @@ def test_points_at_one_place_are_left_out_together(spotted):
     folds = Study.of(Campaign((experiment,))).folds().reshape(3, 10)
     assert len(np.unique(folds)) == 3
     assert (folds == folds[:, :1]).all()
+
+
+def test_of_one_part_patches_are_left_out(spotted):
+    """A neighbour would tell what the model cannot."""
+    one = spotted.experiments[0]
+    readings = Readings.of(grid_m(), np.full(len(grid_m()), 20.0))
+    study = Study.of(Campaign((Experiment.of('panel', PANEL, one.path, readings),)))
+    folds, places_m = study.folds(), study.campaign.positions_m
+    assert len(np.unique(folds)) == FOLDS
+    centres_m = np.array([places_m[folds == k].mean(axis=0) for k in range(FOLDS)])
+    away_m = np.linalg.norm(places_m[:, np.newaxis] - centres_m, axis=2)
+    assert np.mean(away_m.argmin(axis=1) == folds) > 0.95
 
 
 def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):

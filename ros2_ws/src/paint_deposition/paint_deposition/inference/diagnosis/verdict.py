@@ -185,12 +185,15 @@ class Diagnosis:
     @cached_property
     def worse(self) -> tuple[str, ...]:
         """Parts, rows and columns that the newest model predicts worse, a phrase each."""
-        pairs = zip(self.comparisons[0].misfits, self.comparisons[-1].misfits, strict=True)
+        old, new = (
+            [misfit for misfit in comparison.misfits if misfit.kind in ('experiment', 'group')]
+            for comparison in (self.comparisons[0], self.comparisons[-1])
+        )
         return tuple(
-            f'{new.experiment}{"" if new.kind == "experiment" else f", {new.label}"}: '
-            f'{old.residuals.rmse_um:.2f} -> {new.residuals.rmse_um:.2f} µm'
-            for old, new in pairs
-            if new.kind in ('experiment', 'group') and is_worse(old.residuals, new.residuals)
+            f'{now.experiment}{"" if now.kind == "experiment" else f", {now.label}"}: '
+            f'{before.residuals.rmse_um:.2f} -> {now.residuals.rmse_um:.2f} µm'
+            for before, now in zip(old, new, strict=True)
+            if is_worse(before.residuals, now.residuals)
         )
 
     @property

@@ -285,7 +285,8 @@ class Study:
         if self.has_several_parts:
             return parts % FOLDS
         places = self.campaign.positions_m
-        _, patch = kmeans2(places / places.std(), FOLDS, minit='++', rng=seed)
+        count = min(FOLDS, len(np.unique(places, axis=0)))
+        _, patch = kmeans2(places / places.std(), count, minit='++', rng=seed)
         return patch
 
     def passes(self, model: DepositionModel) -> np.ndarray:

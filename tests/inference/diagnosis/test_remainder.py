@@ -1,0 +1,238 @@
+"""What nature leaves over: which parts share it, and how large it is where."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from booth import MODEL
+from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
+from paint_deposition.effects.learned.footprint import WAVES
+from paint_deposition.effects.library.tcp_offset import TcpOffset
+from paint_deposition.inference.diagnosis.remainder import (
+    FOOTPRINT,
+    LENGTHS,
+    RADII,
+    SIDEWAYS,
+    TAILS,
+    Remainder,
+    painted_alike,
+)
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
+from paint_deposition.inference.diagnosis.sprays import MENU
+from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+
+# Parts of the study: a door, and a panel twice.
+DOOR, FIRST, SECOND = range(3)
+
+
+def at_model(study: Study, model=MODEL) -> Fit:
+    """A fit that has found this model."""
+    parameters = FreeParameters.of(model, *model.effects)
+    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
+    residual = (study.measured_um - predicted_um) / study.sigma_um
+    jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
+    return Fit(
+        parameters, vector, model, predicted_um, residual, jacobian, True, study.nuisance
+    )  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def study() -> Study:
+    return study_of(on_door(count=16), on_panel('first'), on_panel('second'))
+
+
+@pytest.fixture(scope='module')
+def remainder(study) -> Remainder:
+    return Remainder.of(study, at_model(study))
+
+
+@pytest.fixture(scope='module')
+def alone() -> tuple[Study, Remainder]:
+    """The door as the only part."""
+    study = study_of(on_door(count=16))
+    return study, Remainder.of(study, at_model(study))
+
+
+def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.ndarray:
+    owner = study.campaign.experiment_of
+    return covariance[np.ix_(owner == one, owner == other)]
+
+
+def test_everything_left_over_is_a_covariance(remainder, alone):
+    for found in (remainder, alone[1]):
+        for sizes in found.choices():
+            covariance = found.covariance(sizes)
+            assert covariance == pytest.approx(covariance.T)
+            values = np.linalg.eigvalsh(covariance)
+            assert values[0] > -1e-9 * values[-1]
+
+
+def test_choices_are_as_probable_as_one(remainder, alone):
+    for found, parts in ((remainder, True), (alone[1], False)):
+        choices = found.choices()
+        for beyond in (False, True):
+            prior = [s.log_prior for s in choices if s.is_beyond_nature == beyond]
+            assert np.exp(prior).sum() == pytest.approx(1.0)
+        # Parts differ from each other only where some were painted alike.
+        assert found.is_repeated == parts
+        assert all((sizes.part > 0.0) == parts for sizes in choices)
+    # Sizes in the middle of what was measured are the most probable.
+    best = max((s for s in remainder.choices() if not s.is_beyond_nature),
+               key=lambda s: s.log_prior)  # fmt: skip
+    assert (best.setting, best.part) == (0.02, 0.01)
+
+
+@pytest.mark.parametrize('k', range(len(LENGTHS)))
+def test_parts_painted_alike_share_the_setting_and_differ_by_the_part(study, remainder, k):
+    """They were measured at the same places."""
+    settings, parts = remainder.settings[k], remainder.parts[k]
+    own = between(study, settings, FIRST, FIRST)
+    assert own.any()
+    assert between(study, settings, FIRST, SECOND) == pytest.approx(own)
+    assert between(study, parts, FIRST, FIRST) == pytest.approx(own)
+    assert not between(study, parts, FIRST, SECOND).any()
+    assert not between(study, parts, DOOR, DOOR).any()
+    shapes = between(study, remainder.shapes, FIRST, FIRST)
+    assert between(study, remainder.shapes, FIRST, SECOND) == pytest.approx(shapes)
+
+
+def test_parts_painted_otherwise_share_the_footprint_alone(study, remainder):
+    for sizes in remainder.choices():
+        assert not between(study, remainder.of_parts(sizes), DOOR, FIRST).any()
+    assert between(study, remainder.of_footprint, DOOR, FIRST).any()
+
+
+def test_fields_fall_with_the_root_of_the_film_and_with_the_distance(alone):
+    study, remainder = alone
+    film_um = study.forward.predict_um(MODEL)
+    for covariance, length_m in zip(remainder.settings, remainder.lengths_m, strict=True):
+        scale = np.sqrt(film_um * film_um.max()) / study.sigma_um
+        assert np.sqrt(np.diag(covariance)) == pytest.approx(scale)
+        places = study.campaign.positions_m
+        away_m = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
+        correlation = np.exp(-0.5 * (away_m / length_m) ** 2)
+        assert covariance / np.outer(scale, scale) == pytest.approx(correlation)
+
+
+def mean_flux(radius_m: np.ndarray, power: tuple[float, float] = (1.0, 1.0)) -> np.ndarray:
+    """Flux around the axis over the peak's, its Gaussians exp(-u) being exp(-u^power)."""
+    p = MODEL.planar
+    turned = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)[:, np.newaxis]
+    even = p.f(np.cos(turned), np.sin(turned)).mean()
+    u1 = (radius_m - p.r_m) ** 2 / (2.0 * p.sigma1_m**2)
+    u2 = radius_m**2 / (2.0 * p.sigma2_m**2)
+    ring = (1.0 - p.K2) * even * p.g1(radius_m, 0.0) * np.exp(u1 - u1 ** power[0])
+    centre = p.K2 * p.g2(radius_m, 0.0) * np.exp(u2 - u2 ** power[1])
+    return p.K1_cm3_per_s * (ring + centre) / p.peak_flux_um_per_s
+
+
+@pytest.fixture(scope='module')
+def knots_m(alone) -> np.ndarray:
+    """(RADII,) radii at which the deviations of the footprint are given."""
+    basis = footprint_basis(alone[0], MODEL, RADII)
+    return np.linspace(0.0, basis.settings['reach_m'], RADII)
+
+
+def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_flux(
+    alone, knots_m
+):
+    of_peak = alone[1].of_peak.reshape(RADII, WAVES, -1)
+    sd = np.sqrt(np.sum(of_peak[:, 1:] ** 2, axis=2))
+    flux = mean_flux(knots_m)
+    expected = np.minimum(FOOTPRINT, flux)[:, np.newaxis]
+    assert sd == pytest.approx(np.repeat(expected, WAVES - 1, axis=1), rel=0.05)
+    at_peak = flux.argmax()
+    assert sd[at_peak] == pytest.approx(FOOTPRINT, rel=0.05)
+    assert flux[-1] < 0.05 * FOOTPRINT
+
+
+def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
+    tails = alone[1].of_peak.reshape(RADII, WAVES, -1)[:, :, :2]
+    assert not tails[:, 1:].any()
+    step = 1e-4
+    for k, power in enumerate(((1.0 + step, 1.0), (1.0, 1.0 + step))):
+        change = (mean_flux(knots_m, power) - mean_flux(knots_m)) / step
+        most = mean_flux(knots_m)
+        assert tails[:, 0, k] == pytest.approx(np.clip(TAILS * change, -most, most), abs=2e-3)
+
+
+def test_the_footprint_changes_the_readings_as_its_knots_say(alone):
+    study, remainder = alone
+    amounts = np.random.default_rng(1).normal(size=remainder.footprint.shape[1])
+    basis = footprint_basis(study, MODEL, RADII)
+    flux = np.repeat(mean_flux(np.linspace(0.0, basis.settings['reach_m'], RADII)), WAVES)
+    relative = remainder.of_peak @ amounts / flux
+    expected = basis.film_um @ relative / study.sigma_um
+    assert remainder.footprint @ amounts == pytest.approx(expected, abs=1e-3)
+
+
+def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
+    """Along the tool's x and y alike; one setting alone has no pattern but the model's."""
+    study, remainder = alone
+    radius = np.linspace(0.0, 0.5, 2001)
+    flux = mean_flux(radius)
+    width_m = np.sqrt(np.trapezoid(radius**3 * flux) / np.trapezoid(radius * flux))
+    values, vectors = np.linalg.eigh(remainder.shapes)
+    seen = values > 1e-6 * values[-1]
+    assert seen.sum() == 2
+    for name in ('offset_x_m', 'offset_y_m'):
+        offset = TcpOffset(**{name: SIDEWAYS * width_m})
+        change = study.forward.predict_um(MODEL.with_effect(offset))
+        change = (change - study.forward.predict_um(MODEL)) / study.sigma_um
+        along = vectors[:, seen].T @ change
+        assert np.linalg.norm(along) == pytest.approx(np.linalg.norm(change), rel=0.01)
+        assert np.sum(along**2 / values[seen]) == pytest.approx(1.0, rel=0.1)
+
+
+def test_the_pattern_differs_between_settings_but_not_in_its_level(study, remainder):
+    fit = at_model(study)
+    door = study.campaign.experiment_of == DOOR
+    shapes = between(study, remainder.shapes, DOOR, DOOR)
+    values, vectors = np.linalg.eigh(shapes)
+    seen = vectors[:, values > 1e-9 * values[-1]]
+    assert seen.shape[1] > 2
+    names = fit.parameters.coordinates
+
+    def left(name: str) -> float:
+        change = fit.jacobian[door, names.index(name)]
+        return np.linalg.norm(change - seen @ (seen.T @ change)) / np.linalg.norm(change)
+
+    assert left('log_K1') > 0.01
+    assert max(left(name) for name in ('K2', 'r_m')) < 1e-6
+
+
+def test_beside_another_fit_only_pattern_and_place_vary_otherwise(study, remainder):
+    moved = MODEL.with_effect(TcpOffset(offset_x_m=0.03))
+    around = remainder.around(study, at_model(study, moved))
+    assert around.settings is remainder.settings
+    assert around.footprint is remainder.footprint
+    assert not np.allclose(around.shapes, remainder.shapes)
+    np.testing.assert_allclose(remainder.around(study, at_model(study)).shapes, remainder.shapes)
+
+
+def test_where_no_paint_lands_nothing_is_left_over():
+    """On the back of a plate the model predicts exactly 0."""
+    study = study_of(plate_with_a_back())
+    assert study.forward.predict_um(MODEL)[-1] == 0.0
+    remainder = Remainder.of(study, at_model(study))
+    covariance = remainder.covariance(remainder.choices()[-1])
+    assert not covariance[-1].any()
+    assert (np.diag(covariance)[:-1] > 0.0).all()
+
+
+def test_which_parts_were_painted_alike():
+    part = on_panel()
+    path = part.path
+    near, far = (
+        replace(part, path=path.with_(position_m=np.add(path.position_m, [away_m, 0.0, 0.0])))
+        for away_m in (0.002, 0.05)
+    )
+    off = replace(part, switched_off=frozenset(['voltage']))
+    menu = {change.key: change.made(part) for change in MENU}
+    found = painted_alike([part, near, far, on_door(count=16), off, replace(part, name='again')])
+    assert found.tolist() == [0, 0, 1, 2, 3, 0]
+    for key in ('half_flow', 'double_speed', 'further', 'turned', 'longer_open', 'voltage_off'):
+        assert painted_alike([part, menu[key]]).tolist() == [0, 1], key
