@@ -31,8 +31,9 @@ SURE = 0.8
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
 DRAWS = 1000
-# So many choices of the remainder are kept of each size of the settings' fields.
-MOST_SIZES = 2
+# So many sizes of the remainder are kept at most, of nature and beyond it, and none whose share
+# of the posterior is smaller.
+MOST_SIZES, LEAST_SHARE = 4, 0.02
 
 
 def log_odds(probability: float) -> float:
@@ -269,11 +270,7 @@ class ModelSpace:
 def probable_sizes(
     plain: NullModel, remainder: Remainder, explanations: Sequence[Explanation], freedom: float
 ) -> list[Sizes]:
-    """The most probable choices of each size of the settings' fields.
-
-    They are chosen where nothing, or the law of any one effect, acts. With more effects less may
-    be left over, so each size has its share.
-    """
+    """The sizes that matter where nothing, or the law of any one effect, acts."""
     laws = [e.columns for e in explanations if e.law is not None]
     columns = np.hstack(laws) if laws else plain.columns[:, :0]
     found: list[tuple[float, Sizes]] = []
@@ -292,13 +289,12 @@ def probable_sizes(
         best = np.max(gain - 0.5 * np.log(precision), initial=0.0)
         with_law = one.log_weight + log_odds(PRIOR_EFFECT) + float(best)
         found.append((float(np.logaddexp(one.log_weight, with_law)), sizes))
-    found.sort(key=lambda one: -one[0])
-    kept: dict[float, list[Sizes]] = {}
-    for _, sizes in found:
-        of_setting = kept.setdefault(sizes.setting, [])
-        if len(of_setting) < (1 if sizes.is_beyond_nature else MOST_SIZES):
-            of_setting.append(sizes)
-    return [sizes for of_setting in kept.values() for sizes in of_setting]
+    kept = []
+    for beyond in (False, True):
+        here = sorted((f for f in found if f[1].is_beyond_nature == beyond), key=lambda f: -f[0])
+        least = float(np.logaddexp.reduce([weight for weight, _ in here])) + np.log(LEAST_SHARE)
+        kept += [sizes for weight, sizes in here[:MOST_SIZES] if weight > least]
+    return kept
 
 
 def inclusion_of(log_weights: Sequence[float], nothing: float) -> float:

@@ -192,19 +192,13 @@ class Search:
 
     def _refitted(self, effects: dict[str, Effect], start: Trial) -> Trial:
         """A set fitted from the pattern, and beside the remainder, of another one."""
-        names, sizes = frozenset(effects), None
-        while start.best.sizes != sizes:
-            sizes = start.best.sizes
-            fit = self.run.fitted_with(
-                [*effects.values()], model=start.fit.model, remainder=start.best.null.remainder
-            )
-            trial = replace(start, names=names, fit=fit)
-            known = self._trials.get(names)
-            if known is not None and trial.log_weight_alone <= known.log_weight_alone + SAME:
-                break
-            self._trials[names] = start = trial
-            effects = trial.effects
-        return self._trials[names]
+        remainder = start.best.null.remainder
+        fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
+        trial = replace(start, names=frozenset(effects), fit=fit)
+        known = self._trials.get(trial.names)
+        if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:
+            self._trials[trial.names] = trial
+        return self._trials[trial.names]
 
     def stages(self) -> list[Stage]:
         """From nothing to the best set, each with one effect more than the one before."""
