@@ -113,7 +113,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
-            *_footprint(study, fit),
+            *_footprint(study, model),
             _shapes(study, fit, group[owner]),
             tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
@@ -169,13 +169,7 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
     return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
 
 
-def _footprint(study: Study, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Directions of a footprint's deviations, and what they are at its knots, over the peak.
-
-    The amount of paint is left to the pattern: the deviations are orthogonal to K1 (Plumlee, JASA
-    112, 2017), or they would take the place of it.
-    """
-    model = fit.model
+def _footprint(study: Study, model: DepositionModel) -> tuple[np.ndarray, np.ndarray]:
     basis = footprint_basis(study, model, RADII)
     flux, tails = _flux_and_tails(model.patterns, basis)
     share = np.minimum(FOOTPRINT / flux, MOST_OF_FLUX)[:, np.newaxis]
@@ -185,10 +179,7 @@ def _footprint(study: Study, fit: Fit) -> tuple[np.ndarray, np.ndarray]:
     ]
     at_knots = np.hstack([TAILS * tails, *roots])
     columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-    pattern = fit.parameters.pattern
-    amounts = [pattern.entries(row)[0] for row in range(pattern.count)]
-    pattern, _ = np.linalg.qr(fit.jacobian[:, amounts])
-    return columns - pattern @ (pattern.T @ columns), flux[:, np.newaxis] * at_knots
+    return columns, flux[:, np.newaxis] * at_knots
 
 
 def _flux_and_tails(
