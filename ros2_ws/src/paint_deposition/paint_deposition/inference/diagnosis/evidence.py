@@ -66,7 +66,7 @@ class NullModel:
             apart: ids of effects in it that the null hypothesis does not have: what they
                 contribute to the film counts as deviation.
             remainder: (P, P) covariance of what nature leaves over.
-            size: standard deviation of the effects' amplitudes, over that of their prior.
+            size: standard deviation of the effects' amplitudes, in typical ones.
         """
         prior, entries = fit.parameters.prior, fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)

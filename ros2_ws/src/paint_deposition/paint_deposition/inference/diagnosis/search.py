@@ -35,8 +35,8 @@ MOST_EFFECTS, TRIALS = 4, 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each.
 LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
-# Sizes of the amplitudes over the prior of the fit: what is typical is known to within a factor.
-AMPLITUDES = (0.33, 1.0)
+# What is typical of an amplitude is known to within a factor.
+AMPLITUDES = (1.0, 3.0)
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.

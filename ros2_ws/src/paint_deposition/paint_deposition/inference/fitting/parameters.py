@@ -49,9 +49,6 @@ class Prior:
         return self.whitening @ (vector - self.centre)
 
 
-# Standard deviation of an amplitude before the readings, in typical ones: an effect that is there
-# may be several times as large.
-AMPLITUDE = 3.0
 # The range that is physical for a shape parameter is this many standard deviations of its prior.
 SHAPE_DEVIATIONS = 4.0
 
@@ -193,8 +190,7 @@ class FreeParameters:
     def weak_prior(self) -> Prior:
         """Of the vector where nothing is known of this bell."""
         centre = [c.centre for c in self.pattern.coordinates] + [0.0] * len(self.varied)
-        width = [c.width for c in self.pattern.coordinates]
-        width += [1.0 if entry.is_shape else AMPLITUDE for entry in self.of_effects]
+        width = [c.width for c in self.pattern.coordinates] + [1.0] * len(self.varied)
         return Prior(np.array(centre), np.diag(width))
 
     @cached_property
