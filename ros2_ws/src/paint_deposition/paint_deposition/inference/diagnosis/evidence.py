@@ -56,7 +56,6 @@ class NullModel:
         nuisance: np.ndarray,
         apart: frozenset[str] = frozenset(),
         remainder: np.ndarray | None = None,
-        size: float = 1.0,
     ) -> 'NullModel':
         """Linear around a fit, with nuisance directions (P, n) over the noise.
 
@@ -66,7 +65,6 @@ class NullModel:
             apart: ids of effects in it that the null hypothesis does not have: what they
                 contribute to the film counts as deviation.
             remainder: (P, P) covariance of what nature leaves over.
-            size: standard deviation of the effects' amplitudes, in typical ones.
         """
         prior, entries = fit.parameters.prior, fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)
@@ -79,10 +77,7 @@ class NullModel:
         counted = free & (kept | ~shape)
         kept &= free
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
-        wide = np.array([1.0] * pattern + [1.0 if entry.is_shape else size for entry in entries])
-        directions = (
-            fit.jacobian[:, kept] @ (wide[:, np.newaxis] * prior.factor)[np.ix_(kept, kept)]
-        )
+        directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
         return NullModel.of(np.hstack([directions, nuisance]), raw, remainder)
 
     def beside(self, more: np.ndarray) -> 'NullModel':

@@ -8,7 +8,6 @@ the remainder of nature at all its sizes, and with or without something unknown 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import product
 
 import numpy as np
 
@@ -35,8 +34,6 @@ MOST_EFFECTS, TRIALS = 4, 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each.
 LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
-# What is typical of an amplitude is known to within a factor.
-AMPLITUDES = (1.0, 3.0)
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.
@@ -76,11 +73,8 @@ class Trial:
         study, freedom = self.run.study, self.run.freedom
         errors = law_errors(study, self.fit, self.names)
         found = []
-        options = product(LAWS_OFF, AMPLITUDES) if self.names else [((1.0, 1.0), 1.0)]
-        for (times, share), size in options:
-            free = np.hstack([study.nuisance, times * errors])
-            null = NullModel.around(self.fit, free, size=size)
-            share /= len(AMPLITUDES) if self.names else 1
+        for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
+            null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
             found += [
                 Weighed.of(null, self.remainder, sizes, freedom, share) for sizes in self.sizes
             ]
