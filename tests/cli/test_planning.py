@@ -190,7 +190,8 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
 
 @pytest.mark.slow
 def test_plan_in_words_and_replaces_an_older_one(tmp_path):
-    arguments = ('plan', '--mesh', SAMPLES / 'panel.stl', '--speed', 0.3, '-o', tmp_path)
+    given = ('--mesh', SAMPLES / 'panel.stl', '--max-edge-length-m', 0.05, '--speed', 0.3)
+    arguments = ('plan', *given, '-o', tmp_path)
     done = installed_paint(*arguments, '--direction', 'vertical', '--index', 0.3)
     assert done.returncode == 0, done.stderr
     assert 'vertical passes at 300 mm' in done.stdout

@@ -72,6 +72,7 @@ def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
     assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_long_pass_is_the_flux_integrated_along_it():
     """Every line across the pass has the same film: the flux summed along the direction."""
     speed = 1.2 / 4.0 / 4.0

@@ -22,6 +22,7 @@ def model_of(planar, *effects):
     return DepositionModel(planar=planar, effects=effects)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('standoff_m', [0.15, 0.25, 0.4])
 @pytest.mark.parametrize('travel_rad', [0.0, 2.5])
 def test_collapse_is_the_integral_of_eq2_along_a_pass(standoff_m, travel_rad):

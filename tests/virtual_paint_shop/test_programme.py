@@ -30,6 +30,7 @@ def given(job):
     )  # fmt: skip
 
 
+@pytest.mark.slow
 def test_the_same_motion_lays_the_same_film(shop):
     pattern, job, spots = shop
     expected = Bench(9, job, pattern, PARCELS).readings([], *spots)[0]
