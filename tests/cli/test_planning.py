@@ -4,7 +4,6 @@ import json
 
 import numpy as np
 import pytest
-import trimesh
 from PIL import Image
 
 from booth import SAMPLES
@@ -121,23 +120,6 @@ def test_calibrated_model_predicts_the_other_panels(calibrated, tmp_path):
     for panel in panels:
         assert abs(panel['bias_um']) < 0.2
         assert panel['rmse_um'] < 0.85
-
-
-@pytest.mark.slow
-def test_notes_on_a_campaign_are_printed_when_piped(tmp_path):
-    mesh = trimesh.load(STUDY / 'panel.stl', process=False)
-    mesh.faces = mesh.faces[:, ::-1]
-    mesh.export(tmp_path / 'panel.stl')
-    text = (STUDY / 'campaign.yaml').read_text()
-    for file in STUDY.iterdir():
-        if not (tmp_path / file.name).exists():
-            (tmp_path / file.name).symlink_to(file)
-    assert 'panel.stl' in text
-    done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    (note, *_) = done.stderr.splitlines()
-    assert note.startswith('note: ')
-    assert 'turned round' in note
 
 
 def test_readings_in_mixed_units_are_refused(tmp_path):

@@ -86,15 +86,6 @@ def test_gun_kept_in_its_orientation_lays_one_profile_both_ways():
         assert np.abs(turned - forth).max() > 0.05 * forth.max()
 
 
-def test_effects_along_the_rays_count():
-    exponent = 0.5
-    model = model_of(RING, EFFECTS['standoff_efficiency'](exponent=exponent))
-    ratio = collapse_um(model, ACROSS_M, 0.2, 0.4) / collapse_um(
-        model_of(RING), ACROSS_M, 0.2, 0.4
-    )
-    np.testing.assert_allclose(ratio, (0.45 / 0.30) ** -exponent, rtol=1e-9)
-
-
 def test_drifting_air_shifts_the_profile_down_whichever_way_the_gun_is_turned():
     model = model_of(RING, EFFECTS['air_drift'](shift_down_m=0.03))
     for turned in (False, True):
