@@ -160,6 +160,7 @@ def test_the_kernel_computes_the_law(effect: type[Effect]):
     np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('effect', [*WITH_LAW, *LEARNED_LAWS], ids=lambda effect: effect.id)
 def test_the_law_stays_in_single_precision(effect: type[Effect]):
     """One number of double precision would carry the whole loop of the kernel into it."""

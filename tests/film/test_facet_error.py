@@ -88,6 +88,7 @@ def told_and_true(curve: Curve, edge_m: float, jitter: float) -> tuple[float, fl
     return told, np.abs(films[0] - films[1]).max() / films[1].max()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('edge_m', 'jitter'), [(0.024, 0.3), (0.012, 0.0)])
 @pytest.mark.parametrize(
     'curve',

@@ -113,6 +113,7 @@ def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, mod
         assert landed_cm3 <= 1.3 * film.emitted_cm3
 
 
+@pytest.mark.slow
 @many
 @given(
     points=parts(), motion=motions(), model=models(),

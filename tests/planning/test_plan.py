@@ -18,6 +18,8 @@ from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
 from planning.test_surface_map import sheet
 
+pytestmark = pytest.mark.slow
+
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )
@@ -55,7 +57,6 @@ def test_placing_beats_the_plane_s_recommendation_on_this_part(planned):
     assert planned.sigma_n == pytest.approx(planned.placing.sigma_n, rel=0.1)
 
 
-@pytest.mark.slow
 def test_neighbouring_indices_are_no_better(bowed, planned):
     for change in (0.97, 1.03):
         index = change * planned.placing.index_m
@@ -82,7 +83,6 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     assert last[:, 0].mean() > first[:, 0].mean() + 0.3
 
 
-@pytest.mark.slow
 def test_given_index_is_kept_and_range_respected(bowed):
     fixed = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_m=0.2))
     assert fixed.placing.index_m == 0.2
@@ -134,7 +134,6 @@ def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):
     assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'
 
 
-@pytest.mark.slow
 def test_sample_door_in_either_direction(repository):
     door = read_mesh(repository / 'ros2_ws/src/paint_deposition/samples/door.stl')
     for direction in ('horizontal', 'vertical'):

@@ -12,6 +12,8 @@ from .gauge import GaugeNoise, scatter
 from .programme import Painted, motion_of
 from .truths import library
 
+pytestmark = pytest.mark.slow
+
 PARCELS = 300_000
 
 
@@ -30,7 +32,6 @@ def given(job):
     )  # fmt: skip
 
 
-@pytest.mark.slow
 def test_the_same_motion_lays_the_same_film(shop):
     pattern, job, spots = shop
     expected = Bench(9, job, pattern, PARCELS).readings([], *spots)[0]

@@ -171,6 +171,7 @@ with RunWriter(sys.argv[1], compression='none') as writer:
 """
 
 
+@pytest.mark.slow
 def test_the_first_refused_write_is_the_last(tmp_path, repository):
     """A limit on the file's size fails exactly as a full disk: some bytes, then an error."""
     run = tmp_path / 'run'

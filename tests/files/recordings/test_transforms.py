@@ -73,6 +73,7 @@ def test_a_bag_without_poses_says_what_else_it_has(tmp_path):
         read_recording(tf_bag(tmp_path / 'run'))
 
 
+@pytest.mark.slow
 def test_a_real_robot_in_its_map(shared_data):
     """A wheeled robot: its odometry moves in the map, which another node corrects."""
     bag = shared_data / 'bags' / 'evo_nav2_turtlebot.mcap'
