@@ -72,7 +72,6 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     assert kept == {gauge: 1, label: 12, good: 12}
 
 
-@pytest.mark.slow
 def test_a_campaign_is_another_case_when_a_file_that_it_names_has_changed(line):
     folder, names = line
     campaign_of(folder, names[0], folder / 'door.stl')
