@@ -12,7 +12,6 @@ from std_msgs.msg import String
 
 from files.recorded import START_NS
 from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
-from paint_deposition.nodes.recording.recorded_topic import LogTime
 from paint_deposition.nodes.runtime import topics
 
 
@@ -65,11 +64,3 @@ def test_diagnostics_tell_bytes_and_disk(record, publisher, wait_until, cell):
     assert status.name == 'run_recorder: recording'
     assert int(values['bytes']) > 0
     assert int(values['disk free bytes']) > 0
-
-
-def test_log_times_keep_their_pace_where_the_clock_is_set_back():
-    hour_ns, log_time = 3_600_000_000_000, LogTime()
-    # A little out of order is no step back.
-    before = [log_time.of(START_NS + time) - START_NS for time in (5, 7, 6, 9)]
-    after = [log_time.of(START_NS - hour_ns + time) - START_NS for time in (0, 4, 8)]
-    assert before + after == [5, 7, 6, 9, 9, 13, 17]

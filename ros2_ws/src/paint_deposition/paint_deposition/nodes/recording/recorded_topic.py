@@ -21,29 +21,8 @@ from rosbags.interfaces import (
 
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
-# Messages of one topic come out of order by less.
-LEAST_STEP_NS = 1_000_000_000
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
-
-
-class LogTime:
-    """Log times of a topic, which keep their pace where the clock of the machine is set back.
-
-    Readers order messages by them: those from after the step would come before those from before.
-    """
-
-    def __init__(self) -> None:
-        self._set_back_ns = self._newest_ns = 0
-
-    def of(self, received_ns: int) -> int:
-        """The log time of a message received at this time of the clock [ns]."""
-        time_ns = received_ns + self._set_back_ns
-        if time_ns < self._newest_ns - LEAST_STEP_NS:
-            self._set_back_ns += self._newest_ns - time_ns
-            time_ns = self._newest_ns
-        self._newest_ns = max(self._newest_ns, time_ns)
-        return time_ns
 
 
 class RecordedTopic:
@@ -67,7 +46,7 @@ class RecordedTopic:
         self.messages = self.messages_before = 0
         self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
-        self._log_time = LogTime()
+        self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
         package, kind, message = type_name.split('/')
@@ -111,8 +90,9 @@ class RecordedTopic:
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
-        log_time_ns = self._log_time.of(info['received_timestamp'])
-        self._take(self.name, cdr, log_time_ns, info['source_timestamp'])
+        # Readers order messages by it; a busy middleware's times of receipt go back a little.
+        self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
+        self._take(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
     def _count_missed(self, info: Mapping[str, Any]) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
