@@ -1,6 +1,6 @@
 """The command `paint`, in this process as a rule and as a process where that is the point.
 
-Figures that a command prints as JSON are held against `report/outputs.py` every time.
+Figures that a command prints as JSON are held against `cli/outputs.py` every time.
 """
 
 import io
@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from booth import LOOKING_ALONG_Y
+from cli.outputs import OUTPUTS
 from paint_deposition.cli.main import run
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.report.outputs import OUTPUTS
 from scenes import straight_pass
 
 TRIGGER = ('--state-topic', '/atomizer/state')
@@ -25,7 +25,7 @@ KINDS = {
     'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
     'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
     'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
-    'measure': 'measurement', 'runs': 'runs', 'sweep': 'sweep', 'line': 'line',
+    'measure': 'measurement', 'sweep': 'sweep', 'line': 'line',
 }  # fmt: skip
 
 
@@ -38,7 +38,6 @@ def kind_of(words: list[str]) -> str:
     if words[0] == 'inspect':
         for kind, marks in {
             'gun_on_part': ('--mesh',),
-            'driven_speed': ('--programmed',),
             'program': ('.mod', '.prg'),
             'pose_table': ('.csv', '.txt', '.tsv'),
         }.items():

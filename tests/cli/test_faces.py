@@ -30,7 +30,7 @@ def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(mesh, tmp_p
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert {'trajectory', 'passes.csv', 'passes.mod', 'passes.png', 'film.png'} <= names
     assert len(plans[0]['faces']) == 2
-    assert plans[0]['sigma_n'] < plans[0]['one_raster']['sigma_n']
+    assert plans[0]['sigma_n'] < plans[0]['sigma_n_unblended']
     assert plans[1]['sigma_n'] < 0.95 * plans[0]['sigma_n']
     assert plans[1]['film']['mean_um'] == pytest.approx(20.0, rel=0.01)
     assert not plans[1]['contacts']

@@ -31,7 +31,7 @@ def test_files_and_figures(improved):
     assert figures['mean_um']['after'] == pytest.approx(figures['mean_um']['before'], rel=0.01)
     assert figures['program_difference'] < 2e-3
     assert [one['number'] for one in figures['passes']] == [1, 2, 3]
-    assert 'm/s between x = ' in figures['passes'][0]['sentence']
+    assert 'm/s on average' in figures['passes'][0]['sentence']
     assert {'mesh', 'trajectory'} <= {file['what'] for file in figures['provenance']['files']}
     for name in ('trajectory', 'passes.csv', 'passes.mod', 'model.yaml', 'film.ply'):
         assert (folder / name).exists()
@@ -104,42 +104,14 @@ def fender(tmp_path_factory):
 
 
 @pytest.mark.slow
-def test_optimised_plans_waste_less_with_standoffs_and_leans_of_their_own_less_still(
-    fender, tmp_path
-):
+def test_optimised_plans_waste_less_for_the_same_film(fender, tmp_path):
     options = ('--target-um', 20, '--optimise', '--max-edge-length-m', 0.06, '--json')
-    free = ('--standoff-min', 0.2, '--standoff-max', 0.3, '--lean-max-deg', 20)
-    plans = []
-    for more in ((), free):
-        done = paint('plan', '--mesh', fender, *options, *more, '-o', tmp_path / str(len(more)))
-        assert done.returncode == 0, done.stderr
-        plans.append(json.loads(done.stdout))
-    plain, films = plans[0]['plain'], [plan['film'] for plan in plans]
-    assert plans[0]['passes'] <= plain['passes']
-    assert films[0]['emitted_volume_cm3'] < 0.9 * plain['paint_cm3']
-    assert films[0]['capture_fraction'] > 1.1 * plain['capture_fraction']
-    assert films[1]['emitted_volume_cm3'] < 0.9 * films[0]['emitted_volume_cm3']
-    for plan, film in zip(plans, films, strict=True):
-        assert film['mean_um'] == pytest.approx(20.0, rel=0.01)
-        assert plan['sigma_n'] < 0.06
-    assert set(plans[0]['standoffs_m']) == {0.25}
-    assert set(plans[0]['leans_deg']) == {0.0}
-    assert all(0.2 <= standoff <= 0.3 for standoff in plans[1]['standoffs_m'])
-    assert all(abs(lean) <= 20.0 for lean in plans[1]['leans_deg'])
-    # The outermost guns look inwards: coordinates across grow from the first pass to the last.
-    assert plans[1]['leans_deg'][0] > 0.0 > plans[1]['leans_deg'][-1]
-    # No pass more than is worth its paint: sets that cost nearly the same count as equal.
-    assert plans[1]['passes'] == 3
-
-
-def test_a_range_of_standoffs_without_the_one_of_the_even_passes_is_refused(fender, tmp_path):
-    done = paint(
-        'plan', '--mesh', fender, '--target-um', 20, '--optimise', '--standoff-min', 0.3,
-        '--max-edge-length-m', 0.06, '-o', tmp_path,
-    )  # fmt: skip
-    assert_refused(done, '0.25 m', 'give a standoff')
-
-
-def test_a_trade_off_needs_an_optimised_plan(fender, tmp_path):
-    done = paint('plan', '--mesh', fender, '--speed', 0.3, '--pareto', '-o', tmp_path)
-    assert_refused(done, '--pareto', '--optimise')
+    done = paint('plan', '--mesh', fender, *options, '-o', tmp_path)
+    assert done.returncode == 0, done.stderr
+    told = json.loads(done.stdout)
+    plain, film = told['plain'], told['film']
+    assert told['passes'] <= plain['passes']
+    assert film['emitted_volume_cm3'] < 0.92 * plain['paint_cm3']
+    assert film['capture_fraction'] > 1.08 * plain['capture_fraction']
+    assert film['mean_um'] == pytest.approx(20.0, rel=0.01)
+    assert told['sigma_n'] < 0.06

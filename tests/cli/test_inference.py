@@ -80,7 +80,7 @@ def test_diagnose_writes_all_that_it_says(diagnosed):
     names = {path.name for path in folder.iterdir()}
     assert names == {
         MARKER, 'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv',
-        'report.html', 'comparison.png', 'residual_panel.ply', 'residual_door.ply',
+        'report.html', 'comparison.png',
     }  # fmt: skip
     rows = table(folder / 'residuals.csv')
     readings = table(SAMPLES / 'measured_door/panel.csv') + table(

@@ -4,9 +4,7 @@ import json
 
 import numpy as np
 import pytest
-import trimesh
 
-from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.motion.part_frame import Rigid
 
@@ -54,28 +52,5 @@ def test_bad_points_are_refused_with_their_files(tables, tmp_path):
     assert_refused(paint('locate', *tables), 'points.csv', 'give a column point')
 
 
-def test_what_belongs_together_must_be_given(tables):
-    assert_refused(paint('locate', *tables[:2]), 'give --touched and --points, or --scan and')
-    assert_refused(paint('locate', *tables, '--mesh', 'm.stl'), 'or --scan and --mesh')
-    assert_refused(paint('locate', '--scan', 's.stl', '--mesh', 'm.stl'), 's.stl: no such mesh')
-
-
-@pytest.mark.slow
-def test_a_scan_in_millimetres_gives_the_pose(tmp_path):
-    """The sample door is nearly the same on both sides, so a start is given."""
-    scan = trimesh.load_mesh(SAMPLES / 'door.stl')
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = POSE.rotation, POSE.translation_m
-    scan.apply_transform(matrix)
-    scan.apply_scale(1000.0)
-    scan.export(tmp_path / 'scan.stl')
-    near = (2.03, 0.48, 0.72, 0.0, 0.02, 0.59, 0.807)
-    done = paint(
-        'locate', '--scan', tmp_path / 'scan.stl', '--scan-scale', 0.001,
-        '--mesh', SAMPLES / 'door.stl', '--start', *near, '--json',
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
-    off = POSE.inverse() @ Rigid.of(figures['part_pose'])
-    assert np.linalg.norm(off.translation_m) < 2e-3
-    assert figures['rms_m'] < 1e-3
+def test_both_lists_must_be_given(tables):
+    assert_refused(paint('locate', *tables[:2]), "Missing option '--points'")

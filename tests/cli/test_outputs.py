@@ -1,4 +1,4 @@
-"""What commands print as JSON; `cli.command` holds every output against `report/outputs.py`."""
+"""What commands print as JSON; `cli.command` holds every output against `cli/outputs.py`."""
 
 import json
 
@@ -8,9 +8,9 @@ from pydantic import ValidationError
 
 from booth import SAMPLES
 from cli.command import KINDS, installed_paint, paint
+from cli.outputs import OUTPUTS
 from paint_deposition.cli.main import COMMANDS, Commands
 from paint_deposition.files.provenance import sha256
-from paint_deposition.report.outputs import OUTPUTS
 
 BAG = SAMPLES / 'door_horizontal'
 

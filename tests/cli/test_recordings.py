@@ -98,14 +98,3 @@ def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
     for command in (('inspect',), ('simulate', *given)):
         done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
         assert_refused(done, '--gun-signal is for RAPID modules')
-
-
-def test_runs_that_cannot_be_listed_are_named(tmp_path):
-    (tmp_path / '4711').mkdir()
-    assert_refused(paint('runs', tmp_path), f'{tmp_path} holds no run', 'change_part')
-    assert_refused(paint('runs', tmp_path / 'none'), 'none is no folder; give the output_dir')
-    (tmp_path / '4711/4711_0.mcap').write_bytes(b'')
-    (row,) = paint('runs', tmp_path).stdout.splitlines()[1:]
-    assert row.split() == ['4711', '-', '1', *'----------', 'unfinished']
-    (tmp_path / '4711/film.json').write_text('{"part": 3}')
-    assert_refused(paint('runs', tmp_path), '4711: film.json or metadata.yaml cannot be')

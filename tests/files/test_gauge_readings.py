@@ -58,10 +58,11 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
             ['x_m,y_m,thickness_um', '0,0,20'],
             r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
-        (['x_ft,y_m,z_m,thickness_um', '0,0,0,20'], 'no column with numbers is known as x'),
+        (['x_ft,y_m,z_m,thickness_um', '0,0,0,20'], 'no column is known as x'),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
-        (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column with numbers is known as the thick'),
-        (['x,y,z,base_um,clear_um', '0,0,0,1,2'], "may be in 'base_um', 'clear_um'; name one"),
+        (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
+        (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
+        (['x,y,z,base_um', '0,0,0,1'], r"'base_um'\); call it thickness_um, or give its heading"),
         (['point,thickness_um', 'A,20'], 'no coordinates .* a list of measuring points'),
         ([], 'there is nothing to read in it'),
         ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),
@@ -121,13 +122,3 @@ def test_predictions_keep_the_readings_own_columns(table, tmp_path):
         '0,0,1,20,"thin, I think",20.5000',
         '0,0,2,21,,21.2500',
     ]
-
-
-def test_a_film_without_a_column_of_its_own_is_refused_in_a_line(tmp_path):
-    """Columns of film without a heading that names it have no name to quote."""
-    path = tmp_path / 'door.txt'
-    path.write_text(
-        'point\tffrom_lef,,t\thei[mm]dft rom_left\thei[mm dtm]fils2\nP1\t10\t20\t1.2\n'
-    )
-    with pytest.raises(ReadingsError, match='the readings have no coordinates'):
-        read_readings(path)

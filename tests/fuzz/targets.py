@@ -10,7 +10,6 @@ from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
@@ -23,7 +22,6 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.parquet import write_parquet
-from paint_deposition.files.rapid.writer import gauge_module_text
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
@@ -199,10 +197,9 @@ def _measuring_points(path: Path) -> object:
 def targets() -> dict[str, Target]:
     """All readers by name."""
     points = b'point,x_m,y_m,z_m\nP1,0.1,0,0.2\nP2,0.2,0,0.2\n'
-    gauge = gauge_module_text(np.zeros((2, 3)), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
     return {
         'rapid': Target(
-            '.mod', read_recording, lambda: [RAPID, gauge.encode()], RAPID_WORDS
+            '.mod', read_recording, lambda: [RAPID], RAPID_WORDS
         ),
         'readings': _table(read_readings, *READINGS),
         'measuring_points': _table(_measuring_points, points),

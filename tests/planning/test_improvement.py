@@ -227,19 +227,6 @@ def _known(**widths):
 
 
 @pytest.mark.slow
-def test_an_uncertain_model_has_its_interval(panel, even):
-    known = _known(
-        log_K1=0.05, K2=0.03, K3_cos_phi=0.03, K3_sin_phi=0.03, r_m=0.004, log_sigma1=0.05,
-        log_sigma2=0.05,
-    )  # fmt: skip
-    better = pd.improve(panel, even.trajectory, SKEWED, posterior=known)
-    (low, high), (new_low, new_high) = better.sigma_n_interval
-    assert low < better.before.sigma_n < high
-    assert new_low < new_high
-    assert new_high < high
-
-
-@pytest.mark.slow
 def test_a_level_that_is_not_known_costs_no_evenness(panel, even, levelled):
     known = _known(log_K1=0.2)
     unsure = pd.improve(panel, even.trajectory, SKEWED, posterior=known, paint_weight=0.0)

@@ -58,6 +58,7 @@ def test_with_a_tolerance_the_widest_index_within_it_is_recommended():
 
 def test_drift_limits_are_where_the_tolerance_breaks():
     answer = recommended(tolerance=0.05)
+    assert answer.index_drift_m in answer.windows_m
     for index in answer.index_drift_m:
         assert sigma_n(SYMMETRIC, index) == pytest.approx(0.05, abs=1e-6)
     for change in answer.standoff_drift_m:
@@ -66,15 +67,9 @@ def test_drift_limits_are_where_the_tolerance_breaks():
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
 
 
-def test_drift_of_standoff_with_effects_is_computed_through_them():
+def test_with_effects_it_is_not_known_how_far_the_standoff_may_drift():
     narrow = SYMMETRIC.with_effect(EFFECTS['pattern_spread'](exponent=-0.5))
-    answer = recommended(narrow, tolerance=0.05)
-    bare = recommended(SYMMETRIC, tolerance=0.05)
-    assert answer.index_m == pytest.approx(bare.index_m, abs=1e-5)
-    for change, without in zip(answer.standoff_drift_m, bare.standoff_drift_m, strict=True):
-        there = sigma_n(narrow, answer.index_m, standoff_m=0.25 + change)
-        assert there == pytest.approx(0.05, abs=1e-4)
-        assert abs(change) > 1.5 * abs(without)
+    assert recommended(narrow, tolerance=0.05).standoff_drift_m is None
 
 
 def test_mean_film_and_speed_for_a_target():

@@ -106,13 +106,13 @@ def test_the_film_is_read_back_from_the_picture_through_its_colour_bar():
     true_um = 18.0 + 9.0 * centre[:, 0] + 6.0 * centre[:, 1]
     seen = pixels[len(pixels) - 1 - at[:, 1], at[:, 0]]
     off = np.abs(seen[:, None] - colours[None]).sum(axis=2)
-    # Elsewhere a contour, its label or the outline lies on top.
-    clear = off.min(axis=1) == 0
+    # Colours between those of the vertices; elsewhere a contour or the outline lies on top.
+    clear = off.min(axis=1) <= 6
     assert clear.mean() > 0.9
     # Where several rows of the bar have the colour, it is read in their middle.
     same = off == off.min(axis=1, keepdims=True)
     read_um = (same @ films) / same.sum(axis=1)
-    assert np.abs(read_um / true_um - 1.0)[clear].max() < 0.01
+    assert np.abs(read_um / true_um - 1.0)[clear].max() < 0.03
 
 
 @pytest.mark.slow
@@ -130,7 +130,8 @@ def test_the_bands_take_the_share_of_the_picture_that_the_figures_tell():
     ]
     # From 10 to 30 um across the panel: 15 and 21 um lie a quarter and eleven twentieths along.
     assert np.array(counts) / sum(counts) == pytest.approx([0.25, 0.3, 0.45], abs=0.005)
-    told = ' '.join(text.get_text() for legend in figure.legends for text in legend.get_texts())
+    legends = filter(None, (axes.get_legend() for axes in figure.axes))
+    told = ' '.join(text.get_text() for legend in legends for text in legend.get_texts())
     told_percent = [float(share) for share in re.findall(r'([\d.]+) %', told)]
     # The figures count whole vertices, here 20 mm apart.
     assert told_percent == pytest.approx([45.0, 30.0, 25.0], abs=2.0)

@@ -11,7 +11,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.inference import draw_profile, write_comparison_picture
+from paint_deposition.report.pictures.chart import save_picture
+from paint_deposition.report.pictures.comparison import comparison_figure, draw_profile
 from paint_deposition.report.style import ACCENT
 from small_campaign import small_campaign
 
@@ -22,7 +23,7 @@ def test_columns_and_strips_are_drawn(tmp_path):
         study = Study.of(small_campaign(tmp_path / style, experiments=('door',), style=style))
         model = DepositionModel()
         data = ReportData((compare(study, model),) * 2)
-        write_comparison_picture(tmp_path / f'{style}.png', data)
+        save_picture(comparison_figure(data), tmp_path / f'{style}.png')
         image = np.asarray(Image.open(tmp_path / f'{style}.png').convert('RGB'))
         accent = [int(ACCENT[k : k + 2], 16) for k in (1, 3, 5)]
         assert np.all(image == accent, axis=2).mean() > 2e-4

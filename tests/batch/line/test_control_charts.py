@@ -5,7 +5,6 @@ import pytest
 
 from paint_deposition.batch.line.control_charts import (
     charts,
-    cusum_limit,
     ewma_limit,
     robust_deviation,
     shewhart_limit,
@@ -13,11 +12,9 @@ from paint_deposition.batch.line.control_charts import (
 
 
 def test_limits_have_the_published_run_lengths():
-    # Montgomery (2012): 3 sigma 370; CUSUM with k = 0.5 has h = 4.77 for 370 and 5 for 465;
-    # Lucas and Saccucci (1990): EWMA with weight 0.2 has L = 2.962 for 500.
+    # Montgomery (2012): 3 sigma 370; Lucas and Saccucci (1990): EWMA with weight 0.2 has
+    # L = 2.962 for 500.
     assert shewhart_limit(370.4) == pytest.approx(3.0, abs=1e-3)
-    assert cusum_limit(370.0) == pytest.approx(4.77, abs=0.02)
-    assert cusum_limit(465.0) == pytest.approx(5.0, abs=0.02)
     assert ewma_limit(500.0) == pytest.approx(2.962, abs=0.01)
 
 
@@ -26,8 +23,6 @@ def test_each_chart_finds_a_step_and_keeps_quiet_before():
     values[40:] = 2.0
     found = charts(values, 1000.0)
     assert found.alarms['shewhart'].size == 0
-    # The CUSUM gains 1.5 a part.
-    assert found.alarms['cusum'][0] == 40 + int(cusum_limit(1000.0) / 1.5)
     assert 40 < found.alarms['ewma'][0] < 50
     values[50] = 5.0
     assert charts(values, 1000.0).alarms['shewhart'].tolist() == [50]
@@ -36,10 +31,9 @@ def test_each_chart_finds_a_step_and_keeps_quiet_before():
 def test_false_alarms_come_as_rarely_as_asked_for():
     run_length = 200.0
     values = np.random.default_rng(1).normal(size=40_000)
-    alarms = charts(values, run_length).alarms
-    for chart in ('shewhart', 'cusum'):
-        wanted = len(values) / run_length
-        assert abs(len(alarms[chart]) - wanted) < 4.0 * np.sqrt(wanted)
+    alarms = charts(values, run_length).alarms['shewhart']
+    wanted = len(values) / run_length
+    assert abs(len(alarms) - wanted) < 4.0 * np.sqrt(wanted)
 
 
 def test_a_step_does_not_widen_the_deviation():

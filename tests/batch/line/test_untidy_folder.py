@@ -5,8 +5,6 @@ import shutil
 
 import pyarrow.parquet as pq
 import pytest
-import trimesh
-import yaml
 
 from cli.command import assert_refused, paint
 from paint_deposition.batch.line.runs import line_cases
@@ -27,18 +25,6 @@ def line(tidy, tmp_path):
     return shutil.copytree(folder, tmp_path / 'line'), names
 
 
-def campaign_of(folder, run, mesh):
-    """The run as a campaign in a folder of its own."""
-    place = folder / '2026-11-09_campaign'
-    place.mkdir()
-    experiment = {
-        'name': 'part', 'mesh': str(mesh), 'trajectory': str(folder / run),
-        'state_topic': '/atomizer/state', 'measurements': str(folder / f'{run}.csv'),
-    }  # fmt: skip
-    told = {'date': '2026-11-09', 'experiments': [experiment]}
-    (place / 'campaign.yaml').write_text(yaml.safe_dump(told))
-
-
 @pytest.mark.slow
 def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     folder, names = line
@@ -51,9 +37,6 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     (folder / f'{label}.csv').rename(folder / f'{label}.CSV')
     (folder / 'unknown_door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
     (folder / 'empty').mkdir()
-    other = tmp_path / 'other.ply'
-    trimesh.load_mesh(folder / 'door.stl').export(other)
-    campaign_of(folder, good, other)
     done = paint('line', folder, '-o', tmp_path / 'out', '--workers', 1, '--json')
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
@@ -62,9 +45,8 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     assert 'two recordings have its name' in told['errors'][1]['error']
     remarks = {one['part']: one['remark'] for one in told['remarks']}
     assert remarks[gauge].startswith('simulated only: two files of readings have its name')
-    assert 'not pooled: other.ply is another mesh than door.stl' in remarks['2026-11-09_campaign']
     assert told['without_run'] == ['unknown_door.csv']
-    assert (told['parts'], told['measured'], told['points']) == (4, 2, 24)
+    assert (told['parts'], told['measured'], told['points']) == (3, 2, 24)
     for words in (*told['without_run'], *(one['run'] for one in told['errors']), *remarks):
         assert sum(words in text for text in done.stderr.splitlines()) == 1
     rows = pq.read_table(tmp_path / 'out/points.parquet').to_pylist()
@@ -72,15 +54,13 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     assert kept == {gauge: 1, label: 12, good: 12}
 
 
-def test_a_campaign_is_another_case_when_a_file_that_it_names_has_changed(line):
+def test_a_run_is_another_case_when_its_readings_have_changed(line):
     folder, names = line
-    campaign_of(folder, names[0], folder / 'door.stl')
     before = [case.digest for case in line_cases(folder)[0]]
     with (folder / f'{names[0]}.csv').open('a') as file:
         file.write('\n')
     after = [case.digest for case in line_cases(folder)[0]]
-    changed = [a != b for a, b in zip(before, after, strict=True)]
-    assert changed == [True, False, False, False, False, True]
+    assert [a != b for a, b in zip(before, after, strict=True)] == [True, *[False] * 4]
 
 
 @pytest.mark.slow

@@ -12,7 +12,7 @@ import yaml
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, installed_paint, paint
-from paint_deposition.batch.cases import FOLDER, ResultCache
+from paint_deposition.batch.cases import ResultCache
 from paint_deposition.batch.cluster import run, workers
 from paint_deposition.batch.sweep.case import computed, varied_motion
 from paint_deposition.batch.sweep.job import Job
@@ -51,7 +51,7 @@ def film_by_itself(k1: float, speed: float) -> pd.Film:
 @pytest.mark.slow
 def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
     job = Job.of(SweepFile.model_validate(TOLD), DOOR)
-    finished = ResultCache(tmp_path / FOLDER)
+    finished = ResultCache(tmp_path / 'finished')
     killed = []
 
     def kill_one(what: str, share: float) -> None:
@@ -79,7 +79,7 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
-    kept = sorted((output / FOLDER).iterdir())
+    kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
     again = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
     assert again['computed'] == 1
@@ -105,11 +105,6 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_
         (
             {'trajectory': None, 'state_topic': None, 'grid': {'index_m': [0.3]}},
             ['neither their speed nor a target', 'passes: {speed_m_per_s: ...}'],
-        ),
-        ({'campaign': str(DOOR / 'campaign.yaml')}, ['speed_factor varies', 'campaign']),
-        (
-            {'campaign': str(DOOR / 'campaign.yaml'), 'grid': {'planar.K2': [0.1]}},
-            ['campaign.yaml names no model', 'give model'],
         ),
     ],
 )
@@ -137,18 +132,6 @@ def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_work
     done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     done.stderr = done.stderr.splitlines()[-1]  # after the notes
     assert_refused(done, 'none of 2 cases has a result; case 1: ')
-
-
-def test_a_campaigns_own_model_is_varied(tmp_path):
-    door = yaml.safe_load((DOOR / 'campaign.yaml').read_text())['experiments'][:1]
-    door[0] |= {key: str(DOOR / door[0][key]) for key in ('mesh', 'trajectory', 'measurements')}
-    (tmp_path / 'model.yaml').write_text('planar: {K2: 0.4, r_m: 0.3}')
-    campaign = {'experiments': door, 'model': 'model.yaml'}
-    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(campaign))
-    told = {'campaign': 'campaign.yaml', 'grid': {'planar.K2': [0.1]}}
-    (case,) = Job.of(SweepFile.model_validate(told), tmp_path).cases
-    planar = case.given['model'].planar
-    assert (planar.K2, planar.r_m) == (0.1, 0.3)
 
 
 def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
@@ -186,7 +169,7 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
     motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
     alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
     file.unlink()
-    finished = ResultCache(tmp_path / FOLDER)
+    finished = ResultCache(tmp_path / 'finished')
     with workers(count=1) as client:
         run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()

@@ -122,7 +122,7 @@ def test_nothing_to_recover(tmp_path, shared_data):
         recover(tmp_path / 'none', tmp_path / 'recovered')
     with pytest.raises(RecordingError, match=r'holds no \.mcap file'):
         recover(tmp_path, tmp_path / 'recovered')
-    with pytest.raises(RecordingError, match='is not an MCAP file'):
+    with pytest.raises(RecordingError, match='not a valid MCAP file'):
         recover(shared_data / 'bags/evo_ROS_example.bag', tmp_path / 'recovered')
     writer = RunWriter(tmp_path / 'empty')
     writer.abandon()

@@ -1,9 +1,6 @@
-"""Passes and diagnoses as actions over real DDS: feedback, result, refusal and cancel."""
+"""Passes as an action over real DDS: feedback, result, refusal and cancel."""
 
 from __future__ import annotations
-
-import json
-import multiprocessing
 
 import pytest
 
@@ -11,7 +8,7 @@ pytest.importorskip('rclpy')
 
 from action_msgs.msg import GoalStatus
 from nav_msgs.msg import Path
-from paint_msgs.action import Diagnose, PlanPasses
+from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action import ActionClient
 from rclpy.node import Node
@@ -23,19 +20,18 @@ from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
-from small_campaign import small_campaign
 
 COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
 
 
 @pytest.fixture
-def planner(ros_context, spin, tmp_path):
+def planner(ros_context, spin):
     """`planner(**parameters)`: a planner that runs, and is closed at the end."""
     made = []
 
     def planner(**values) -> IndexPlanner:
-        chosen = COARSE | {'output_directory': str(tmp_path / 'runs')} | values
-        made.append(IndexPlanner(context=ros_context, parameter_overrides=parameters(**chosen)))
+        chosen = parameters(**COARSE | values)
+        made.append(IndexPlanner(context=ros_context, parameter_overrides=chosen))
         spin(made[-1])
         return made[-1]
 
@@ -99,19 +95,13 @@ def test_passes_are_planned_with_feedback(planner, ask, onlooker, wait_until, tm
     assert len(path.poses) > 10
 
 
-def test_what_has_no_answer_is_aborted_with_the_reason(planner, ask, tmp_path):
+def test_what_has_no_answer_is_aborted_with_the_reason(planner, ask):
     planner()
     status, result, _ = ask(PlanPasses, 'plan_passes')
     assert status == GoalStatus.STATUS_ABORTED
     assert result.message == 'mesh_file is empty: name the mesh of the part'
     status, result, _ = ask(PlanPasses, 'plan_passes', mesh_file='nowhere.stl')
     assert 'nowhere.stl: no such mesh file' in result.message
-    status, result, _ = ask(Diagnose, 'diagnose', campaign_file='x.yaml', name='../out')
-    assert status == GoalStatus.STATUS_ABORTED
-    assert "name '../out': use letters" in result.message
-    (tmp_path / 'runs/done').mkdir(parents=True)
-    _, result, _ = ask(Diagnose, 'diagnose', campaign_file='x.yaml', name='done')
-    assert 'runs/done is there already: choose another name' in result.message
 
 
 def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
@@ -132,34 +122,3 @@ def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
     assert heard[-1].stage == 'single passes'
     wait_until(answer.done)
     assert answer.result().success
-
-
-@pytest.mark.slow
-def test_a_diagnosis_answers_and_writes_its_files(planner, ask, tmp_path):
-    options = {'experiments': ('panel',), 'truth': 'clean', 'readings': 12, 'parcels': 20_000}
-    small_campaign(tmp_path / 'campaign', **options)
-    planner()
-    file = str(tmp_path / 'campaign/campaign.yaml')
-    status, result, heard = ask(Diagnose, 'diagnose', campaign_file=file, name='panel')
-    assert status == GoalStatus.STATUS_SUCCEEDED, result.message
-    written = json.loads((tmp_path / 'runs/panel/diagnosis.json').read_text())
-    assert result.verdict == written['verdict']
-    assert result.rmse_after_um == written['rmse_um']['after']
-    assert str(tmp_path / 'runs/panel/report.html') in result.paths
-    stages = [feedback.stage for feedback in heard]
-    assert {'starting', 'fitting the model', 'writing'} <= {*stages}
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize('stage', ['starting', 'fitting the model'])
-def test_a_diagnosis_is_cancelled_within_two_seconds(planner, ask, repository, tmp_path, stage):
-    """Also in a fit of many seconds; nothing is left of it."""
-    planner()
-    sample = repository / 'ros2_ws/src/paint_deposition/samples/measured_door/campaign.yaml'
-    status, _, heard = ask(
-        Diagnose, 'diagnose', cancel_at=stage, campaign_file=str(sample), name='door'
-    )
-    assert status == GoalStatus.STATUS_CANCELED
-    assert heard[-1].stage == stage
-    assert not (tmp_path / 'runs').exists()
-    assert not multiprocessing.active_children()

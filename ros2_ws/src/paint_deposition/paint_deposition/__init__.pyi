@@ -36,7 +36,6 @@ from paint_deposition.api.simulation import (
 from paint_deposition.api.simulation import (
     simulate as simulate,
 )
-from paint_deposition.api.speeds import compare_speeds as compare_speeds
 from paint_deposition.effects.deposition_model import DepositionModel as DepositionModel
 from paint_deposition.errors import PaintError as PaintError
 from paint_deposition.files.campaign_file import read_campaign as read_campaign
@@ -57,7 +56,6 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis as Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration as Calibration
 from paint_deposition.inference.readings.campaign import Campaign as Campaign
 from paint_deposition.inference.readings.readings import Readings as Readings
-from paint_deposition.motion.driven_speed import DrivenSpeed as DrivenSpeed
 from paint_deposition.motion.trajectory import Trajectory as Trajectory
 from paint_deposition.part.surface import Surface as Surface
 from paint_deposition.planning.improvement.improvement import Improvement as Improvement

@@ -18,7 +18,7 @@ from paint_deposition.inference.fitting.posterior import drawn
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import FilmAtPoints, simulated, stratified_sample
+from paint_deposition.planning.films import simulated
 from paint_deposition.planning.improvement.improvement import (
     DEFAULT_TOLERANCE,
     Improvement,
@@ -36,8 +36,7 @@ Progress = Callable[[str, float], None]
 COUNTED_ABOVE = 0.1
 # A gun whose mean direction is shorter paints more sides than one.
 ONE_SIDE = 0.9
-DRAWS, CHECKS = 8, 24
-QUANTILES = (0.05, 0.95)
+DRAWS = 8
 
 
 @takes(ImproveRequest)
@@ -98,11 +97,9 @@ def improve(
     band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
     before = LaidFilm.of(film_um, surface, target_region, band, paint.emitted_cm3, trajectory)
     after = LaidFilm.of(new_um, surface, target_region, band, new_paint.emitted_cm3, improved)
-    programmes = (given, Programme.of(improved))
     return Improvement(
         surface, target_region, model, request, trajectory, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
-        _interval(surface, target_region, model, posterior, programmes, seed),
         seen.geometry.warnings,
     )  # fmt: skip
 
@@ -124,25 +121,3 @@ def _read_back(passes: Passes) -> tuple[Trajectory, Trajectory]:
             read_recording(Path(aside) / BAG, frame_id=frame),
             read_recording(Path(aside) / PROGRAM, frame_id=frame),
         )
-
-
-def _interval(
-    surface: Surface,
-    target_region: np.ndarray,
-    model: DepositionModel,
-    posterior: Posterior | None,
-    programmes: tuple[Programme, Programme],
-    seed: int,
-) -> tuple[tuple[float, float], tuple[float, float]] | None:
-    """Quantiles of sigma_n before and after over draws that the search has not seen."""
-    if posterior is None:
-        return None
-    rows = np.flatnonzero(target_region)
-    rows = rows[stratified_sample(surface.vertex_areas_m2[target_region])]
-    found = []
-    for drawn_model in drawn(model, posterior, CHECKS, seed + 1):
-        films = FilmAtPoints(surface, rows, drawn_model)
-        laid = [films.film_um(programme) for programme in programmes]
-        found.append([film.std() / film.mean() for film in laid])
-    low, high = np.quantile(np.array(found), QUANTILES, axis=0)
-    return (float(low[0]), float(high[0])), (float(low[1]), float(high[1]))

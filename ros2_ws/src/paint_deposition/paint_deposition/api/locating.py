@@ -2,17 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.gauge_readings import read_points
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.part_location import PartPlace, locate, register
-
-# For distances the surface need not be refined.
-UNREFINED_M = 10.0
+from paint_deposition.motion.part_location import PartPlace, locate
 
 
 def locate_by_points(
@@ -33,31 +27,3 @@ def locate_by_points(
         return locate(*given)
     except RecordingError as error:
         raise RecordingError(f'{touched} and {points}: {error}') from None
-
-
-def locate_by_scan(
-    scan: str | Path,
-    mesh: str | Path,
-    start: Sequence[float] | None = None,
-    scan_scale: float = 1.0,
-    mesh_scale: float = 1.0,
-) -> PartPlace:
-    """The pose of a part from a scan of it in the robot's frame.
-
-    Args:
-        scan, mesh: mesh files. start: pose to begin with, [x y z qx qy qz qw].
-        scan_scale, mesh_scale: metres per unit of the files.
-
-    Raises:
-        MeshError: a mesh cannot be read.
-    """
-    from trimesh import Trimesh
-
-    found, part = (
-        Trimesh(surface.vertices_m, surface.faces, process=False)
-        for surface in (
-            read_mesh(scan, scan_scale, UNREFINED_M),
-            read_mesh(mesh, mesh_scale, UNREFINED_M),
-        )
-    )
-    return register(found, part, None if start is None else Rigid.of(start))

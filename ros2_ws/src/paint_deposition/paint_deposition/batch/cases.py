@@ -26,7 +26,6 @@ from paint_deposition.files.parquet import write_parquet
 if TYPE_CHECKING:
     import pyarrow as pa
 
-FOLDER = 'finished'
 Columns = Mapping[str, Any]
 
 

@@ -43,17 +43,13 @@ def compute(
     results: ResultCache,
     progress: Callable[..., None],
 ) -> tuple[int, str]:
-    """Start workers if a case is left, compute it, and stop them.
-
-    Args:
-        scheduler, count: of ``workers``.
-        work, cases, inputs, results, progress: of ``run``.
+    """Start workers if a case is left, compute it, and stop them; arguments as below.
 
     Returns:
-        How many cases were computed, and the workers in words, '' where none was needed.
+        How many cases were computed, and the workers in words.
     """
     if all(results.has(case.digest) for case in cases):
-        return 0, ''
+        return 0, 'none: every case had been finished'
     progress('starting the workers')
     with workers(scheduler, count) as client:
         described = _in_words(client)  # before any of them may end
@@ -102,18 +98,18 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             ) from None
         # A lost connection becomes an error of one line in ``run``.
         with silence_logging_cmgr(logging.CRITICAL), client:
-            _require_same_version(client, scheduler)
+            own, theirs = paint_deposition.__version__, client.run(_version)
+            if set(theirs.values()) != {own}:  # films are the same only by the same code
+                raise ManyError(
+                    f'the workers at {scheduler} have paint_deposition '
+                    f'{", ".join(sorted(set(theirs.values()))) or "nowhere: there is none"}, this '
+                    f'is {own}; start `dask worker {scheduler} --nthreads 1` with the same version'
+                )
             yield client
 
 
-def require_alone(scheduler: str | None, count: int | None) -> None:
-    """Refuse a number of processes beside a scheduler, which has its own.
-
-    Raises:
-        ManyError: both are given.
-    """
-    if scheduler is not None and count is not None:
-        raise ManyError('--workers is for this machine; leave it out beside --scheduler')
+def _version() -> str:
+    return paint_deposition.__version__
 
 
 def _in_words(client: Client) -> str:
@@ -123,22 +119,6 @@ def _in_words(client: Client) -> str:
     each = f'{min(memory) / 2**30:.1f} GiB' if all(memory) else 'unlimited memory'
     plural = '' if len(memory) == 1 else 'es'
     return f'{len(memory)} worker process{plural} of {each} at {info["address"]}'
-
-
-def _require_same_version(client: Client, scheduler: str) -> None:
-    """Films are the same on all workers only if all run the same code."""
-    versions = client.run(lambda: paint_deposition.__version__)
-    if not versions:
-        raise ManyError(
-            f'the scheduler at {scheduler} has no worker; start some with '
-            f'`dask worker {scheduler} --nthreads 1`'
-        )
-    for worker, version in versions.items():
-        if version != paint_deposition.__version__:
-            raise ManyError(
-                f'worker {worker} has paint_deposition {version}, this is '
-                f'{paint_deposition.__version__}; install the same everywhere'
-            )
 
 
 def run(
@@ -151,11 +131,10 @@ def run(
 ) -> int:
     """Compute the cases that are not finished yet, and return how many those were.
 
-    An input is sent once. It travels as the result of a task of its own: the scheduler can make
-    it anew when the only worker that holds it dies, and workers hand it to each other. Cases of a
-    worker that dies are run again by another one. A case that ends its worker again and again, or
-    fails in a way that is not foreseen, has the reason in its column ``error`` and is tried again
-    by the next run.
+    An input is sent once, as the result of a task of its own: the scheduler can make it anew when
+    the only worker that holds it dies. Cases of a worker that dies are run again by another one. A
+    case that ends its worker again and again, or fails in a way that is not foreseen, has the
+    reason in its column ``error`` and is tried again by the next run.
 
     Args:
         client: of ``workers``.
@@ -223,14 +202,13 @@ def _as_done(client: Client, futures: Sequence[Future]) -> Iterator[Future]:
             continue
         time.sleep(RESULTS_S)
         now_s = time.monotonic()
-        if now_s < looked_s + WORKERS_S:
-            continue
-        looked_s = now_s
-        with suppress(OSError):  # the scheduler is lost: the futures will say so
-            if client.scheduler_info(n_workers=-1)['workers']:
-                there_s = now_s
-        if now_s > there_s + PATIENCE_S:
-            raise ManyError(f'no worker has been there for {PATIENCE_S:.0f} s; {RESUME}')
+        if now_s > looked_s + WORKERS_S:
+            looked_s = now_s
+            with suppress(OSError):  # the scheduler is lost: the futures will say so
+                if client.scheduler_info(n_workers=-1)['workers']:
+                    there_s = now_s
+            if now_s > there_s + PATIENCE_S:
+                raise ManyError(f'no worker has been there for {PATIENCE_S:.0f} s; {RESUME}')
 
 
 def _result(future: Future) -> tuple[Columns, str | None]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
+from functools import reduce
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -21,58 +23,56 @@ from paint_deposition.cli.results_folder import results_in
 from paint_deposition.errors import ManyError
 from paint_deposition.files.parquet import MANY, require_libraries
 
-SCHEDULER = click.option(
-    '--scheduler', metavar='ADDRESS',
-    help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
-    'machine.',
-)  # fmt: skip
-WORKERS = click.option(
-    '--workers', 'count', type=click.IntRange(min=1),
-    help='Processes on this machine, of one thread each; default: one a core.',
-)  # fmt: skip
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from paint_deposition.batch.cases import Case, ResultCache
 
 MOST_WARNINGS = 5
+# Of finished cases, in the folder of the results.
+FINISHED = 'finished'
+WORKERS = (
+    click.option(
+        '--scheduler', metavar='ADDRESS',
+        help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
+        'machine.',
+    ),
+    click.option(
+        '--workers', 'count', type=click.IntRange(min=1),
+        help='Processes on this machine, of one thread each; default: one a core.',
+    ),
+    PICTURES,
+    JSON,
+)  # fmt: skip
+
+
+def with_workers(command: Callable) -> Callable:
+    """Give a command the options ``WORKERS``."""
+    return reduce(lambda taken, option: option(taken), reversed(WORKERS), command)
 
 
 @click.command('sweep')
 @click.argument('sweep', type=FILE)
 @output_option('cases.parquet, sweep.json and sweep.png')
-@SCHEDULER
-@WORKERS
-@PICTURES
-@JSON
-def sweep_command(
-    sweep: Path,
-    output: Path,
-    scheduler: str | None,
-    count: int | None,
-    pictures: str,
-    as_json: bool,
-) -> None:
+@with_workers
+def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, **where: Any) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
-    Each case is what `simulate` computes, or `compare` for a campaign. Finished cases are kept in
+    Each case is what `simulate` computes. Finished cases are kept in
     the folder `finished` of the output: a run that was cut off computes the rest only, and so does
     a sweep with more cases.
     """
     require_libraries('paint sweep', MANY)
-    from paint_deposition.batch.cases import FOLDER as FINISHED
-    from paint_deposition.batch.cases import ResultCache
-    from paint_deposition.batch.cluster import compute, require_alone
     from paint_deposition.batch.sweep.case import computed
     from paint_deposition.batch.sweep.job import Job
     from paint_deposition.batch.sweep.result import Sweep, write_sweep
     from paint_deposition.batch.sweep.sweep_file import read_sweep
 
-    require_alone(scheduler, count)
     with Progress('sweep') as show:
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
-        finished = ResultCache(output / FINISHED)
         say_all('note', job.notes)
-        done, workers = compute(scheduler, count, computed, job.cases, job.inputs, finished, show)
-        workers = workers or 'none: every case had been finished'
-        say_all('note', [f'workers: {workers}'])
+        finished, done, workers = _computed(computed, job.cases, job.inputs, output, show, **where)
         show('writing and drawing')
         found = Sweep.of(job, finished, done, workers)
         if len(found.errors) == len(job.cases):
@@ -87,19 +87,9 @@ def sweep_command(
 
 @click.command('line')
 @click.argument('folder', type=FOLDER)
-@output_option('points.parquet, parts.parquet, line.json, line.png and report.html')
-@SCHEDULER
-@WORKERS
-@PICTURES
-@JSON
-def line_command(
-    folder: Path,
-    output: Path,
-    scheduler: str | None,
-    count: int | None,
-    pictures: str,
-    as_json: bool,
-) -> None:
+@output_option('points.parquet, parts.parquet, line.json and line.png')
+@with_workers
+def line_command(folder: Path, output: Path, pictures: str, as_json: bool, **where: Any) -> None:
     """Simulate and compare all runs in FOLDER, and show what they share and what changes.
 
     FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
@@ -107,24 +97,17 @@ def line_command(
     folder `finished` of the output: the next time only new runs are computed.
     """
     require_libraries('paint line', MANY)
-    from paint_deposition.batch.cases import FOLDER as FINISHED
-    from paint_deposition.batch.cases import ResultCache
-    from paint_deposition.batch.cluster import compute, require_alone
     from paint_deposition.batch.line.output import write_line
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
 
-    require_alone(scheduler, count)
     with Progress('line') as show:
         show('reading')
         cases, file, model, strays = line_cases(folder)
-        finished, digests = ResultCache(output / FINISHED), [case.digest for case in cases]
-        done, workers = compute(scheduler, count, computed, cases, {}, finished, show)
-        workers = workers or 'none: every run had been finished'
-        say_all('note', [f'workers: {workers}'])
+        finished, done, workers = _computed(computed, cases, {}, output, show, **where)
         show('pooling')
-        table = finished.table(digests)
+        table = finished.table(case.digest for case in cases)
         found = Line(folder, model, shared_files(folder, file), table, done, workers, strays)
         if not found.runs:
             name, error = found.errors[0]
@@ -137,6 +120,27 @@ def line_command(
         named = ', '.join(strays[:MOST_WARNINGS])
         say_all('warning', [f'no recording has the name of {named}{more}; left out'])
     _say_results(output / 'line.json', as_json, [*found.lines, *file_lines(files)])
+
+
+def _computed(
+    work: Callable,
+    cases: Sequence[Case],
+    inputs: Mapping[str, Any],
+    output: Path,
+    show: Callable[..., None],
+    scheduler: str | None,
+    count: int | None,
+) -> tuple[ResultCache, int, str]:
+    """The finished cases, how many were computed now, and by which workers."""
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.cluster import compute
+
+    if scheduler is not None and count is not None:
+        raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
+    finished = ResultCache(output / FINISHED)
+    done, workers = compute(scheduler, count, work, cases, inputs, finished, show)
+    say_all('note', [f'workers: {workers}'])
+    return finished, done, workers
 
 
 def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:

@@ -4,26 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
-    BODY,
     FILE,
     JSON,
-    MESH,
-    MESH_SCALE,
     MODEL,
-    PARETO,
     PICTURES,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     motion_options,
     output_option,
+    part_options,
     say_all,
     say_results,
     seed_option,
@@ -31,14 +26,11 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
-from paint_deposition.planning.requests import PAINT_WEIGHTS, ImproveRequest
-
-if TYPE_CHECKING:
-    import numpy as np
+from paint_deposition.planning.requests import ImproveRequest
 
 
 @click.command('improve')
-@MESH
+@part_options(0.02)
 @click.option(
     '--trajectory', required=True, type=FILE,
     help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',
@@ -50,29 +42,19 @@ if TYPE_CHECKING:
 )  # fmt: skip
 @output_option('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
 @options_of(ImproveRequest)
-@PARETO
 @seed_option('the models drawn from what the model file knows')
 @motion_options
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.02)
-@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
 @PICTURES
 @JSON
 def improve_command(
     request: ImproveRequest,
-    mesh: Path,
+    part: dict[str, Any],
     trajectory: Path,
     model_file: Path | None,
     rivals: tuple[Path, ...],
     output: Path,
     seed: int,
     motion: dict[str, Any],
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
-    down: np.ndarray | None,
-    pareto: bool,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -87,22 +69,15 @@ def improve_command(
         chosen = model_for(model_file, trajectory)
         recorded = pd.read_recording(trajectory, **motion)
         show('refining the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
-        rest: dict[str, Any] = {
-            'posterior': chosen.file.posterior if chosen.file else None,
-            'rivals': [pd.read_model(path) for path in rivals],
-            'seed': seed, 'progress': show, **dict(request),
-        }  # fmt: skip
-        result = pd.improve(surface, recorded, chosen.model, **rest)
-        rest |= {'target_region': result.target_region}
-        others = [
-            pd.improve(
-                result.surface, recorded, chosen.model, **rest | {'paint_weight': weight}
-            ).points[1]
-            for weight in (PAINT_WEIGHTS if pareto else ())
-        ]
+        surface = pd.read_mesh(**part)
+        result = pd.improve(
+            surface, recorded, chosen.model,
+            posterior=chosen.file.posterior if chosen.file else None,
+            rivals=[pd.read_model(path) for path in rivals],
+            seed=seed, progress=show, **dict(request),
+        )  # fmt: skip
         made_from = {
-            'mesh_file': str(mesh),
+            'mesh_file': str(part['path']),
             'trajectory': str(trajectory),
             'model_file': str(chosen.path or ''),
             'rivals': [str(path) for path in rivals],
@@ -111,7 +86,7 @@ def improve_command(
         show('writing and drawing')
         files = write_results(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
-            pictures=pictures, trade_off=others,
+            pictures=pictures,
         )  # fmt: skip
     say_all('note', [*result.surface.notes, *recorded.notes])
     say_all('warning', [*recorded.warnings, *result.warnings])
@@ -128,12 +103,6 @@ def _lines(result: pd.Improvement) -> Iterator[str]:
         f'film {before.min_um:.1f} to {before.max_um:.1f} µm before, {after.min_um:.1f} to '
         f'{after.max_um:.1f} µm after; mean {before.mean_um:.1f} and {after.mean_um:.1f} µm'
     )
-    if result.sigma_n_interval:
-        (low, high), (new_low, new_high) = result.sigma_n_interval
-        yield (
-            f'with what is not known of the model: sigma_n {100 * low:.1f} to {100 * high:.1f} % '
-            f'before, {100 * new_low:.1f} to {100 * new_high:.1f} % after'
-        )
     for change in result.changes:
         yield change.sentence
     yield from result.limit_sentences

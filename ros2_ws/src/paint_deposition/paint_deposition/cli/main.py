@@ -29,9 +29,8 @@ COMMANDS = {
     'refit': ('inference', 'Add an effect of your choice and fit anew.'),
     'sweep': ('batch', 'Many variations of one job, on all cores or a cluster.'),
     'line': ('batch', 'Many parts over days: what they share and what changes.'),
-    'locate': ('locate', 'Find where the part stands, by touched points or a scan.'),
+    'locate': ('locate', 'Find where the part stands, by touched points.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'runs': ('recordings', 'List what a cell has painted, part by part, with figures.'),
     'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
 }
 

@@ -4,27 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import chosen_model, model_for
 from paint_deposition.cli.options import (
-    BODY,
     BRUSH,
     FILE,
     JSON,
     MAX_POSE_GAP,
-    MESH,
-    MESH_SCALE,
     MODEL,
     PICTURES,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     motion_options,
     output_option,
+    part_options,
     say_all,
     say_results,
     write_results,
@@ -33,15 +29,12 @@ from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 
-if TYPE_CHECKING:
-    import numpy as np
-
 # Below this probability an effect is named as one that the part hardly shows.
 HARDLY = 0.15
 
 
 @click.command('measure')
-@MESH
+@part_options(0.01)
 @click.option(
     '--trajectory', type=FILE,
     help='How it is painted: what `simulate` takes; default: passes as `plan` would lay them, '
@@ -51,31 +44,21 @@ HARDLY = 0.15
 @BRUSH
 @options_of(MeasureRequest)
 @options_of(FilmBuild, into='passes')
-@output_option('points.csv, poses.csv, points.mod, points.png and measure.json')
+@output_option('points.csv, poses.csv, points.png and measure.json')
 @motion_options
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.01)
 @MAX_POSE_GAP
-@direction_option(
-    '--down', 'Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.'
-)
 @PICTURES
 @JSON
 def measure_command(
     request: MeasureRequest,
     passes: FilmBuild,
-    mesh: Path,
+    part: dict[str, Any],
     trajectory: Path | None,
     model_file: Path | None,
     brush: int,
     output: Path,
     motion: dict[str, Any],
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
     max_pose_gap_s: float,
-    down: np.ndarray | None,
     pictures: str,
     as_json: bool,
 ) -> None:
@@ -96,7 +79,7 @@ def measure_command(
             if trajectory
             else chosen_model(model_file, brush=brush)
         )
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
+        surface = pd.read_mesh(**part)
         warnings: tuple[str, ...] = ()
         if trajectory is None:
             recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
@@ -109,7 +92,7 @@ def measure_command(
             progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
-            'mesh_file': str(mesh),
+            'mesh_file': str(part['path']),
             'trajectory': str(trajectory or ''),
             'model_file': str(chosen.path or ''),
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -47,10 +47,6 @@ PICTURES = click.option(
     '--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png', show_default=True,
     help='Format of the pictures.',
 )  # fmt: skip
-PARETO = click.option(
-    '--pareto', is_flag=True,
-    help='Sweep the weight of the paint and plot the Pareto front of evenness over paint.',
-)  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
 
@@ -59,9 +55,6 @@ def model_option(text: str) -> Callable:
     return click.option('--model', 'model_file', type=FILE, help=text)
 
 
-MESH = click.option(
-    '--mesh', required=True, type=FILE, help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'
-)
 MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
 
 
@@ -87,11 +80,6 @@ def output_option(what: str, default: str | None = None) -> Callable:
 def seed_option(of: str) -> Callable:
     """The seed of what a command draws at random."""
     return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
-
-
-def direction_option(name: str, text: str) -> Callable:
-    """A direction in space, (3,) finite numbers that are not all zero, or None."""
-    return click.option(name, nargs=3, type=NUMBER, metavar='X Y Z', callback=_vector, help=text)
 
 
 def _vector(
@@ -121,14 +109,6 @@ def _pose(
     return list(given)
 
 
-MESH_SCALE = click.option(
-    '--mesh-scale', default=1.0, show_default=True, type=POSITIVE,
-    help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP name '
-    'their unit: leave it out there.',
-)  # fmt: skip
-BODY = click.option(
-    '--body', help='The one body to take of a mesh file with several; default: all as one part.'
-)
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
     help='A longer time between poses is a gap: gun off.',
@@ -184,26 +164,50 @@ MOTION = (
 )  # fmt: skip
 
 
-def motion_options(command: Callable) -> Callable:
-    """Give a command the options ``MOTION``; it takes what was given as ``motion``."""
-
-    @wraps(command)
-    def with_motion(**given: Any) -> Any:
-        return command(motion={name: given.pop(name) for name in names}, **given)
+def _grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Callable]:
+    """Give a command these options; it takes what was given as one argument."""
 
     def with_options(function: Callable) -> Callable:
-        return reduce(lambda taken, option: option(taken), reversed(MOTION), function)
+        return reduce(lambda taken, option: option(taken), reversed(options), function)
 
-    names = [option.name for option in click.command('motion')(with_options(lambda: None)).params]
-    return with_options(with_motion)
+    def with_group(command: Callable) -> Callable:
+        @wraps(command)
+        def with_one(**given: Any) -> Any:
+            return command(**{into: {name: given.pop(name) for name in names}}, **given)
+
+        return with_options(with_one)
+
+    names = [option.name for option in click.command('any')(with_options(lambda: None)).params]
+    return with_group
 
 
-def max_edge_length_option(default_m: float) -> Callable:
-    """How fine the mesh is refined."""
-    return click.option(
-        '--max-edge-length-m', default=default_m, show_default=True, type=POSITIVE,
-        help='Triangles are split until no edge is longer.',
+motion_options = _grouped(MOTION, 'motion')
+
+
+def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
+    """The part and how its mesh is read: a command takes ``read_mesh``'s arguments as ``part``."""
+    options = (
+        click.option('--mesh', 'path', required=required, type=FILE,
+                     help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'),
+        click.option(
+            '--mesh-scale', 'scale', default=1.0, show_default=True, type=POSITIVE,
+            help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP '
+            'name their unit: leave it out there.',
+        ),
+        click.option(
+            '--body',
+            help='The one body to take of a mesh file with several; default: all as one part.',
+        ),
+        click.option(
+            '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
+            help='Triangles are split until no edge is longer.',
+        ),
+        click.option(
+            '--down', nargs=3, type=NUMBER, metavar='X Y Z', callback=_vector,
+            help='Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.',
+        ),
     )  # fmt: skip
+    return _grouped(options, 'part')
 
 
 def read_inputs(

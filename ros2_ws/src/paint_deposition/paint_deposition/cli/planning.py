@@ -2,31 +2,25 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import chosen_model
 from paint_deposition.cli.options import (
-    BODY,
     BRUSH,
     JSON,
-    MESH,
-    MESH_SCALE,
     MODEL,
-    PARETO,
     PART_POSE,
     PICTURES,
     FiniteRange,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     output_option,
     paint_lines,
+    part_options,
     say_all,
     say_results,
     write_results,
@@ -34,14 +28,10 @@ from paint_deposition.cli.options import (
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import (
-    PAINT_WEIGHTS,
     GunEnvelope,
     IndexRequest,
     PlanRequest,
 )
-
-if TYPE_CHECKING:
-    import numpy as np
 
 
 @click.command('recommend')
@@ -87,15 +77,10 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@MESH
+@part_options(0.02)
 @MODEL
 @BRUSH
 @options_of(PlanRequest)
-@PARETO
-@direction_option('--down', 'Gravity in the mesh frame; -z, or -y if drawn flat at z = 0.')
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.02)
 @PART_POSE
 @click.option(
     '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
@@ -116,33 +101,26 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
-    mesh: Path,
+    part: dict[str, Any],
     model_file: Path | None,
     brush: int,
     output: Path,
-    down: np.ndarray | None,
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
     part_pose: list[float] | None,
     frame_id: str | None,
     faces: str,
     face_angle_deg: float,
-    pareto: bool,
     pictures: str,
     as_json: bool,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     from paint_deposition.planning.clearance import contacts
 
-    if pareto and not request.optimise:
-        raise click.UsageError('--pareto weighs paint in an optimised plan; add --optimise')
     chosen, wanted = chosen_model(model_file, brush=brush), dict(request)
     model = chosen.model
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as show:
         show('reading the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
+        surface = pd.read_mesh(**part)
         frame = frame_id if part_pose is None else 'part'
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
@@ -154,21 +132,16 @@ def plan_command(
                 progress=show, **wanted,
             )  # fmt: skip
             touched = result.contacts
-        weights = PAINT_WEIGHTS if pareto else ()
-        others = [
-            pd.plan(surface, model, progress=show, **wanted | {'paint_weight': weight}).point
-            for weight in weights
-        ]
         show('writing')
         made_from = {
-            'mesh': str(mesh),
+            'mesh': str(part['path']),
             'model': str(model_file or 'default'),
             'frame_id': frame_id,
             'part_pose': part_pose,
         }
         files = write_results(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
-            pictures=pictures, trade_off=others,
+            pictures=pictures,
         )  # fmt: skip
     say_all('note', surface.notes)
     say_all('warning', map(str, touched))
@@ -192,12 +165,6 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
                 f'the {1e3 * gun.before_m:.0f} mm before it keep clear of the part'
             )
         return
-    styles = [planned.style for planned in result.passes]
-    if len({(style.standoff_m, style.lean_rad) for style in styles}) > 1:
-        yield 'standoff and lean, pass by pass: ' + ', '.join(
-            f'{style.standoff_m * 1e3:.0f} mm {math.degrees(style.lean_rad):+.0f} deg'
-            for style in styles
-        )
     if result.plain:
         plain, paint = result.plain, result.plain.statistics
         yield (

@@ -1,4 +1,4 @@
-"""Commands on recordings: `inspect`, `recover` and `runs`."""
+"""Commands on recordings: `inspect` and `recover`."""
 
 from __future__ import annotations
 
@@ -11,15 +11,12 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.options import (
-    BODY,
     FILE,
-    FOLDER,
     JSON,
     MAX_POSE_GAP,
-    MESH_SCALE,
-    direction_option,
     model_option,
     motion_options,
+    part_options,
     say_all,
 )
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
@@ -27,40 +24,25 @@ from paint_deposition.files.json_files import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
-    import numpy as np
-
     from paint_deposition.files.recordings.bag_summary import BagSummary
-    from paint_deposition.files.recordings.cell_runs import CellRun
-
-# A picture shows no finer mesh than this.
-MAX_EDGE_LENGTH_M = 0.02
 
 
 @click.command('inspect')
 @click.argument('recording', type=FILE, required=False)
-@click.option('--mesh', type=FILE, help='A part to set beside the motion.')
+@part_options(0.02, required=False)
 @click.option('--trajectory', type=FILE, help='The motion to set beside the part; or RECORDING.')
 @click.option(
     '--out', '--output', '-o', 'output', type=FILE,
-    help='Picture to draw, PNG: part, passes and tool axes from three sides; or the speeds.',
-)  # fmt: skip
-@click.option(
-    '--programmed', type=FILE,
-    help='The programme that the robot ran, a RAPID module or a table of passes: the speed '
-    'driven against the programmed one.',
+    help='Picture to draw, PNG: part, passes and tool axes from three sides.',
 )  # fmt: skip
 @model_option('Model that says where the spray goes; default: a 50 mm bell.')
 @motion_options
-@MESH_SCALE
-@BODY
-@direction_option('--down', 'Gravity in the mesh frame; default: as guessed.')
 @MAX_POSE_GAP
 @JSON
 def inspect_command(
     recording: Path | None,
-    mesh: Path | None,
+    part: dict[str, Any],
     trajectory: Path | None,
-    programmed: Path | None,
     max_pose_gap_s: float,
     motion: dict[str, Any],
     as_json: bool,
@@ -74,29 +56,16 @@ def inspect_command(
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
-
-    With --programmed: the speed of the TCP along the way sprayed, pass by pass, against the
-    programmed one.
     """
     path = trajectory or recording
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
-    if programmed is not None:
-        if mesh is not None or options['model_file']:
-            raise click.UsageError(
-                '--programmed cannot be combined with --mesh or --model; run inspect twice'
-            )
-        from paint_deposition.cli.speeds import show_speeds
-
-        show_speeds(path, programmed, motion, max_pose_gap_s, options['output'], as_json)
-    elif mesh is not None:
-        _show_gun_on_part(mesh, path, motion, max_pose_gap_s, as_json, **options)
+    if part['path'] is not None:
+        _show_gun_on_part(part, path, motion, max_pose_gap_s, as_json, **options)
     else:
         gun_signal = motion.pop('gun_signal')
         if any(options[name] for name in ('output', 'model_file')) or any(motion.values()):
-            raise click.UsageError(
-                '--out, --model and how the motion is read need --mesh or --programmed'
-            )
+            raise click.UsageError('--out, --model and how the motion is read need --mesh')
         _show_contents(path, gun_signal, max_pose_gap_s, as_json)
 
 
@@ -164,7 +133,7 @@ def _bag_contents(summary: BagSummary) -> str:
 
 
 def _show_gun_on_part(
-    mesh: Path,
+    part: dict[str, Any],
     path: Path,
     motion: dict[str, Any],
     max_pose_gap_s: float,
@@ -172,15 +141,13 @@ def _show_gun_on_part(
     *,
     output: Path | None,
     model_file: Path | None,
-    mesh_scale: float,
-    body: str | None,
-    down: np.ndarray | None,
 ) -> None:
     """Print how the gun ran over a part and what is odd, and draw it if a picture is wanted."""
+    mesh = part['path']
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        surface = pd.read_mesh(mesh, mesh_scale, MAX_EDGE_LENGTH_M, down, body)
+        surface = pd.read_mesh(**part)
         model = model_for(model_file, path).model
         seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
@@ -247,49 +214,3 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     for topic, count in recovery.counts.items():
         click.echo(f'{count:10d}  {topic}')
     click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
-
-
-@click.command('runs')
-@click.argument('folder', type=FOLDER)
-@JSON
-def runs_command(folder: Path, as_json: bool) -> None:
-    """List the runs in FOLDER, the output_directory of the nodes: each coat on each part.
-
-    Shown are the part, when it came, its poses, its film and whether the recording is complete.
-    """
-    from paint_deposition.files.recordings.cell_runs import read_cell_runs
-
-    runs = read_cell_runs(folder)
-    if as_json:
-        figures = {'folder': str(folder), 'runs': [asdict(run) for run in runs]}
-        click.echo(json_text(figures | {'provenance': origin()}))
-        return
-    headings = (
-        'run', 'type', 'coat', 'since', 'poses', 'gaps', 'mean µm', 'std µm', 'min', 'max',
-        'coverage', 'in target', 'cm3', 'recording',
-    )  # fmt: skip
-    rows = [headings, *(_run_row(run) for run in runs)]
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    for row in rows:
-        cells = (cell.ljust(width) for cell, width in zip(row, widths, strict=True))
-        click.echo('  '.join(cells).rstrip())
-
-
-def _run_row(run: CellRun) -> tuple[str, ...]:
-    def cell(value: float | None, form: str) -> str:
-        return '-' if value is None else format(value, form)
-
-    film = run.film
-    return (
-        run.run,
-        run.type or '-',
-        str(run.coat),
-        run.since[:19].replace('T', ' ') or '-',
-        cell(run.poses, 'd'),
-        cell(run.gaps, 'd'),
-        *(cell(film.get(name), '.1f') for name in ('mean_um', 'std_dev_um', 'min_um', 'max_um')),
-        cell(film.get('coverage'), '.1%'),
-        cell(film.get('within_target'), '.1%'),
-        cell(film.get('painted_volume_cm3'), '.2f'),
-        run.recording,
-    )

@@ -5,40 +5,32 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 import paint_deposition as pd
 from paint_deposition.cli.model_choice import models_for
 from paint_deposition.cli.options import (
-    BODY,
     FILE,
     JSON,
     MAX_POSE_GAP,
-    MESH,
-    MESH_SCALE,
     NOT_NEGATIVE,
     PICTURES,
-    direction_option,
     file_lines,
-    max_edge_length_option,
     motion_options,
     output_option,
     paint_lines,
+    part_options,
     say_all,
     say_results,
     write_results,
 )
 from paint_deposition.cli.progress import Progress
-from paint_deposition.files.parquet import require_libraries
-
-if TYPE_CHECKING:
-    import numpy as np
 
 
 @click.command('simulate')
-@MESH
+@part_options(0.01)
 @click.option(
     '--trajectory', 'trajectories', required=True, multiple=True, type=FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
@@ -65,24 +57,14 @@ if TYPE_CHECKING:
     help='Measuring points, label and x, y, z, of readings that name their point only.',
 )  # fmt: skip
 @motion_options
-@MESH_SCALE
-@BODY
-@max_edge_length_option(0.01)
 @MAX_POSE_GAP
-@direction_option(
-    '--down', 'Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.'
-)
 @click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
 @click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
-@click.option(
-    '--parquet', is_flag=True,
-    help='Also write film.parquet: the table of film.csv to the last bit, with normals and areas.',
-)  # fmt: skip
 @PICTURES
 @JSON
 def simulate_command(
-    mesh: Path,
+    part: dict[str, Any],
     trajectories: tuple[Path, ...],
     atomizers: tuple[str, ...],
     model_files: tuple[Path, ...],
@@ -90,11 +72,6 @@ def simulate_command(
     readings_file: Path | None,
     points_file: Path | None,
     motion: dict[str, Any],
-    mesh_scale: float,
-    body: str | None,
-    max_edge_length_m: float,
-    down: np.ndarray | None,
-    parquet: bool,
     pictures: str,
     as_json: bool,
     **wanted: float,
@@ -105,8 +82,6 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
-    if parquet:
-        require_libraries('--parquet')
     with Progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions
@@ -118,7 +93,7 @@ def simulate_command(
         guns = read_gun_motions(trajectories, source, atomizers)
         chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
         show('refining the mesh')
-        surface = pd.read_mesh(mesh, mesh_scale, max_edge_length_m, down, body)
+        surface = pd.read_mesh(**part)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
@@ -127,14 +102,12 @@ def simulate_command(
             names=[gun.name for gun in guns], readings=readings, progress=show, **wanted,
         )  # fmt: skip
         made_from = {
-            'mesh_file': str(mesh),
+            'mesh_file': str(part['path']),
             'trajectory': ', '.join(map(str, trajectories)),
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
-        files = write_results(
-            film, output, made_from=made_from, pictures=pictures, parquet=parquet
-        )
+        files = write_results(film, output, made_from=made_from, pictures=pictures)
     say_all('note', film.notes)
     say_all('note', [readings.understood] if readings else [])
     say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])

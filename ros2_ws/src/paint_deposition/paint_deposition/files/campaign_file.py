@@ -71,16 +71,6 @@ class _File(BaseModel, extra='forbid'):
         return {key: text for key in HEAD if (text := getattr(self, key))}
 
 
-class _Files(BaseModel):
-    """The files of an experiment; paths are relative to the campaign's file."""
-
-    mesh: Text = Field(description='the name of a mesh file')
-    trajectory: Text | None = Field(
-        None, description='the name of a recording, RAPID module or table'
-    )
-    measurements: Text = Field(description='the name of a file of gauge readings')
-
-
 class _Brushed(MotionSource):
     """A motion, and its brush where the recording has none."""
 
@@ -95,14 +85,18 @@ class _Gun(_Brushed):
     trajectory: Text | None = Field(None, description='the name of a recording or module')
 
 
-class _Entry(_Brushed, _Files):
-    """An experiment as it is written."""
+class _Entry(_Brushed):
+    """An experiment as it is written; paths are relative to the campaign's file."""
 
+    mesh: Text = Field(description='the name of a mesh file')
+    trajectory: Text | None = Field(
+        None, description='the name of a recording, RAPID module or table'
+    )
+    measurements: Text = Field(description='the name of a file of gauge readings')
     guns: list[Any] = Field(
         [], description='a list of guns that painted the part together, each with its motion'
     )
-
-    name: Annotated[str, BeforeValidator(str)] = Field('', description='a name')
+    name: Name = Field('', description='a name')
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
@@ -221,11 +215,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
 
 
 def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int | None]]:
-    """The file of each gun, what to read of it, and its brush.
-
-    Raises:
-        ReadingsError: a gun has no file.
-    """
+    """The file of each gun, what to read of it, and its brush."""
     own = {key: getattr(entry, key) for key in MotionSource.model_fields}
     motions = []
     for number, written in enumerate(entry.guns or [{}], start=1):

@@ -13,7 +13,7 @@ import numpy as np
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
-from paint_deposition.files.tables.reading_table import ReadingTable
+from paint_deposition.files.tables.readings import ReadingTable
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
@@ -47,7 +47,7 @@ def read_readings(
     """
     path, layout = Path(path), layout or Layout()
     listed = None if points is None else MeasuringPoints.read(Path(points), layout, surface)
-    read = ReadingTable.read(path, 'thickness', layout, listed.labels if listed else ())
+    read = ReadingTable.read(path, True, layout, listed.labels if listed else ())
     table = read.table
     thickness, row, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
@@ -122,7 +122,7 @@ class MeasuringPoints:
         Raises:
             ReadingsError: all that is wrong with the file.
         """
-        read = ReadingTable.read(path, 'place', Layout(unit=layout.unit))
+        read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         positions, normals, place_words = _places(read, surface)
         quantity = 'point' if read.has('point') else 'number'
         if not read.has(quantity):
@@ -174,10 +174,10 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
 
     A row with several readings is written once: they are at one place.
     """
-    read = ReadingTable.read(Path(readings.source), 'thickness', Layout(), readings.point)
+    read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
     _, row, _ = read.films_um()
     rows, first = np.unique(row, return_index=True)
-    names = [heading.text for heading in read.columns.headings]
+    names = [heading.text for heading in read.table.headings]
     kept = [k for k, name in enumerate(names) if name != 'predicted_um']
     columns = [read.table.texts(k) for k in kept]
     lines = [[column[r] for column in columns] for r in rows]
@@ -205,11 +205,7 @@ def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
 def _places(
     read: ReadingTable, surface: Surface | None
 ) -> tuple[np.ndarray, np.ndarray | None, str]:
-    """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words.
-
-    Raises:
-        ReadingsError: the table does not say where its rows were taken.
-    """
+    """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words."""
     table = read.table
     if read.has(*AXES):
         positions, words = read.lengths_m(AXES)
@@ -233,7 +229,7 @@ def _places(
     missing = [axis for axis in AXES if not read.has(axis)]
     if len(missing) < len(AXES):
         raise table.error(
-            f'no column with numbers is known as {" or ".join(missing)} {shown(table.headings)}; '
+            f'no column is known as {" or ".join(missing)} {shown(table.headings)}; '
             f'give it with columns: {{{missing[0]}: ...}} in the campaign'
         )
     raise table.error(

@@ -160,11 +160,7 @@ def _patterns(content: dict[str, Any]) -> DepositionModel:
 
 
 def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
-    """The brushes of a section; those without a pattern are interpolated between the others.
-
-    Raises:
-        ModelError: one line that names the brush, the key, its value and the remedy.
-    """
+    """The brushes of a section; those without a pattern are interpolated between the others."""
     if not section:
         raise ModelError('brushes is empty; give a brush by its number, or planar')
     for number in section:

@@ -18,7 +18,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy
-from numba import njit
 
 from paint_deposition.part.edges import edges_of
 
@@ -90,7 +89,7 @@ class CurvedEdges:
             vertices_m, normals: (V, 3) corners of smooth patches [m], unit normals.
             faces: (F, 3).
         """
-        edges = edges_of(faces[_bent(vertices_m, normals, faces)])[0]
+        edges = edges_of(faces)[0]
         error = _bends(vertices_m, normals, edges)[0]
         matter = np.flatnonzero(error > LEAST_ERROR)
         edges = edges[matter[np.argsort(-error[matter], kind='stable')[:MOST_EDGES]]]
@@ -109,42 +108,18 @@ class CurvedEdges:
         )
 
 
-@njit(cache=True, nogil=True)
-def _bend(vertices, normals, start, end):
-    """What an edge costs, its length, lean and sagitta."""
-    x = vertices[end, 0] - vertices[start, 0]
-    y = vertices[end, 1] - vertices[start, 1]
-    z = vertices[end, 2] - vertices[start, 2]
-    length = np.sqrt(x * x + y * y + z * z)
-    if length < LEAST_EDGE_M:
-        return 0.0, length, 0.0, 0.0
-    at_start = (normals[start, 0] * x + normals[start, 1] * y + normals[start, 2] * z) / length
-    at_end = (normals[end, 0] * x + normals[end, 1] * y + normals[end, 2] * z) / length
-    lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
-    return 1.5 * abs(lean) + 2.0 * abs(sagitta) / GUN_M, length, lean, sagitta
-
-
-@njit(cache=True, nogil=True)
-def _bent(vertices, normals, faces):
-    """(F,) bool, triangles with an edge that matters."""
-    bent = np.zeros(len(faces), dtype=np.bool_)
-    for f in range(len(faces)):
-        for k in range(3):
-            if _bend(vertices, normals, faces[f, k], faces[f, (k + 1) % 3])[0] > LEAST_ERROR:
-                bent[f] = True
-                break
-    return bent
-
-
-@njit(cache=True, nogil=True)
-def _bends(vertices, normals, edges):
+def _bends(
+    vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Of edges (E, 2): what they cost, lengths, leans and sagittas."""
-    bends = np.empty((4, len(edges)))
-    for e in range(len(edges)):
-        bends[0, e], bends[1, e], bends[2, e], bends[3, e] = _bend(
-            vertices, normals, edges[e, 0], edges[e, 1]
-        )
-    return bends
+    start, end = edges.T
+    along = vertices_m[end] - vertices_m[start]
+    length = np.linalg.norm(along, axis=1)
+    along /= np.maximum(length, 1e-12)[:, None]
+    at_start, at_end = (np.einsum('ij,ij->i', normals[v], along) for v in (start, end))
+    lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
+    cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
+    return np.where(length < LEAST_EDGE_M, 0.0, cost), length, lean, sagitta
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -1,7 +1,7 @@
 """From the triangles of a file to a conforming mesh of bounded edge length."""
 
 from dataclasses import dataclass
-from functools import lru_cache, reduce
+from functools import lru_cache
 
 import numpy as np
 from numba import njit
@@ -116,61 +116,35 @@ KEY_BASE = np.int64(1) << 31
 
 def face_areas_m2(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F,) areas [m^2]."""
-    return 0.5 * _face_vectors(*_plain(vertices_m, faces))[1]
+    return 0.5 * _lengths(_face_vectors(vertices_m, faces))
 
 
 def face_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) unit normals by the right-hand rule."""
-    vectors, lengths = _face_vectors(*_plain(vertices_m, faces))
-    return vectors / lengths[:, None]
+    vectors = _face_vectors(vertices_m, faces)
+    return vectors / _lengths(vectors)[:, None]
 
 
 def longest_edges_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F,) lengths of the longest edges of the triangles [m]."""
-    return reduce(np.maximum, edge_lengths_m(vertices_m, faces).T)
+    return edge_lengths_m(vertices_m, faces).max(axis=1)
 
 
 def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """(F, 3) lengths of the edges from each corner to the next [m]."""
-    return _edge_lengths(*_plain(vertices_m, faces))
+    corners = np.asarray(vertices_m, dtype=np.float64)[faces]
+    return _lengths(np.roll(corners, -1, axis=1) - corners)
 
 
-def _plain(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    return (
-        np.ascontiguousarray(vertices_m, dtype=np.float64),
-        np.ascontiguousarray(faces, dtype=np.int64),
-    )
+def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """(F, 3) normals as long as the parallelograms are large."""
+    a, b, c = np.asarray(vertices_m, dtype=np.float64)[faces].transpose(1, 0, 2)
+    return np.cross(b - a, c - a)
 
 
-@njit(cache=True, nogil=True)
-def _face_vectors(vertices, faces):
-    """(F, 3) normals as long as the parallelograms are large, and their lengths (F,)."""
-    vectors, lengths = np.empty((len(faces), 3)), np.empty(len(faces))
-    for f in range(len(faces)):
-        i, j, k = faces[f]
-        ax = vertices[j, 0] - vertices[i, 0]
-        ay = vertices[j, 1] - vertices[i, 1]
-        az = vertices[j, 2] - vertices[i, 2]
-        bx = vertices[k, 0] - vertices[i, 0]
-        by = vertices[k, 1] - vertices[i, 1]
-        bz = vertices[k, 2] - vertices[i, 2]
-        x, y, z = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
-        vectors[f, 0], vectors[f, 1], vectors[f, 2] = x, y, z
-        lengths[f] = np.sqrt(x * x + y * y + z * z)
-    return vectors, lengths
-
-
-@njit(cache=True, nogil=True)
-def _edge_lengths(vertices, faces):
-    lengths = np.empty((len(faces), 3))
-    for f in range(len(faces)):
-        for k in range(3):
-            start, end = faces[f, k], faces[f, (k + 1) % 3]
-            x = vertices[end, 0] - vertices[start, 0]
-            y = vertices[end, 1] - vertices[start, 1]
-            z = vertices[end, 2] - vertices[start, 2]
-            lengths[f, k] = np.sqrt(x * x + y * y + z * z)
-    return lengths
+def _lengths(vectors: np.ndarray) -> np.ndarray:
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    return np.sqrt(x * x + y * y + z * z)
 
 
 def refine(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
-from paint_deposition.part import creases, derivatives, face_tree, locating
+from paint_deposition.part import creases, derivatives, locating
 from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
@@ -141,7 +141,7 @@ class Surface:
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        return face_tree.first_faces(self._tree, starts_m, directions)
+        return self.occluder.first_faces(starts_m, directions)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""

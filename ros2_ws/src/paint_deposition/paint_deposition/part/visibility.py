@@ -198,6 +198,15 @@ class Occluder:
         )
         return ~blocked.reshape(length.shape)
 
+    def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
+        """(N,) the triangle that each ray meets first, from either side, -1 for none."""
+        starts, ways = (
+            (starts_m - self._origin_m).astype(np.float32),
+            directions.astype(np.float32),
+        )
+        met = self._scene.run(starts, ways, query='INTERSECT')
+        return np.where(met >= 0, self._tree().order[met], -1)
+
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) sine of the elevation above which nothing of the part hides a point."""
         return horizon_sines(self._tree(), points_m, normals)

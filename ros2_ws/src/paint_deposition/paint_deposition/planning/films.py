@@ -198,9 +198,12 @@ class LineFilms:
         self.lines_m = np.linspace(self.low_m, self.high_m, count)
         integrator = FilmIntegrator(points, model)
         longest = finest_m / STEPS_PER_SCALE
+        # Poses about a sub-step apart.
+        rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
         self.films_um = np.empty((count, len(rows)))
         for k, across in enumerate(self.lines_m):
-            motion = line_motion(surface_map, float(across), style, longest)
+            line = (plan_pass(surface_map, float(across), style),)
+            motion = trajectory_of(line, style, rate_hz=rate)
             path, _ = spray_path(motion, max_step_m=longest)
             integrator.reset()
             integrator.add(path)
@@ -214,14 +217,6 @@ class LineFilms:
         weights = self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
         film = weights @ self.films_um
         return film.std(axis=-1) / film.mean(axis=-1)
-
-
-def line_motion(
-    surface_map: SurfaceMap, across_m: float, style: PassStyle, step_m: float
-) -> Trajectory:
-    """The motion of a single pass along a line, with poses about a sub-step apart."""
-    rate = max(style.speed_m_per_s / step_m, SLOWEST_RATE_HZ)
-    return trajectory_of((plan_pass(surface_map, across_m, style),), style, rate_hz=rate)
 
 
 class FilmAtPoints:

@@ -1,13 +1,11 @@
 """Parallel passes over a plane: how the gun runs along them, their evenness over the index.
 
-Minima of the curve, how far a tolerance lets index and standoff drift, how many passes cover a
-width, and how long they take.
+Minima of the curve, how many passes cover a width, and how long they take.
 """
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from functools import lru_cache
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -26,21 +24,14 @@ from paint_deposition.model.eq4_eq5_uniformity import (
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
-# Passes that are kept for requests that differ in tolerance or width only.
-PASSES_KEPT = 64
 # Share by which the film at the part's edge may fall below the least film inside.
 EDGE_LOSS = 0.05
 FEWEST_POINTS, MOST_POINTS = 121, 601
 POINTS_PER_SCALE = 12.0
-# Where a window ends, and the standoff that is still good, are found to this [m].
+# Where a window ends is found to this [m].
 PRECISION_M = 1e-7
-STANDOFF_PRECISION_M = 1e-4
-# Drift is followed as far as these shares of the right value.
-LEAST, MOST = 0.4, 1.8
-STEPS = 100
-# With effects each step costs a pass through the integrator: few, and each with a quarter of the
-# sub-steps and samples, which is good to 1e-5 of sigma_n.
-STEPS_WITH_EFFECTS = 6
+# With effects each pass goes through the integrator: a quarter of the sub-steps and samples is
+# good to 1e-5 of sigma_n.
 SEARCHED = 0.25
 
 
@@ -78,7 +69,6 @@ class PassSetup:
             return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
         return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
-    @lru_cache(maxsize=PASSES_KEPT)  # noqa: B019  (a setup is a few numbers)
     def parallel_passes(
         self, model: DepositionModel, speed_m_per_s: float, fineness: float = 1.0
     ) -> ParallelPasses:
@@ -232,71 +222,8 @@ def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
     return Minimum(middle, curve.parallel.sigma_n(middle))
 
 
-def index_drift_m(
-    parallel: ParallelPasses, index_m: float, tolerance: float
-) -> tuple[float, float]:
-    """Least and greatest index around a good one that keep sigma_n within the tolerance [m]."""
-    least, most = (
-        _farthest(parallel.sigma_n, index_m, share * index_m, tolerance, STEPS, PRECISION_M)
-        for share in (LEAST, MOST)
-    )
-    return least, most
-
-
-def standoff_drift_m(
-    model: DepositionModel,
-    setup: PassSetup,
-    speed_m_per_s: float,
-    parallel: ParallelPasses,
-    index_m: float,
-    tolerance: float,
-    index_drift: tuple[float, float],
-) -> tuple[float, float]:
-    """Change of standoff, nearer (negative) and further, that keeps within the tolerance [m].
-
-    The bare projection widens a pass in proportion to its distance from the emission point,
-    which is as good as a narrower index; with effects every standoff is computed. ``parallel``
-    are the passes at the standoff of the setup.
-    """
-    here = setup.standoff_m
-    if not model.effects:
-        distance = here + model.projection.emission_offset_m
-        nearer = distance * (index_m / index_drift[1] - 1.0)
-        return max(nearer, -here), distance * (index_m / index_drift[0] - 1.0)
-    one_way = setup.one_way or parallel.alike
-
-    def sigma_n(standoff_m: float) -> float:
-        other = replace(setup, standoff_m=standoff_m, one_way=one_way)
-        return other.parallel_passes(model, speed_m_per_s, SEARCHED).sigma_n(index_m)
-
-    nearest, farthest = (
-        _farthest(sigma_n, here, share * here, tolerance, STEPS_WITH_EFFECTS, STANDOFF_PRECISION_M)
-        for share in (LEAST, MOST)
-    )
-    return nearest - here, farthest - here
-
-
-def _farthest(
-    sigma_n: Callable[[float], float],
-    start: float,
-    end: float,
-    tolerance: float,
-    steps: int,
-    precision_m: float,
-) -> float:
-    """How far a value may go from a good start toward an end within a tolerance [m]."""
-    for low, high in pairwise(np.linspace(start, end, steps + 1).tolist()):
-        if sigma_n(high) > tolerance:
-            return _crossing_at(sigma_n, low, high, tolerance, precision_m)
-    return float(end)
-
-
 def _crossing_at(
-    sigma_n: Callable[[float], float],
-    low: float,
-    high: float,
-    tolerance: float,
-    precision_m: float = PRECISION_M,
+    sigma_n: Callable[[float], float], low: float, high: float, tolerance: float
 ) -> float:
     """Where a function passes the tolerance between two places on either side of it."""
-    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=precision_m))
+    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=PRECISION_M))

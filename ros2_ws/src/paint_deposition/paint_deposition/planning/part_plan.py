@@ -1,8 +1,6 @@
 """Passes for a part that one raster does not cover: face by face, in order, and checked."""
 
-import math
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,15 +8,13 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.film.statistics import film_statistics
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import Contact, contacts
 from paint_deposition.planning.faces import blend, in_order, motion_over
-from paint_deposition.planning.films import PlannedFilm, evenness, predicted
+from paint_deposition.planning.films import PlannedFilm, predicted
 from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
-from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 
 # Faces that turn further from the side of the gun are its back.
@@ -33,16 +29,12 @@ class PartPlan(PlannedFilm):
         faces: sprayed, the largest first.
         margin_m: by how much each face is sprayed less far than its seams.
         sigma_n_unblended: sigma_n without margins, each face for itself.
-        sigma_n_one_raster, coverage_one_raster: of the passes of one raster over the whole part,
-            nan where it has no one side.
         contacts: where gun or spray come too near to the part. envelope: of the gun.
     """
 
     faces: tuple[Face, ...]
     margin_m: float
     sigma_n_unblended: float
-    sigma_n_one_raster: float
-    coverage_one_raster: float
     contacts: tuple[Contact, ...]
     envelope: GunEnvelope
 
@@ -61,15 +53,9 @@ class PartPlan(PlannedFilm):
 
     @property
     def comparison(self) -> str:
-        """What faces and blending are worth, in a sentence."""
-        raster = 'one raster has no side to lie on'
-        if math.isfinite(self.sigma_n_one_raster):
-            raster = (
-                f'one raster covers {100 * self.coverage_one_raster:.0f} % with sigma_n '
-                f'{100 * self.sigma_n_one_raster:.1f} %'
-            )
+        """What blending is worth, in a sentence."""
         return (
-            f'{raster}; {self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
+            f'{self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
             f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with '
             f'{"speeds along" if self.request.optimise else "a time for"} each pass '
             f'{100 * self.sigma_n:.1f} %'
@@ -85,9 +71,6 @@ class PartPlan(PlannedFilm):
             'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
-            'one_raster': {
-                'sigma_n': self.sigma_n_one_raster, 'coverage': self.coverage_one_raster,
-            },
             'gun': self.envelope.model_dump(),
             'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
@@ -142,17 +125,10 @@ def plan_faces(
             f'no passes on {len(faces)} face(s) keep sigma_n within {request.tolerance:g}; the '
             f'closest is {sigma_n:.4f}: allow that much, or narrower faces (--face-angle-deg)'
         )
-    progress('one raster', 0.0)
-    raster = (math.nan, math.nan)
-    with suppress(PlanError):
-        one = plan(surface, model, request.model_copy(update={'tolerance': None})).film_um
-        covered = film_statistics(one[painted], area[painted], 1.0).coverage
-        raster = evenness(one, area)[1], covered
     return PartPlan(
         **found, passes=tuple(planned for face in running for planned in face.passes),
         moves=moves, faces=faces, margin_m=margin_m,
-        sigma_n_unblended=unblended, sigma_n_one_raster=raster[0],
-        coverage_one_raster=raster[1], contacts=contacts(surface, trajectory, envelope),
+        sigma_n_unblended=unblended, contacts=contacts(surface, trajectory, envelope),
         envelope=envelope,
     )  # fmt: skip
 

@@ -36,8 +36,6 @@ class PassStyle:
         band_m: the part's ends are looked for this far to both sides of a pass [m].
         travel_rad: direction of the first pass in the tool's x-y frame [rad].
         one_way: every pass runs in the direction of the first.
-        lean_rad: of the gun, turned about the line of its pass; above 0 the spray points to
-            greater coordinates across [rad].
         brush: number of the brush that sprays; 0 is the only one.
     """
 
@@ -48,7 +46,6 @@ class PassStyle:
     band_m: float = 0.15
     travel_rad: float = 0.0
     one_way: bool = False
-    lean_rad: float = 0.0
     brush: int = ONLY_BRUSH
 
     @property
@@ -127,7 +124,7 @@ def plan_pass(
 def tool_poses(
     surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
 ) -> tuple[np.ndarray, np.ndarray]:
-    """TCP (N, 3) [m] and tool axes (N, 3, 3), at standoff and lean over the smoothed surface."""
+    """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
     axes = surface_map.axes
     normals = surface_map.normals(travel_m, across_m)
     height = surface_map.height_m(travel_m, across_m)
@@ -136,8 +133,6 @@ def tool_poses(
     way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)
-    cos, sin = math.cos(style.lean_rad), math.sin(style.lean_rad)
-    tool_z, side = cos * tool_z + sin * side, cos * side - sin * tool_z
     cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
     rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
     return on_surface - style.standoff_m * tool_z, rotations

@@ -62,7 +62,7 @@ def place_passes(
     best = [
         placing
         for passes in range(fewest, most + 1)
-        if (placing := _best_of(films, extent_m, index_range_m, passes)) is not None
+        if (placing := best_placing(films, extent_m, index_range_m, passes)) is not None
     ]
     closest = min(best, key=lambda placing: placing.sigma_n)
     limit = SLACK * closest.sigma_n + LEAST_SLACK if tolerance is None else tolerance
@@ -83,12 +83,13 @@ def placed(films: LineFilms, passes: int, index_m: float, middle_m: float) -> Pl
     return Placing(passes, index_m, middle_m, sigma_n)
 
 
-def _best_of(
+def best_placing(
     films: LineFilms,
     extent_m: tuple[float, float],
     index_range_m: tuple[float, float],
     passes: int,
 ) -> Placing | None:
+    """The most even placing of so many passes; None where it has no room."""
     middle = 0.5 * (extent_m[0] + extent_m[1])
     low, high = index_range_m
     # Lines further out than the films that are kept are not considered.

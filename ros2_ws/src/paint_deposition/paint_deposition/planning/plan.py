@@ -1,6 +1,5 @@
 """Passes for a part: where they lie, how the gun runs along them, and the film that they lay."""
 
-import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -28,18 +27,6 @@ INDEX_SHARES = (0.75, 1.25)
 OVERSPRAY_SHARE = 0.9
 TARGET_ROUNDS = 4
 TARGET_PRECISION = 2e-3
-
-
-@dataclass(frozen=True)
-class TradeOffPoint:
-    """A result of one weight of the paint, as ``pareto.csv`` has it."""
-
-    paint_weight: float
-    sigma_n: float
-    mean_um: float
-    paint_cm3: float
-    cycle_time_s: float
-    passes: int
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -83,21 +70,11 @@ class Plan(PlannedFilm):
             f'{100 * self.plane_on_part.sigma_n:.1f} %'
         )
 
-    @property
-    def point(self) -> TradeOffPoint:
-        """The plan in a trade-off."""
-        return TradeOffPoint(
-            self.request.paint_weight, self.sigma_n, self.mean_um,
-            self.statistics.emitted_volume_cm3, self.cycle_time_s, self.placing.passes,
-        )  # fmt: skip
-
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
         return super().to_dict() | {
             'index_m': self.placing.index_m,
             'lines_m': [planned.across_m for planned in self.passes],
-            'standoffs_m': [planned.style.standoff_m for planned in self.passes],
-            'leans_deg': [math.degrees(planned.style.lean_rad) for planned in self.passes],
             'travel': 'one_way' if self.request.one_way else 'alternating',
             'gun_turns': False,
             'speed_m_per_s': self.style.speed_m_per_s,
@@ -107,7 +84,11 @@ class Plan(PlannedFilm):
             'smoothing_radius_m': self.request.smoothing_radius_m,
             'plain': self.plain
             and {
-                **{k: v for k, v in vars(self.plain.point).items() if k != 'paint_weight'},
+                'sigma_n': self.plain.sigma_n,
+                'mean_um': self.plain.mean_um,
+                'paint_cm3': self.plain.statistics.emitted_volume_cm3,
+                'cycle_time_s': self.plain.cycle_time_s,
+                'passes': self.plain.placing.passes,
                 'capture_fraction': self.plain.statistics.capture_fraction,
             },
             'plane': {

@@ -16,9 +16,7 @@ from paint_deposition.planning.index_search import (
     PassSetup,
     choose,
     cycle_time_s,
-    index_drift_m,
     passes_to_cover,
-    standoff_drift_m,
     variation_over_width,
 )
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
@@ -52,7 +50,8 @@ class Recommendation:
         setup: how gun and passes were assumed.
         half_width_m: SB50 of one pass.
         index_drift_m: least and largest index that keep to the tolerance, or None.
-        standoff_drift_m: least and largest change of standoff that do, negative is nearer.
+        standoff_drift_m: least and largest change of standoff that do, negative is nearer; None
+            with effects, which may depend on the standoff by themselves.
         notes: what the reader should know besides.
     """
 
@@ -144,12 +143,15 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     if request.speed_m_per_s is None:
         curve, best, speed = _at_target(model, setup, request, curve, best, speed)
     tolerance = request.tolerance
+    windows = curve.windows_m(tolerance) if tolerance is not None else []
     index_drift = standoff_drift = None
-    if tolerance is not None:
-        index_drift = index_drift_m(curve.parallel, best.index_m, tolerance)
-        standoff_drift = standoff_drift_m(
-            model, setup, speed, curve.parallel, best.index_m, tolerance, index_drift
-        )
+    if windows:
+        index_drift = next(w for w in windows if w[0] - NEAR <= best.index_m <= w[1] + NEAR)
+        # The bare projection widens a pass in proportion to its distance from the emission point,
+        # which is as good as a narrower index.
+        distance = standoff + model.projection.emission_offset_m
+        nearer, further = (distance * (best.index_m / end - 1.0) for end in index_drift[::-1])
+        standoff_drift = None if model.effects else (max(nearer, -standoff), further)
     passes = cycle_time = over_width = None
     length = request.width_m and (request.length_m or request.width_m)
     if request.width_m is not None and length is not None:
@@ -163,7 +165,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         sigma_n=best.sigma_n,
         index_range_m=(float(curve.index_m[0]), float(curve.index_m[-1])),
         tolerance=tolerance,
-        windows_m=tuple(curve.windows_m(tolerance)) if tolerance is not None else (),
+        windows_m=tuple(windows),
         minima=curve.minima,
         mean_um=curve.parallel.mean_um(best.index_m),
         speed_m_per_s=speed,

@@ -11,14 +11,11 @@ from pydantic import BeforeValidator, Field, model_validator
 from paint_deposition.errors import PlanError, ReadingsError
 from paint_deposition.request import Request, given
 
-# From evenness alone to paint above all, in units of sigma_n squared: the weights of a trade-off.
-PAINT_WEIGHTS = (0.0, 1e-3, 3e-3, 1e-2, 3e-2)
 USUAL_RANGE_M = (0.2, 0.8)
 # A pattern whose SB50 lies here is searched over the usual range, another one over its own scale.
 USUAL_HALF_WIDTHS_M = (0.25, 0.75)
 RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
 FASTEST_M_PER_S = 3.0
-WIDEST_LEAN_RAD = math.radians(45.0)
 
 Positive = Annotated[float, Field(gt=0.0)]
 Vector = Annotated[tuple[float, float, float], BeforeValidator(tuple)]
@@ -153,17 +150,6 @@ class PlanRequest(Limits, PassRequest):
     time_weight: float = given(
         5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
     )
-    standoff_min_m: float | None = given(
-        None, 'With --optimise: each pass may have a standoff of its own, from this one on [m].',
-        '--standoff-min', above=0.0,
-    )  # fmt: skip
-    standoff_max_m: float | None = given(
-        None, 'With --optimise: up to this one [m].', '--standoff-max', above=0.0
-    )
-    lean_max_rad: float = given(
-        0.0, 'With --optimise: the gun may be turned so far about the line of a pass.',
-        least=0.0, most=WIDEST_LEAN_RAD,
-    )  # fmt: skip
 
     @model_validator(mode='after')
     def _has_a_side(self) -> 'PlanRequest':

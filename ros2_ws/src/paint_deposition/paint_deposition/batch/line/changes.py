@@ -23,7 +23,7 @@ FEWEST = 8
 MOST_BASELINE = 100
 # All charts together raise one false alarm in so many parts; level, misfit and effects share it.
 RUN_LENGTH = 1000.0
-CHARTS, SHARES = 3, 3
+CHARTS, SHARES = 2, 3
 # An amplitude that one part knows no better than to so many typical sizes is not charted.
 VAGUE = 5.0
 # Series that are correlated by more than this are one.
@@ -79,7 +79,7 @@ class Series:
 
     @cached_property
     def charts(self) -> Charts:
-        """Shewhart, EWMA and CUSUM."""
+        """Shewhart and EWMA."""
         return charts(self.standard, self.run_length)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from datetime import datetime, timezone
 from functools import lru_cache
 from pathlib import Path
@@ -17,11 +18,9 @@ from paint_deposition.batch.line.runs import LineFile, Run
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, PaintError
-from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.provenance import sha256
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis.sensitivities import mark_um
@@ -43,48 +42,23 @@ def computed(given: Mapping[str, Any]) -> Columns:
     """Rows of a run: one for each point measured, or one if nothing was measured.
 
     Args:
-        given: ``run``, ``file`` (the line's), ``folder``, ``model``, and ``mesh``, the digest of
-            the line's mesh.
+        given: ``run``, ``file`` (the line's), ``folder`` and ``model``.
 
-    A run that cannot be used says why in the column ``error``. A part whose readings cannot be
-    used, or that is of another mesh than the line's, says so in ``remark``.
+    A run that cannot be used says why in the column ``error``, a part whose readings cannot be
+    used says so in ``remark``.
     """
     run: Run = given['run']
-    rows: list[dict[str, Any]] = []
     try:
         if run.problem:
             raise ManyError(run.problem)
-        rows.extend(
-            _rows(run, given['file'], Path(given['folder']), given['model'], given['mesh'])
-        )
+        rows = _rows(run, given['file'], Path(given['folder']), given['model'])
     except PaintError as error:
-        rows.append({'part': run.name, 'error': str(error)})
+        rows = [{'part': run.name, 'error': str(error)}]
     names = dict.fromkeys(name for row in rows for name in row)
     return {name: [row.get(name) for row in rows] for name in names}
 
 
-def _rows(
-    run: Run, file: LineFile, folder: Path, model: DepositionModel, mesh: str
-) -> Iterator[dict[str, Any]]:
-    if run.is_campaign:
-        odd: list[tuple[str, str, str]] = []
-        campaign = read_campaign(
-            run.path, part_pose=file.part_pose, remark=lambda *said: odd.append(said)
-        )
-        time_s = _date(campaign.head.get('date', ''), run)
-        for experiment in campaign.experiments:
-            name = run.name if len(campaign.experiments) == 1 else f'{run.name}/{experiment.name}'
-            mine = ('warning', experiment.name)
-            remarks = [line for *about, line in odd if tuple(about) == mine]
-            pooled = sha256(experiment.files['mesh']) == mesh
-            if not pooled:
-                other = Path(experiment.files['mesh']).name
-                remarks.append(f'not pooled: {other} is another mesh than {file.mesh}')
-            painted = _film(experiment.surface, experiment.path, model)
-            about = {'part': name, 'time_s': time_s, 'remark': '; '.join(remarks),
-                     'pooled': pooled, **painted}  # fmt: skip
-            yield from _measured(about, experiment, model)
-        return
+def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> list[dict[str, Any]]:
     down = None if file.down is None else tuple(file.down)
     surface = _read_surface(
         folder / file.mesh, file.mesh_scale, file.max_edge_length_m, down, file.body
@@ -92,10 +66,7 @@ def _rows(
     motion = read_motion(run.path, file)
     seen = look_at(surface, motion, model, max_pose_gap_s=file.max_pose_gap_s)
     stamp_s = 1e-9 * float(motion.stamps_ns[0])
-    time_s = stamp_s if stamp_s > EARLIEST_S else _date(run.name, run)
-    painted = _film(seen.surface, seen.path, model)
-    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
-    remarks += seen.geometry.warnings
+    time_s = stamp_s if stamp_s > EARLIEST_S else _date(run)
     unused = run.remark
     rows: list[dict[str, Any]] = []
     if run.readings is not None:
@@ -103,28 +74,27 @@ def _rows(
         try:
             readings = read_readings(run.readings, points, surface=seen.surface)
             experiment = Experiment.of(run.name, seen.surface, seen.path, readings)
-            rows.extend(_measured({}, experiment, model))
+            rows = list(_measured(experiment, model))
         except PaintError as error:
             unused = str(error).removeprefix(f'{folder}/')
-    remarks += [f'simulated only: {unused}'] if unused else []
-    about = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks), 'pooled': True}
-    for row in rows or [{}]:
-        yield about | painted | row
+    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
+    remarks += [*seen.geometry.warnings, *([f'simulated only: {unused}'] if unused else [])]
+    about = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks)}
+    about |= _film(seen.surface, seen.path, model)
+    return [about | row for row in rows or [{}]]
 
 
-def _date(text: str, run: Run) -> float:
-    """Seconds since 1970 of the first date in a text."""
-    found = DATE.search(text)
-    try:
+def _date(run: Run) -> float:
+    """Seconds since 1970 of the first date in the name of a run."""
+    found = DATE.search(run.name)
+    with suppress(ValueError):
         if found:
             year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
-            found_at = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
-            return found_at.timestamp()
-    except ValueError:
-        pass
+            there = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+            return there.timestamp()
     raise ManyError(
         f'{run.path}: it is not known when it was painted; put the date into its name, '
-        '2026-11-12_0730 say (a campaign: the key date), or record with the time of day'
+        '2026-11-12_0730 say, or record with the time of day'
     )
 
 
@@ -144,9 +114,7 @@ def _film(surface: Surface, path: SprayPath, model: DepositionModel) -> dict[str
     return {f'film_{name}': figures[name] for name in FIGURES}
 
 
-def _measured(
-    about: dict[str, Any], experiment: Experiment, model: DepositionModel
-) -> Iterator[dict[str, Any]]:
+def _measured(experiment: Experiment, model: DepositionModel) -> Iterator[dict[str, Any]]:
     """A row for each point, with the derivatives that pooling needs."""
     study = Study.of(Campaign((experiment,)), tuple(effect() for effect in EFFECTS.values()))
     parameters = FreeParameters.of(model)
@@ -163,7 +131,7 @@ def _measured(
     for row in range(len(study)):
         first = campaign.means.first[row]
         x, y, z = campaign.positions_m[row].tolist()
-        yield about | {
+        yield {
             'point': str(campaign.experiments[0].readings.point[first]),
             'x_m': x, 'y_m': y, 'z_m': z,
             'repeats': int(campaign.means.repeats[row]),

@@ -79,13 +79,13 @@ def amplitudes() -> list[tuple[str, str]]:
 
 
 def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
-    """The measured parts of the line's mesh among the rows of all runs, oldest first."""
+    """The measured parts among the rows of all runs, oldest first."""
     if 'measured_um' not in columns:
         return []
     rows_of: dict[str, list[int]] = {}
-    cells = zip(columns['part'], columns['measured_um'], columns['pooled'], strict=True)
-    for row, (part, value, pooled) in enumerate(cells):
-        if value is not None and pooled:
+    cells = zip(columns['part'], columns['measured_um'], strict=True)
+    for row, (part, value) in enumerate(cells):
+        if value is not None:
             rows_of.setdefault(part, []).append(row)
 
     def taken(name: str, rows: list[int]) -> np.ndarray:
@@ -278,8 +278,7 @@ class Cause:
         value, sd: its amplitude and the standard deviation of it.
         probability: that one of ``members`` acts, given what was accepted before.
         members: effects that these readings do not tell from it, itself first.
-        one_part: how many standard deviations it is off zero in one part alone, the median.
-        all_parts: the same in all parts together.
+        all_parts: how many standard deviations it is off zero, in all parts together.
     """
 
     effect: str
@@ -289,7 +288,6 @@ class Cause:
     sd: float
     probability: float
     members: tuple[str, ...]
-    one_part: float
     all_parts: float
 
     @property
@@ -299,7 +297,7 @@ class Cause:
         size = f'{self.value:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
         return (
             f'{self.effect}{others}: {self.parameter} {size}; '
-            f'{self.all_parts:.1f} standard deviations over all parts, {self.one_part:.1f} in one'
+            f'{self.all_parts:.1f} standard deviations over all parts'
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -361,13 +359,11 @@ def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Poo
         weighed = beside if near[0] == best else Weighed.beside(statistics, chosen)
         members = tuple(dict.fromkeys(names[k][0] for k in near))
         posterior = weighed.likeliest(chosen)
-        causes.append(_cause(parts, pattern, posterior, chosen, probability, members))
+        causes.append(_cause(posterior, chosen, probability, members))
     return Pooled(tuple(causes), weighed.likeliest(chosen), chosen)
 
 
 def _cause(
-    parts: Sequence[Measured],
-    pattern: PatternVector,
     posterior: LinePosterior,
     chosen: tuple[int, ...],
     probability: float,
@@ -377,13 +373,7 @@ def _cause(
     value, sd = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
     effect, parameter = amplitudes()[chosen[-1]]
     info = EFFECTS[effect].parameters()[parameter]
-    alone = []
-    for part in parts[:: max(len(parts) // 25, 1)]:
-        one = LinePosterior(SufficientStatistics.of([part], pattern), posterior.scales)
-        variance = one.solved(chosen[-1:])[1][-1, -1]
-        # Without the prior of the amplitude, which is standard normal.
-        alone.append(abs(value) * np.sqrt(max(1.0 / variance - 1.0, 0.0)))
     return Cause(
         effect, parameter, info['unit'], info['neutral'] + info['typical'] * value,
-        info['typical'] * sd, probability, members, float(np.median(alone)), abs(value) / sd,
+        info['typical'] * sd, probability, members, abs(value) / sd,
     )  # fmt: skip

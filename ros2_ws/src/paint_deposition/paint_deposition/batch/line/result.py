@@ -83,7 +83,7 @@ class Line:
     @cached_property
     def runs(self) -> list[dict[str, Any]]:
         """The first row of each part without its point, oldest first."""
-        names = ['part', 'time_s', 'remark', 'pooled', *(f'film_{name}' for name in FIGURES)]
+        names = ['part', 'time_s', 'remark', *(f'film_{name}' for name in FIGURES)]
         names = [name for name in names if name in self.table.column_names]
         if 'time_s' not in names:
             return []
@@ -175,7 +175,6 @@ class Line:
             'limits': {
                 'shewhart': drawn.shewhart_limit,
                 'ewma': float(drawn.ewma_limit[-1]),
-                'cusum': drawn.cusum_limit,
             },
             'alarms': {
                 chart: [self.parts[row].name for row in rows]

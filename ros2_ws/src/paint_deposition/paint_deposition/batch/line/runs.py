@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import Field
 
@@ -19,10 +19,8 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
-NAME, CAMPAIGN = 'line.yaml', 'campaign.yaml'
+NAME = 'line.yaml'
 BAGS = ('.bag', '.mcap')
-# Keys of a campaign that name files.
-FILES = {'mesh', 'trajectory', 'measurements', 'points', 'urdf'}
 TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
 
 
@@ -49,7 +47,7 @@ class Run:
 
     Attributes:
         name: of its folder or file.
-        path: a recording, or a campaign file.
+        path: its recording.
         readings: a file of gauge readings on the part, or None.
         problem: why it cannot be used, '' if it can.
         remark: why its readings are not used, '' if they are.
@@ -62,9 +60,9 @@ class Run:
     remark: str = ''
 
     @property
-    def is_campaign(self) -> bool:
-        """Whether it is a campaign's file."""
-        return self.path.name == CAMPAIGN
+    def files(self) -> list[Path]:
+        """The recording, and the readings if there are any."""
+        return [self.path, *([self.readings] if self.readings else [])]
 
 
 def read_line(folder: Path) -> LineFile:
@@ -89,7 +87,7 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     """The runs of a folder, by name, and names of files like readings that belong to none.
 
     A run is a recording (a folder of rosbag2, a .bag or a .mcap) with its readings, if any, beside
-    it under the same name; or a folder with a campaign.yaml.
+    it under the same name.
 
     Args:
         folder: of the line.
@@ -103,18 +101,13 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     for path in sorted(set(folder.iterdir()) - set(shared)):
         if path.name.startswith('.'):
             continue
-        if path.is_dir() and (path / CAMPAIGN).is_file():
-            recordings.setdefault(path.name, []).append(path / CAMPAIGN)
-        elif path.is_dir() and _is_bag(path):
+        if path.is_dir() and _is_bag(path):
             recordings.setdefault(path.name, []).append(path)
         elif path.suffix.lower() in BAGS:
             recordings.setdefault(path.stem, []).append(path)
         elif path.suffix.lower() in TABLES:
             readings.setdefault(path.stem, []).append(path)
-    runs = [
-        _run(name, paths, [] if paths[0].name == CAMPAIGN else readings.pop(name, []))
-        for name, paths in recordings.items()
-    ]
+    runs = [_run(name, paths, readings.pop(name, [])) for name, paths in recordings.items()]
     if not runs:
         raise ManyError(
             f'{folder}: holds no run; put recordings there (a rosbag2 folder, .bag or .mcap) and '
@@ -142,8 +135,7 @@ def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
 
 
 def _names(paths: list[Path]) -> str:
-    """Of recordings and readings that stand beside each other in the folder of the line."""
-    return ' and '.join(p.parent.name if p.name == CAMPAIGN else p.name for p in paths)
+    return ' and '.join(path.name for path in paths)
 
 
 def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, list[str]]:
@@ -159,14 +151,14 @@ def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, lis
     file = read_line(folder)
     model = read_model(folder / file.model)
     files = shared_files(folder, file)
-    digests = {what: sha256(path) for what, path in files.items()}
     own = [effect.file_content.decode() for effect in model.effects]
-    shared = [code_digest(), file.model_dump(), model_digest(model), own, *digests.values()]
-    given = {'file': file, 'folder': str(folder), 'model': model, 'mesh': digests['mesh']}
+    shared = [code_digest(), file.model_dump(), model_digest(model), own]
+    shared += map(sha256, files.values())
+    given = {'file': file, 'folder': str(folder), 'model': model}
     runs, strays = runs_in(folder, files.values())
     cases = [
         Case(
-            digest_of(*shared, run.name, run.problem, run.remark, *_contents(run)),
+            digest_of(*shared, run.name, run.problem, run.remark, *map(_digest, run.files)),
             given | {'run': run},
             about={'part': [run.name]},
         )
@@ -181,34 +173,9 @@ def shared_files(folder: Path, file: LineFile) -> dict[str, Path]:
     return {what: folder / name for what, name in named.items() if name}
 
 
-def _contents(run: Run) -> list[str]:
-    """Digests of its files; in place of one that cannot be read stands why."""
-    paths = [run.path, run.readings]
-    if run.is_campaign:
-        paths = [run.path.parent, *_named_by_campaign(run.path)]
-    return [_digest(path) for path in paths if path]
-
-
 def _digest(path: Path) -> str:
+    """Of a file; in place of one that cannot be read stands why."""
     try:
         return sha256(path)
     except PaintError as error:
         return str(error)
-
-
-def _named_by_campaign(path: Path) -> list[Path]:
-    """Files that a campaign names, wherever they lie; none if it cannot be read."""
-    try:
-        waiting: list[Any] = [read_yaml(path, 'campaign', ManyError)]
-    except PaintError:
-        return []
-    found = []
-    while waiting:
-        value = waiting.pop()
-        if isinstance(value, dict):
-            named = {key: name for key, name in value.items() if key in FILES}
-            found += [path.parent / name for name in named.values() if isinstance(name, str)]
-            waiting += value.values()
-        elif isinstance(value, list):
-            waiting += value
-    return sorted(found)

@@ -10,38 +10,35 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.api.inference import compare
 from paint_deposition.api.planning import plan
 from paint_deposition.api.simulation import simulate
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 
 # Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
-FILM, PREDICTED = 'film_um', 'predicted_um'
+PREDICTED = 'predicted_um'
 WARNINGS = 'warnings'
 Columns = dict[str, list[Any]]
 
 
-def computed(given: Mapping[str, Any], *inputs: Any) -> Columns:
-    """The figures of a case, one row.
+def computed(
+    given: Mapping[str, Any],
+    surface: Surface,
+    trajectory: Trajectory | None,
+    readings: Readings | None,
+) -> Columns:
+    """The figures of a case, one row; a case without a film says why in the column ``error``.
 
     Args:
-        given: ``model``; and ``motion``, ``passes``, ``target_um``, ``tolerance_um``,
-            ``keep_films`` of a film.
-        inputs: a campaign; or a surface, a motion (None: passes are planned) and readings (None:
-            nothing is predicted).
-
-    A case that has no film says why in the column ``error``.
+        given: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
+        surface: the part. trajectory: the motion; None: passes are planned.
+        readings: places at which the gauge is predicted, or None.
     """
     try:
-        if isinstance(inputs[0], Campaign):
-            figures = _compared(given['model'], inputs[0])
-        else:
-            figures = _painted(given, *inputs)
+        figures = _painted(given, surface, trajectory, readings)
     except PaintError as error:
         figures = {'error': str(error)}
     return {name: [value] for name, value in figures.items()}
@@ -73,22 +70,7 @@ def _painted(
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()
-    if given['keep_films']:
-        figures[FILM] = film.film_um.tolist()
     return figures
-
-
-def _compared(model: DepositionModel | None, campaign: Campaign) -> dict[str, Any]:
-    found = compare(campaign, model)
-    points = found.points
-    return {
-        'readings': len(found.readings),
-        'rmse_um': points.rmse_um,
-        'mean_residual_um': float(points.residual_um.mean()),
-        'level': float(points.measured_um.sum() / points.predicted_um.sum()),
-        'noise_um': found.study.noise.typical_um,
-        'regions_of_misfit': len(found.regions),
-    }
 
 
 def varied_motion(

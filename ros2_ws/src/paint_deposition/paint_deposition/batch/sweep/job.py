@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from paint_deposition.batch.sweep.variations import (
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
-from paint_deposition.files.campaign_file import model_of_campaign, read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
@@ -68,7 +66,7 @@ class Job:
             PaintError: a file that cannot be used, or values that do not go together.
         """
         job = Job(file, folder)
-        models = job._named_models()
+        models = [job._model_file(folder / name).model for name in named_models(file)]
         job.effects = effects_of(models)
         job.values = variations(file, models)
         for number, values in enumerate(job.values):
@@ -78,23 +76,11 @@ class Job:
         return job
 
     def _case(self, values: Values) -> Case:
-        campaign = self._named('campaign', values)
-        if campaign:
-            fixed = ('mesh', 'trajectory', *OF_MOTION, *OF_PASSES)
-            if varied := [name for name in fixed if name in values]:
-                raise ManyError(
-                    f'{varied[0]} varies, but a campaign has its own parts and motions; leave one '
-                    'out'
-                )
+        inputs = self._inputs(values)
+        options = self._options(values, planned=inputs[1] == NOTHING)
         model = self._model(values)
-        if campaign:
-            inputs: tuple[str, ...] = (self._campaign(values),)
-            options: dict[str, Any] = {}
-        else:
-            inputs = self._of_a_film(values)
-            options = self._options(values, planned=inputs[1] == NOTHING)
-        own = [effect.file_content.decode() for effect in model.effects] if model else []
-        digest = digest_of(code_digest(), model and model_digest(model), own, options, inputs)
+        own = [effect.file_content.decode() for effect in model.effects]
+        digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
         return Case(digest, {'model': model, **options}, inputs)
 
     def _named(self, key: str, values: Values) -> Path | None:
@@ -114,41 +100,24 @@ class Job:
             name = f'{what}-{content_digest(value)}'
             self.inputs[name] = value
             self.files[f'{what} {path.name}'] = path
+            self.notes |= dict.fromkeys(getattr(value, 'notes', ()))
+            self.notes |= dict.fromkeys(getattr(value, 'warnings', ()))
             return name
 
         return self._once((what, path, key), named)
-
-    def _named_models(self) -> list[DepositionModel]:
-        """All models that the sweep names, those of campaigns included."""
-        paths = [self.folder / name for name in named_models(self.file, 'model')]
-        for name in named_models(self.file, 'campaign'):
-            own = model_of_campaign(self.folder / name)
-            paths += [Path(own)] if own else []
-        return [self._model_file(path).model for path in paths]
 
     def _model_file(self, path: Path) -> ModelFile:
         self.files[f'model {path.name}'] = path
         return self._once(('model', path), lambda: read_model_file(path))
 
-    def _model(self, values: Values) -> DepositionModel | None:
-        """The model of a case; None: a campaign's own, or one fitted to it."""
+    def _model(self, values: Values) -> DepositionModel:
         path = self._named('model', values)
-        campaign = self._named('campaign', values)
-        changes = 'effects' in values or any('.' in name for name in values) or DRAW in values
-        if path is None and campaign:
-            if not changes:
-                return None
-            own = self._once(('start', campaign), partial(model_of_campaign, campaign))
-            path = Path(own) if own else None
-        if path is None and (campaign or DRAW in values):
-            what = f'{campaign} names no model' if campaign else 'no model is given'
-            raise ManyError(f'{what}, and the parameters of one vary; give model')
         if path is None:
+            if DRAW in values:
+                raise ManyError('no model is given, and the parameters of one vary; give model')
             return varied_model(DepositionModel(), values, self.effects)
         file = self._model_file(path)
-        model = file.model
-        if DRAW in values:
-            model = self._draws(path, file)[values[DRAW]]
+        model = self._draws(path, file)[values[DRAW]] if DRAW in values else file.model
         return varied_model(model, values, self.effects)
 
     def _draws(self, path: Path, file: ModelFile) -> list[DepositionModel]:
@@ -163,35 +132,23 @@ class Job:
             ('draws', path), lambda: drawn(file.model, posterior, sample.count, sample.seed)
         )
 
-    def _campaign(self, values: Values) -> str:
-        path = self._named('campaign', values)
-        assert path is not None
-        pose = values.get('part_pose', self.file.part_pose)
-        read = partial(read_campaign, path, part_pose=pose, remark=self._note)
-        return self._input(str(pose), 'campaign', path, read)
-
-    def _note(self, kind: str, experiment: str, line: str) -> None:
-        self.notes[f'{experiment}: {line}'] = None
-
-    def _of_a_film(self, values: Values) -> tuple[str, str, str]:
-        mesh, motion = self._named('mesh', values), self._named('trajectory', values)
+    def _inputs(self, values: Values) -> tuple[str, str, str]:
+        """Names of the part, the motion and the readings of a case."""
+        file, mesh = self.file, self._named('mesh', values)
+        motion = self._named('trajectory', values)
         if mesh is None:
-            raise ManyError('no mesh is given; give mesh, or campaign')
-        file = self.file
+            raise ManyError('no mesh is given; give mesh')
         surface = self._input(
             None, 'mesh', mesh,
             lambda: read_mesh(mesh, file.mesh_scale, file.max_edge_length_m, None, file.body),
         )  # fmt: skip
         recorded = NOTHING if motion is None else self._motion(motion, values)
-        places = NOTHING
-        if file.readings:
-            path = self.folder / file.readings
-            places = self._input(
-                surface, 'readings', path,
-                lambda: read_readings(path, None, surface=self.inputs[surface]),
-            )  # fmt: skip
-        for note in self.inputs[surface].notes:
-            self.notes[note] = None
+        if not file.readings:
+            return surface, recorded, NOTHING
+        path, part = self.folder / file.readings, self.inputs[surface]
+        places = self._input(
+            surface, 'readings', path, lambda: read_readings(path, None, surface=part)
+        )
         return surface, recorded, places
 
     def _motion(self, path: Path, values: Values) -> str:
@@ -200,10 +157,7 @@ class Job:
         if 'part_pose' in values:
             given['part_pose'] = values['part_pose']
         source = MotionSource.model_validate(given)
-        name = self._input(str(given), 'trajectory', path, lambda: read_motion(path, source))
-        for note in (*self.inputs[name].notes, *self.inputs[name].warnings):
-            self.notes[note] = None
-        return name
+        return self._input(str(given), 'trajectory', path, lambda: read_motion(path, source))
 
     def _options(self, values: Values, planned: bool) -> dict[str, Any]:
         file = self.file
@@ -226,5 +180,4 @@ class Job:
             'passes': passes if planned else {},
             'target_um': file.target_um,
             'tolerance_um': file.tolerance_um,
-            'keep_films': file.keep_films,
         }

@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from paint_deposition.batch.cases import ResultCache
-from paint_deposition.batch.sweep.case import FILM, PREDICTED, WARNINGS
+from paint_deposition.batch.sweep.case import PREDICTED, WARNINGS
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.variations import DRAW
 from paint_deposition.files.json_files import write_json
@@ -31,9 +31,9 @@ MOST_COLUMNS = 6
 LEAST_SPAN = 0.01
 # What a case says that leaves a thing, or everything, as the sweep's file has it.
 UNCHANGED = 'unchanged'
-# What is judged and drawn, of films and of campaigns, each with its label; less is better.
-JUDGED = {'sigma_n': 'unevenness σ_N', 'rmse_um': 'error at the readings [µm]'}
-LEVELS = {'mean_um': 'mean film [µm]', 'level': 'measured over predicted'}
+# What is judged, less being better, and drawn, each with its label.
+JUDGED, LABEL = 'sigma_n', 'unevenness σ_N'
+DRAWN = {JUDGED: LABEL, 'mean_um': 'mean film [µm]'}
 
 
 @dataclass(frozen=True)
@@ -94,16 +94,11 @@ class Sweep:
         return [(number, text) for number, text in texts if text]
 
     @property
-    def judged(self) -> str | None:
-        """The figure by which cases are judged, None if no case has a result."""
-        return next((name for name in JUDGED if name in self.table.column_names), None)
-
-    @property
     def best(self) -> int | None:
-        """Row of the most even film, or of the least error."""
-        if self.judged is None or not np.isfinite(self.column(self.judged)).any():
+        """Row of the most even film."""
+        if JUDGED not in self.table.column_names or np.isnan(self.column(JUDGED)).all():
             return None
-        return int(np.nanargmin(self.column(self.judged)))
+        return int(np.nanargmin(self.column(JUDGED)))
 
     @property
     def sentence(self) -> str:
@@ -116,7 +111,7 @@ class Sweep:
     def lines(self) -> Iterator[str]:
         """What to say of it."""
         yield self.sentence
-        for name, label in (JUDGED | LEVELS).items():
+        for name, label in DRAWN.items():
             if name in self.table.column_names:
                 values = self.column(name)
                 low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95))
@@ -127,11 +122,11 @@ class Sweep:
                 for name, value in self.job.values[self.best].items()
             ]
             shown = ', '.join(texts) or UNCHANGED
-            yield f'best by {JUDGED[str(self.judged)]}: case {self.best + 1}, {shown}'
+            yield f'best by {LABEL}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``sweep.json``."""
-        names = [name for name in (*JUDGED, *LEVELS) if name in self.table.column_names]
+        names = [name for name in DRAWN if name in self.table.column_names]
         best = self.best
         return {
             'cases': len(self.job.cases),
@@ -139,7 +134,7 @@ class Sweep:
             'workers': self.workers,
             'varied': list(self.varied),
             'figures': {name: _spread(self.column(name)) for name in names},
-            'judged_by': self.judged,
+            'judged_by': JUDGED if best is not None else None,
             'best': None if best is None else {'case': best + 1, 'values': self.job.values[best]},
             'errors': [{'case': number, 'error': error} for number, error in self.errors],
             'notes': list(self.job.notes),
@@ -150,15 +145,13 @@ class Sweep:
 def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
     """Write tables, figures and the picture; returns the paths."""
     names = sweep.table.column_names
-    lists = [name for name in (FILM, PREDICTED) if name in names]
+    lists = [PREDICTED] if PREDICTED in names else []
     files = [write_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
-    if FILM in names:
-        files.append(write_parquet(folder / 'films.parquet', sweep.table.select(['case', FILM])))
-    if PREDICTED in names:
+    if lists:
         files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
-    drawn = [(name, label) for name, label in (JUDGED | LEVELS).items() if name in names]
+    drawn = [(name, label) for name, label in DRAWN.items() if name in names]
     over = {name: _drawn_over(sweep, name) for name in sweep.varied if name != 'part_pose'}
     if drawn and over:
         results = {label: sweep.column(name) for name, label in drawn}

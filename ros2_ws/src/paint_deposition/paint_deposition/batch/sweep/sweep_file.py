@@ -103,7 +103,6 @@ class SweepFile(MotionSource, extra='forbid'):
 
     mesh: Text | None = Field(None, description='the name of a mesh file')
     trajectory: Text | None = Field(None, description='the name of a recording, module or table')
-    campaign: Text | None = Field(None, description='the name of a campaign file')
     model: Text | None = Field(None, description='the name of a model file')
     readings: Text | None = Field(
         None, description='the name of a file of points at which the gauge is predicted'
@@ -114,7 +113,6 @@ class SweepFile(MotionSource, extra='forbid'):
     target_um: Number = Field(0.0, ge=0.0, le=1e4, description='film wanted [um]')
     tolerance_um: Number = Field(0.0, ge=0.0, le=1e4, description='what it may differ [um]')
     passes: Passes = Field(Passes(), description='keys that say how passes are planned')
-    keep_films: bool = Field(False, description='whether films.parquet holds every film')
     grid: Annotated[dict[str, Any], AfterValidator(_grid)] = Field(
         {}, description='values by name'
     )

@@ -18,7 +18,7 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
 
-INPUTS = ('mesh', 'trajectory', 'campaign', 'model')
+INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
 OF_PASSES = ('index_m', 'standoff_m', 'speed_m_per_s')
 OF_MOTION = ('speed_factor', 'standoff_change_m', 'flow_factor')
@@ -47,10 +47,13 @@ def known_names(models: Sequence[DepositionModel] = ()) -> list[str]:
     return [*others, *of_model, *of_brushes, *of_effects]
 
 
-def named_models(file: SweepFile, key: str) -> list[str]:
-    """Files that a sweep names under ``key``, a model or a campaign: each once."""
-    varied = (*file.grid.get(key, ()), *(case[key] for case in file.cases if key in case))
-    return [n for n in dict.fromkeys((getattr(file, key), *varied)) if isinstance(n, str)]
+def named_models(file: SweepFile) -> list[str]:
+    """Model files that a sweep names, each once."""
+    varied = (
+        *file.grid.get('model', ()),
+        *(case['model'] for case in file.cases if 'model' in case),
+    )
+    return [n for n in dict.fromkeys((file.model, *varied)) if isinstance(n, str)]
 
 
 def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[Values]:

@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import (
-    Effect,
-    PathContext,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, PathContext, over, parameter
 from paint_deposition.motion.path import SprayPath
 
 # A gun that is slower than this stands, and its log trembles [m/s].

@@ -4,12 +4,7 @@ import math
 
 import numpy as np
 
-from paint_deposition.effects.base import (
-    REFERENCE_CURVATURE_PER_M,
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, over, parameter
 from paint_deposition.part.points import SurfacePoints
 
 

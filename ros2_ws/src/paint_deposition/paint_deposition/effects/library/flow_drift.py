@@ -1,11 +1,6 @@
 """Flow that drifts from pass to pass."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    PathContext,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, PathContext, over, parameter
 from paint_deposition.motion.path import SprayPath
 
 # The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.

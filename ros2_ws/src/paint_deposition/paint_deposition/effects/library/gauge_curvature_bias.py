@@ -2,12 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import (
-    REFERENCE_CURVATURE_PER_M,
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, over, parameter
 from paint_deposition.part.points import SurfacePoints
 
 

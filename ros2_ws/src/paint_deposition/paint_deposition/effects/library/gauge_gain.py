@@ -2,11 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import (
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, over, parameter
 from paint_deposition.part.points import SurfacePoints
 
 

@@ -1,11 +1,6 @@
 """A plume that trails behind the moving gun."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    PathContext,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, PathContext, over, parameter
 from paint_deposition.motion.path import SprayPath
 
 

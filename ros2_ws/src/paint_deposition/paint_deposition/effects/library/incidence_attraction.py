@@ -1,10 +1,6 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, over, parameter
 from paint_deposition.kernel.laws import Ray
 
 

@@ -1,10 +1,6 @@
 """A pattern that does not widen in proportion to the distance."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, over, parameter
 from paint_deposition.kernel.fast_math import power
 from paint_deposition.kernel.laws import Ray
 

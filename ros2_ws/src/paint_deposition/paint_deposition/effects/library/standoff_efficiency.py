@@ -1,10 +1,6 @@
 """Transfer efficiency that falls with the distance from the bell."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, over, parameter
 from paint_deposition.kernel.fast_math import power
 from paint_deposition.kernel.laws import Ray
 

@@ -1,11 +1,6 @@
 """A TCP calibrated too short or too long along the bell's axis."""
 
-from paint_deposition.effects.base import (
-    Effect,
-    PathContext,
-    over,
-    parameter,
-)
+from paint_deposition.effects.base import Effect, PathContext, over, parameter
 from paint_deposition.motion.path import SprayPath
 
 

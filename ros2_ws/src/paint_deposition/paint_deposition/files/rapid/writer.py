@@ -1,4 +1,4 @@
-"""Planned passes, and places for a gauge, as ABB RAPID modules."""
+"""Planned passes as ABB RAPID modules."""
 
 from __future__ import annotations
 
@@ -28,15 +28,6 @@ MODULE = r"""MODULE PaintPasses
 {moves}
     SetDO doGun,0;
   ENDPROC
-ENDMODULE
-"""
-GAUGE_MODULE = r"""MODULE PaintGauge
-  ! Places for the gauge in wobjPart, taught on the robot: z of the tool points into the surface.
-  ! Millimetres; axis configurations are free. pGauge{{1}} is point P1 of points.csv, and so on.
-{about}  CONST num nGauge:={count};
-  CONST robtarget pGauge{{{count}}}:=[
-{targets}
-  ];
 ENDMODULE
 """
 NOWHERE = '[[0,0,0],[1,0,0,0]]'
@@ -122,20 +113,6 @@ def _speed(move: Move) -> float:
 
 def _flow(move: Move) -> float:
     return round(float(move.flow), 4)
-
-
-def gauge_module_text(
-    positions_m: np.ndarray, quaternions_xyzw: np.ndarray, part: Rigid | None = None
-) -> str:
-    """A module with the targets of a measuring robot, in the order of the points.
-
-    Args:
-        positions_m, quaternions_xyzw: (P, 3) and (P, 4) poses of the gauge in the part's frame.
-        part: as in ``module_text``.
-    """
-    targets = (_target(*pose) for pose in zip(positions_m, quaternions_xyzw, strict=True))
-    listed = ',\n'.join(f'    {target}' for target in targets)
-    return GAUGE_MODULE.format(about=_work_object(part), count=len(positions_m), targets=listed)
 
 
 def _work_object(part: Rigid | None) -> str:

@@ -26,13 +26,6 @@ from paint_deposition.files.recordings import message_definitions as definitions
 # The key of a bag's custom data under which a plan says which topic is its trigger.
 TRIGGER = 'trigger_topic'
 ROS2_SUFFIXES = ('.mcap', '.db3')
-# The messages that are read by the names of their fields.
-KNOWN = (
-    'builtin_interfaces/msg/Time', 'std_msgs/msg/Header', 'std_msgs/msg/Bool',
-    'geometry_msgs/msg/PoseStamped', 'geometry_msgs/msg/Pose', 'geometry_msgs/msg/Point',
-    'geometry_msgs/msg/Quaternion', 'geometry_msgs/msg/TransformStamped',
-    'geometry_msgs/msg/Transform', 'geometry_msgs/msg/Vector3', 'sensor_msgs/msg/JointState',
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -124,18 +117,9 @@ class Bag:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
             types = self._definitions(connection)
-            self._refuse_other_fields(types)
             store.register({name: types[name] for name in types if name not in store.fielddefs})
             self._stores[topic] = store
         return self._stores[topic]
-
-    def _refuse_other_fields(self, types: dict) -> None:
-        standard = get_typestore(definitions.STANDARD_STORE).fielddefs
-        for name in () if self._is_ros1 else {*KNOWN} & {*types}:
-            if types[name][1] != standard[name][1]:
-                raise RecordingError(
-                    f'{self.path} defines {name} with other fields than ROS does; record it again'
-                )
 
     @staticmethod
     def _definitions(connection: Connection) -> dict:

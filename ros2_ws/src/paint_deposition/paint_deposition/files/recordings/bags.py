@@ -16,16 +16,8 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics, open_bag
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import (
-    JOINT_TYPE,
-    STATE_TYPE,
-    TF_TYPES,
-)
-from paint_deposition.files.recordings.triggers import (
-    BOOL_TYPE,
-    read_switching,
-    unused_triggers,
-)
+from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_switching, unused_triggers
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 

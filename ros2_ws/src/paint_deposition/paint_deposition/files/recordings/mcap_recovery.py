@@ -1,14 +1,11 @@
 """Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
 
-import mmap
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import IO, cast
 
 import lz4.frame
 import yaml
@@ -16,10 +13,10 @@ import zstandard
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError, RecordLengthLimitExceeded
 from mcap.opcode import Opcode
+from mcap.reader import SeekingReader
 from mcap.records import Channel, Chunk, Footer, McapRecord, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import MCAP0_MAGIC
-from rosbags.interfaces import Qos
 from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
@@ -29,7 +26,7 @@ from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
 MAX_CHUNK_BYTES = 256 * 1024 * 1024
-RECORD_HEAD = struct.Struct('<BQ')  # opcode and length
+HEAD_BYTES = 9  # opcode and length of a record
 # What the readers raise on bytes that are not what they should be.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
@@ -42,8 +39,7 @@ class Recovery:
     """What came out of a damaged run.
 
     Attributes:
-        folder: the new run.
-        counts: messages by topic.
+        folder: the new run. counts: messages by topic.
         damaged_chunks: chunks left out because their content is broken.
         breaks: where and why reading stopped, one line a file; empty for whole files.
         skipped_topics: topics that no rosbag2 folder can hold (not CDR, or without a schema).
@@ -78,20 +74,18 @@ def recover(
         RecordingError: `path` holds no MCAP file, `folder` exists or cannot be written, or no
             message could be read.
     """
-    files = mcap_files(Path(path))
-    _refuse_what_is_no_mcap(Path(path), files)
-    surveys = [_survey(file) for file in files]
-    information = next((s.information for s in reversed(surveys) if s.information), {})
-    writer = RunWriter(
-        folder,
-        custom_data=information.get('custom_data') or {},
-        ros_distro=information.get('ros_distro'),
-    )
+    path = Path(path)
+    if not path.exists():
+        raise RecordingError(f'{path} does not exist')
+    files = mcap_files(path)
+    if not files:
+        raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
+    writer = RunWriter(folder)
     recovery = Recovery(writer.folder)
     try:
         with writer:
-            for file, survey in zip(files, surveys, strict=True):
-                _copy(file, survey, writer, recovery, on_bytes, topics)
+            for file in files:
+                _copy(file, writer, recovery, on_bytes, topics)
             if not writer.message_count:
                 reason = '; '.join(recovery.breaks) or 'no messages'
                 raise RecordingError(f'nothing to recover in {path}: {reason}')
@@ -102,170 +96,115 @@ def recover(
     return recovery
 
 
-def _refuse_what_is_no_mcap(path: Path, files: list[Path]) -> None:
-    if not path.exists():
-        raise RecordingError(f'{path} does not exist')
-    if not files:
-        raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
-    for file in files:
-        with file.open('rb') as stream:
-            if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-                raise RecordingError(f'{file} is not an MCAP file; nothing to recover')
-
-
-@dataclass
-class _Survey:
-    """What a file says outside its chunks: rosbag2's newest metadata, the repeated channels."""
-
-    information: dict = field(default_factory=dict)
-    schemas: dict[int, Schema] = field(default_factory=dict)
-    channels: dict[int, Channel] = field(default_factory=dict)
-
-    def note(self, record: McapRecord) -> None:
-        if isinstance(record, Metadata) and record.name == 'rosbag2':
-            self.information = _mapping(record) or self.information
-        elif isinstance(record, Schema):
-            self.schemas[record.id] = record
-        elif isinstance(record, Channel):
-            self.channels[record.id] = record
-
-
-def _survey(file: Path) -> _Survey:
-    survey = _Survey()
-    with _content(file) as stream:
-        for record in _records(file, stream, []):
-            survey.note(record)
-    return survey
-
-
-@contextmanager
-def _content(file: Path) -> Iterator[mmap.mmap]:
-    """A file as bytes; a plain stream would take memory for what a damaged length asks for."""
-    with file.open('rb') as stream, mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as all_:
-        yield all_
-
-
-def _mapping(record: Metadata) -> dict:
-    try:
-        content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
-    except yaml.YAMLError:  # damaged; an older record, or none, has to do
-        return {}
-    return content if isinstance(content, dict) else {}
-
-
-def _records(file: Path, stream: mmap.mmap, breaks: list[str]) -> Iterator[McapRecord]:
-    """Records up to the break, which is noted; chunks are not opened."""
-    size = file.stat().st_size
-    reader = StreamReader(cast(IO[bytes], stream), emit_chunks=True, record_size_limit=size)
-    record_at = len(MCAP0_MAGIC)
-    try:
-        for record in reader.records:
-            yield record
-            if isinstance(record, Footer):
-                return
-            record_at = stream.tell()
-    except DAMAGE as error:
-        cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
-        stream.seek(record_at)
-        beginning = _readable_beginning(stream.read(MAX_CHUNK_BYTES))
-        if beginning:
-            yield beginning
-        reason = 'the end is missing' if cut else str(error)
-        breaks.append(f'{file.name} breaks off at byte {record_at} of {size}: {reason}')
-
-
 def _copy(
     file: Path,
-    survey: _Survey,
     writer: RunWriter,
     recovery: Recovery,
     on_bytes: Callable[[int], None],
     topics: Collection[str],
 ) -> None:
-    with _content(file) as stream:
-        position = 0
-        for record in _records(file, stream, recovery.breaks):
-            for inner in _opened(record, recovery):
-                survey.note(inner)
-                if isinstance(inner, Channel) and (not topics or inner.topic in topics):
-                    _is_kept(inner, survey, writer, recovery)
-                elif isinstance(inner, Message):
-                    # The chunk that introduced the channel may be among the damaged ones.
-                    channel = survey.channels.get(inner.channel_id)
-                    if channel is None or (topics and channel.topic not in topics):
-                        continue
-                    if _is_kept(channel, survey, writer, recovery):
-                        writer.write(channel.topic, inner.data, inner.log_time, inner.publish_time)
-            on_bytes(stream.tell() - position)
-            position = stream.tell()
+    schemas: dict[int, Schema] = {}
+    channels: dict[int, Channel] = {}
+    try:  # the chunk that introduces a channel may be damaged; the end of a file repeats them
+        with file.open('rb') as stream:
+            if summary := SeekingReader(
+                stream, record_size_limit=file.stat().st_size
+            ).get_summary():
+                schemas, channels = dict(summary.schemas), dict(summary.channels)
+    except DAMAGE:
+        pass
+    for record in _records(file, recovery, on_bytes):
+        if isinstance(record, Schema):
+            schemas[record.id] = record
+        elif isinstance(record, Metadata) and record.name == 'rosbag2':
+            _take_information(record, writer)
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        if isinstance(record, Channel | Message):
+            channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
+            if channel is not None and (not topics or channel.topic in topics):
+                kept = _is_kept(channel, schemas.get(channel.schema_id), writer, recovery)
+                if kept and isinstance(record, Message):
+                    writer.write(channel.topic, record.data, record.log_time, record.publish_time)
 
 
-def _opened(record: McapRecord, recovery: Recovery) -> list[McapRecord]:
-    if not isinstance(record, Chunk):
-        return [record]
+def _records(
+    file: Path, recovery: Recovery, on_bytes: Callable[[int], None]
+) -> Iterator[McapRecord]:
+    """Records up to the break, which is noted, those of chunks among them."""
+    size, start = file.stat().st_size, len(MCAP0_MAGIC)
+    with file.open('rb') as stream:
+        reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
+        try:
+            for record in reader.records:
+                yield from _opened(record, recovery) if isinstance(record, Chunk) else [record]
+                if isinstance(record, Footer):
+                    return
+                on_bytes(stream.tell() - start)
+                start = stream.tell()
+        except DAMAGE as error:
+            cut = stream.tell() >= size or isinstance(error, RecordLengthLimitExceeded)
+            reason = 'the end is missing' if cut else str(error)
+            recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
+            stream.seek(start)
+            yield from _readable_beginning(stream.read(MAX_CHUNK_BYTES))
+
+
+def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
     try:
-        if record.uncompressed_size > MAX_CHUNK_BYTES:
+        if chunk.uncompressed_size > MAX_CHUNK_BYTES:
             raise ValueError('no recorder makes chunks of that size')
-        return breakup_chunk(record, validate_crc=True)
+        return breakup_chunk(chunk, validate_crc=True)
     except DAMAGE:
         recovery.damaged_chunks += 1
         return []
 
 
-def _is_kept(channel: Channel, survey: _Survey, writer: RunWriter, recovery: Recovery) -> bool:
-    """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
-    schema = survey.schemas.get(channel.schema_id)
-    text = _text(schema)
-    if schema is None or text is None or channel.message_encoding != 'cdr':
-        if channel.topic not in recovery.skipped_topics:
-            recovery.skipped_topics.append(channel.topic)
-        return False
-    if channel.topic not in writer.counts:
-        definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
-        writer.add_topic(RunTopic(channel.topic, schema.name, definition, _qos(channel)))
-    return True
-
-
-def _text(schema: Schema | None) -> str | None:
-    try:
-        return schema.data.decode() if schema else None
-    except UnicodeDecodeError:
-        return None
-
-
-def _qos(channel: Channel) -> list[Qos]:
-    try:
-        return parse_qos(channel.metadata.get('offered_qos_profiles', ''))
-    except (ReaderError, KeyError, TypeError, AttributeError):
-        return []  # damaged; players take their default then
-
-
-def _readable_beginning(record: bytes) -> Chunk | None:
-    """An uncompressed chunk of the whole messages in a cut chunk record, None if there are none.
+def _readable_beginning(record: bytes) -> Iterator[McapRecord]:
+    """The whole records in a cut chunk; its checksum covers all of it and cannot be checked.
 
     Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
-    Its checksum covers all of it and cannot be checked any more.
     """
     if record[:1] != bytes([Opcode.CHUNK]):
-        return None
+        return
     try:
-        chunk = Chunk.read(ReadDataStream(BytesIO(record[RECORD_HEAD.size :])))
+        chunk = Chunk.read(ReadDataStream(BytesIO(record[HEAD_BYTES:])))
         data = chunk.data
         if chunk.compression == 'zstd':
             data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
         elif chunk.compression == 'lz4':
             data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+        reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
+        yield from reader.records
     except DAMAGE:
-        return None
-    end = 0
-    while end + RECORD_HEAD.size <= len(data):
-        length = RECORD_HEAD.size + RECORD_HEAD.unpack_from(data, end)[1]
-        if end + length > len(data):
-            break
-        end += length
-    whole = data[:end]
-    return (
-        replace(chunk, compression='', data=whole, uncompressed_crc=0, uncompressed_size=end)
-        if whole
-        else None
-    )
+        return
+
+
+def _take_information(record: Metadata, writer: RunWriter) -> None:
+    """Custom data and distribution, as rosbag2 noted them last."""
+    try:
+        content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
+        writer.custom_data = {k: str(v) for k, v in (content.get('custom_data') or {}).items()}
+        writer.ros_distro = content.get('ros_distro') or writer.ros_distro
+    except (yaml.YAMLError, AttributeError):  # an older record, or none, has to do
+        return
+
+
+def _is_kept(
+    channel: Channel, schema: Schema | None, writer: RunWriter, recovery: Recovery
+) -> bool:
+    """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
+    if channel.topic in writer.counts:
+        return True
+    if schema is None or channel.message_encoding != 'cdr':
+        if channel.topic not in recovery.skipped_topics:
+            recovery.skipped_topics.append(channel.topic)
+        return False
+    text = schema.data.decode(errors='replace')
+    try:
+        qos = parse_qos(channel.metadata.get('offered_qos_profiles', ''))
+    except (ReaderError, KeyError, TypeError, AttributeError):
+        qos = []  # damaged; players take their default then
+    definition = Definition(text, channel.metadata.get('topic_type_hash', ''), schema.encoding)
+    writer.add_topic(RunTopic(channel.topic, schema.name, definition, qos))
+    return True

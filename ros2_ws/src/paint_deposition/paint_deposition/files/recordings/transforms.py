@@ -42,11 +42,7 @@ def part_pose_topics(bag: Bag) -> list[str]:
 
 
 def _edges(bag: Bag, static: bool) -> list[Edge]:
-    """The transforms of a bag, either the static ones or those over time.
-
-    Raises:
-        RecordingError: the part was placed anew while the run was recorded.
-    """
+    """The transforms of a bag, either the static ones or those over time."""
     topics = [topic.name for topic in bag.topics_of(*TF_TYPES)]
     topics = [name for name in topics if (name.rsplit('/', 1)[-1] == STATIC) == static]
     placed = part_pose_topics(bag) if static else []

@@ -21,35 +21,32 @@ UNIT_NAMES = {1.0: 'm', 1e-2: 'cm', 1e-3: 'mm', 1e-6: 'µm', 25.4e-6: 'mil', 25.
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading.
-
-    Attributes:
-        text: as it is written.
-        words: small and without accents, without the unit.
-        unit: one of ``UNITS``, '' where there is none.
-        bracket: what stands in brackets and is no known unit.
-    """
+    """A heading as it is written, its words without the unit, and the unit ('' for none)."""
 
     text: str
     words: tuple[str, ...]
     unit: str = ''
-    bracket: str = ''
 
     @staticmethod
     def of(text: str) -> Heading:
-        """'X [mm]', 'x_mm', 'DFT, µm', 'Dicke in µm' and '/pose/orientation/w' are understood."""
+        """'X [mm]', 'x_mm', 'DFT, µm', 'Dicke in µm' and '/pose/orientation/w' are understood.
+
+        A text in brackets that is no known unit stays as the unit, for the reader to refuse.
+        """
         text = text.strip().lstrip('#%').strip()
         small = re.sub(r'[\s_](mm?)_per_s$', r' [\1/s]', _small(text))
-        bracketed = re.search(r'[\[(]\s*([^\])]*?)\s*[\])]', small)
-        if bracketed:
-            words = words_of(small[: bracketed.start()] + ' ' + small[bracketed.end() :])
-            inside = bracketed[1]
-            known = inside in UNITS
-            return Heading(text, words, inside if known else '', '' if known else inside)
+        if bracketed := re.search(r'[\[(]\s*([^\])]*?)\s*[\])]', small):
+            rest = small[: bracketed.start()] + ' ' + small[bracketed.end() :]
+            return Heading(text, words_of(rest), bracketed[1])
         words = words_of(small)
-        if words and words[-1] in UNITS and (len(words) > 1 or words[-1] in LENGTHS):
+        if len(words) > 1 and words[-1] in UNITS:
             return Heading(text, tuple(w for w in words[:-1] if w != 'in'), words[-1])
         return Heading(text, words)
+
+    @property
+    def unit_m(self) -> float | None:
+        """Metres in its unit, None where it has no unit of length."""
+        return LENGTHS.get(self.unit)
 
 
 def words_of(text: str) -> tuple[str, ...]:

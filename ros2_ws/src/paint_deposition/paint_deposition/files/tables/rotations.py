@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.headings import ANGLES
+from paint_deposition.files.tables.pose_columns import (
+    QUATERNION,
+    ROLL_PITCH_YAW,
+    ROTATION_VECTOR,
+    PoseTable,
+)
 
-QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ABB_QUATERNION = ('q2', 'q3', 'q4', 'q1')  # the scalar is the first one, q1
-ROTATION_VECTOR, EULER = ('rx', 'ry', 'rz'), ('ex', 'ey', 'ez')
-ROLL_PITCH_YAW = ('roll', 'pitch', 'yaw')
+EULER = ('ex', 'ey', 'ez')
 # Angles in the order in which a convention takes them, and the maker who calls them so.
 IN_ORDER = {
     ('a', 'b', 'c'): 'kuka', ('w', 'p', 'r'): 'fanuc', ('alpha', 'beta', 'gamma'): '',
@@ -34,15 +37,6 @@ ROTVEC = 'rotvec'
 LARGEST_RAD = 2.0 * np.pi + 1e-6
 
 
-class Columns(Protocol):
-    """The columns of a table of poses."""
-
-    def find_all(self, names: Sequence[str]) -> list[int] | None: ...
-    def units(self, columns: Sequence[int]) -> set[str]: ...
-    def written(self, columns: Sequence[int]) -> str: ...
-    def numbers(self, columns: Sequence[int]) -> np.ndarray: ...
-
-
 def is_rotation(name: str) -> bool:
     """Whether a name is that of a rotation vector or of a convention of angles."""
     known = name.lower() in (ROTVEC, *CONVENTIONS)
@@ -50,7 +44,7 @@ def is_rotation(name: str) -> bool:
 
 
 def read_rotations(
-    table: Columns, rotation: str | None, angle_unit: str | None
+    table: PoseTable, rotation: str | None, angle_unit: str | None
 ) -> tuple[np.ndarray, str]:
     """Quaternions (N, 4), scalar last, and how they were read.
 
@@ -88,7 +82,7 @@ def read_rotations(
     return Rotation.from_euler(sequence, angles).as_quat(), how
 
 
-def _angle_columns(table: Columns, rotation: str | None) -> tuple[list[int], bool, str]:
+def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
     if columns := table.find_all(ROTATION_VECTOR):
         if rotation is None and table.units(columns) & {'deg', '°'}:
@@ -113,7 +107,9 @@ def _angle_columns(table: Columns, rotation: str | None) -> tuple[list[int], boo
     )
 
 
-def _unit(table: Columns, columns: Sequence[int], convention: str, angle_unit: str | None) -> str:
+def _unit(
+    table: PoseTable, columns: Sequence[int], convention: str, angle_unit: str | None
+) -> str:
     """The unit of the angles: their headings', else the one given, else their maker's."""
     units = table.units(columns)
     if units <= {'deg', '°'} or units == {'rad'}:

@@ -6,7 +6,7 @@ import csv
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
@@ -17,9 +17,7 @@ from paint_deposition.files.parquet import MAGIC, require_libraries
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
 
-SEPARATORS = {',': 'commas', ';': 'semicolons', '\t': 'tabs', '|': 'bars'}
-# Columns of a printed list stand apart by two blanks where headings have one.
-BLANKS = (re.compile(r'\s{2,}|\t'), re.compile(r'\s+'))
+SEPARATORS = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
 ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
 # A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
@@ -49,11 +47,8 @@ class Sheet:
         return Sheet([row for _, row in kept], [line for line, _ in kept], form)
 
 
-def read_sheets(path: Path, refusal: type[PaintError]) -> list[list[Sheet]]:
-    """The ways to read a file, the likelier ones first.
-
-    Each is a list of sheets: those of a workbook; or a text once for each separator that is in
-    it, and then once for each kind of blanks between columns.
+def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
+    """The sheets of a workbook, or a text once for each separator that is in it and by blanks.
 
     Raises:
         PaintError: of the class given; the file is neither text nor workbook.
@@ -66,26 +61,14 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[list[Sheet]]:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
-            return [_sheets_of_workbook(content)]
+            return _sheets_of_workbook(content)
         if content.startswith(MAGIC):
             require_libraries(str(path))
-            return [[_sheet_of_parquet(content)]]
-        text, encoding = _decoded(content)
-        separated = [
-            Sheet.of(_separated(text, mark), f'{name}, {encoding}')
-            for mark, name in SEPARATORS.items()
-            if mark in text
-        ]
+            return [_sheet_of_parquet(content)]
+        return _sheets_of_text(*_decoded(content))
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
-    lines = [line.strip() for line in text.splitlines()]
-    by_blanks = [
-        Sheet.of(enumerate((list[Cell](blank.split(line)) for line in lines), 1), form)
-        for blank in BLANKS
-        for form in [f'blanks, {encoding}']
-    ]
-    return [separated, by_blanks]
 
 
 def text_of(cell: Cell) -> str:
@@ -107,13 +90,19 @@ def _decoded(content: bytes) -> tuple[str, str]:
     raise ValueError('text')
 
 
-def _separated(text: str, separator: str) -> Iterator[tuple[int, list[Cell]]]:
-    reader = csv.reader(StringIO(text, newline=''), delimiter=separator)
-    try:
-        for row in reader:
-            yield reader.line_num, [_in_one_line(cell) for cell in row]
-    except csv.Error as error:
-        raise ValueError(f'CSV text (line {reader.line_num}: {error})') from None
+def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
+    sheets = []
+    for mark, name in SEPARATORS.items():
+        if mark not in text:
+            continue
+        reader = csv.reader(StringIO(text, newline=''), delimiter=mark)
+        try:
+            rows = [(reader.line_num, [_cell(cell) for cell in row]) for row in reader]
+        except csv.Error as error:
+            raise ValueError(f'CSV text (line {reader.line_num}: {error})') from None
+        sheets.append(Sheet.of(rows, f'{name}, {encoding}'))
+    by_blanks = enumerate((list[Cell](line.split()) for line in text.splitlines()), 1)
+    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}')]
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
@@ -125,10 +114,9 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
         return [
             Sheet.of(
                 enumerate(([_cell(value) for value in row] for row in sheet.to_python(False)), 1),
-                f"sheet '{name}'",
+                f"sheet '{sheet.name}'",
             )
-            for name in workbook.sheet_names
-            for sheet in [workbook.get_sheet_by_name(name)]
+            for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names)
         ]
     except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
         raise ValueError(f'a workbook ({error})') from None
@@ -143,9 +131,8 @@ def _refuse_far_cells(content: bytes) -> None:
             if not (name.startswith('xl/') and name.endswith('.xml')):
                 continue
             places = set(XLSX_CELL.findall(package.read(name)))
-            width = max((sum(26**k * (c & 31) for k, c in enumerate(letters[::-1]))
-                         for letters, _ in places), default=0)  # fmt: skip
-            if width * max((int(row) for _, row in places), default=0) > MOST_CELLS:
+            widths = [sum(26**k * (c & 31) for k, c in enumerate(a[::-1])) for a, _ in places]
+            if max(widths, default=0) * max((int(r) for _, r in places), default=0) > MOST_CELLS:
                 raise ValueError('a workbook (delete what lies far outside the table)')
 
 
@@ -173,8 +160,4 @@ def _sheet_of_parquet(content: bytes) -> Sheet:
 def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    return _in_one_line(str(value))
-
-
-def _in_one_line(text: str) -> str:
-    return ' '.join(text.strip().splitlines())
+    return ' '.join(str(value).strip().splitlines())

@@ -3,43 +3,26 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Container, Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol, TypeVar
 
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.tables.headings import LENGTHS, Heading, length_of
+from paint_deposition.files.tables.headings import Heading
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
 MOST_HEADINGS_SHOWN = 20
 MOST_COMPLAINTS_SHOWN = 8
-NUMBER = re.compile(r'([+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?))\s*(.*)')
+NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
+# With one mark only, three digits behind it may be thousands.
+IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|none|null', re.IGNORECASE)
 SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
-
-
-class Header(Protocol):
-    """What is known of the columns under a row of headings."""
-
-    @property
-    def header(self) -> int:
-        """Row of the headings, -1 where there are none."""
-
-    @property
-    def score(self) -> int:
-        """How much is known: of several ways to read a file the one that knows most is right."""
-
-    def serves(self) -> bool:
-        """Whether the columns that are needed are among them."""
-
-
-Found = TypeVar('Found', bound=Header)
 
 
 @dataclass
@@ -71,58 +54,42 @@ class Table:
         return [text_of(_cell(row, column)) for row in self.rows]
 
     def numbers(
-        self,
-        column: int,
-        units: Container[float] = (),
-        may_be_empty: bool = False,
-        finite: bool = True,
-        switch: bool = False,
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """A column (N,) as written, and metres in the unit behind each number (N,).
+        self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
+    ) -> np.ndarray:
+        """A column (N,) as written; what is no number is complained of.
 
         Args:
             column: its index.
-            units: of length that may stand behind a number, in metres.
             may_be_empty: whether blank cells give nan without a complaint.
             finite: whether nan and inf are complained of.
             switch: whether on, off, yes, no, true and false are numbers too.
         """
-        values, behind = np.full(len(self), np.nan), np.full(len(self), np.nan)
+        values = np.full(len(self), np.nan)
+        name = self.headings[column].text or f'column {column + 1}'
         for index, row in enumerate(self.rows):
             cell = _cell(row, column)
+            value = self._number(cell)
             if may_be_empty and is_nothing(cell):
                 continue
             if switch and text_of(cell).lower() in SWITCHED:
-                values[index] = SWITCHED[text_of(cell).lower()]
-                continue
-            value, text = self._number(cell)
-            unit = length_of(text) if text else None
-            if value is None or (text and unit not in units):
+                value = SWITCHED[text_of(cell).lower()]
+            if value is None:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
-                self.complain(index, f"{self._name(column)} is '{text_of(cell)}'; {wanted}")
+                self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
-                self.complain(index, f'{self._name(column)} is {cell}; expected a finite number')
+                self.complain(index, f'{name} is {cell}; expected a finite number')
             else:
                 values[index] = value
-                behind[index] = np.nan if unit is None else unit
-        return values, behind
+        return values
 
-    def _name(self, column: int) -> str:
-        return self.headings[column].text or f'column {column + 1}'
-
-    def _number(self, cell: Cell) -> tuple[float | None, str]:
-        """The number in a cell and the text behind it, its unit."""
+    def _number(self, cell: Cell) -> float | None:
         if isinstance(cell, float):
-            return cell, ''
+            return cell
         text = cell.replace('−', '-').lower()
-        other = '.' if self.decimal == ',' else ','
-        if other in text:  # between thousands
-            grouped = re.match(rf'[+-]?\d{{1,3}}(\{other}\d{{3}})+(?!\d)', text)
-            text = text.replace(other, '') if grouped else ''
-        text = text.replace(',', '.')
-        found = NUMBER.fullmatch(text)
-        return (float(found[1]), found[2]) if found else (None, '')
+        if self.decimal == ',':
+            text = text.replace('.', '?').replace(',', '.')
+        return float(text) if NUMBER.fullmatch(text) else None
 
     def written(self, columns: Sequence[int]) -> str:
         """Headings as the file has them."""
@@ -157,89 +124,80 @@ class Table:
         )
 
     def with_decimal(self, columns: Iterable[int], given: str = '') -> tuple[Table, str]:
-        """The table with the decimal mark that these columns have in common, and what is in doubt.
+        """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
 
         Args:
             columns: of numbers.
             given: the mark, if the user gives it.
         """
-        certain: dict[str, str] = {}
-        unsure = ''
+        seen: dict[str, str] = {}
+        only_in_doubt = True
         for row, line in zip(self.rows, self.lines, strict=True):
             for cell in (_cell(row, column) for column in columns):
-                digits = re.match(r'[+-]?[\d.,]+', cell) if isinstance(cell, str) else None
-                marks = set(digits[0]) & {'.', ','} if digits else set()
-                if not digits or not marks:
-                    continue
-                if re.fullmatch(r'[+-]?[1-9]\d{0,2}[.,]\d{3}', digits[0]):
-                    unsure = unsure or (f"'{cell}' in line {line}" if ',' in marks else '')
-                else:
-                    certain.setdefault(max(marks, key=digits[0].rfind), f"'{cell}' in line {line}")
-        mark, doubt = given or next(iter(certain), ',' if unsure else '.'), ''
-        if not given and len(certain) > 1:
-            point, comma = certain['.'], certain[',']
-            doubt = f'decimal point ({point}) and decimal comma ({comma}) are mixed; use one'
-        elif not given and not certain and unsure:
+                if isinstance(cell, str) and re.fullmatch(r'[+−-]?[\d.,]+(e[+-]?\d+)?', cell):
+                    for mark in {'.', ','} & {*cell}:
+                        seen.setdefault(mark, f"'{cell}' in line {line}")
+                    only_in_doubt &= ',' not in cell or bool(IN_DOUBT.fullmatch(cell))
+        mark, doubt = given or (',' if ',' in seen else '.'), ''
+        if not given and len(seen) > 1:
             doubt = (
-                f'{unsure} may have a decimal comma or a comma between thousands; say which with '
-                'decimal: comma or decimal: point'
+                f'decimal point ({seen["."]}) and decimal comma ({seen[","]}) are mixed; use one, '
+                'and no mark between thousands'
+            )
+        elif not given and ',' in seen and only_in_doubt:
+            doubt = (
+                f'{seen[","]} may have a decimal comma or a comma between thousands; say '
+                'decimal: comma, or leave the thousands unmarked'
             )
         form = self.form + (', decimal comma' if mark == ',' else '')
         return replace(self, decimal=mark, form=form), doubt
 
 
-def read_table(
+def find_table(
     path: Path,
     refusal: type[PaintError],
-    find: Callable[[Sheet, int], Found | None],
+    known: Callable[[list[Heading]], int],
     sheet: str = '',
-) -> tuple[Sheet, Found | None]:
-    """The sheet of a file, or the way to separate its cells, of which most is known.
+) -> tuple[Sheet, int | None]:
+    """The sheet with a table, and the row of its headings; None where none is found.
 
     Args:
         path: of a text file or workbook.
         refusal: the class of the errors.
-        find: what is known of the columns of a sheet if this row has the headings.
+        known: how many quantities a row of headings names, 0 where a needed one is missing.
         sheet: name of a workbook's sheet, or ''.
 
     Raises:
-        PaintError: the file cannot be read, or several sheets serve alike.
+        PaintError: the file cannot be read, or several sheets of a workbook hold a table.
     """
-    best: tuple[Sheet, Found] | None = None
-    widest = Sheet([], [], '')
-    for sheets in read_sheets(path, refusal):
-        if sheet:
-            named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
-            if not named:
-                there = ', '.join(s.form for s in sheets)
-                raise refusal(f"{path}: there is no sheet '{sheet}' (there are: {there})")
-            sheets = named
-        widest = max([widest, *sheets], key=lambda s: len(s.rows[0]) if s.rows else 0)
-        known = [(s, found) for s in sheets if (found := _best_header(s, find))]
-        for way in known:
-            if best is None or _rank(way[1]) > _rank(best[1]):
-                best = way
-        if best and best[1].serves():
-            alike = [s.form for s, found in known if _rank(found) == _rank(best[1])]
-            if len(alike) > 1 and alike[0].startswith('sheet'):
-                found_in = ' and '.join(alike)
-                raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
-            return best
-    return best or (widest, None)
+    sheets = read_sheets(path, refusal)
+    if sheet:
+        named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
+        if not named:
+            there = ', '.join(s.form for s in sheets)
+            raise refusal(f"{path}: there is no sheet '{sheet}' (there are: {there})")
+        sheets = named
+    found: list[tuple[Sheet, int]] = []
+    for one in sheets:
+        ranks = [
+            (known(headings_in(row)), not is_comment(row)) for row in one.rows[:MOST_LINES_ABOVE]
+        ]
+        best = max(ranks, default=(0, False))
+        if best[0]:
+            found.append((one, ranks.index(best)))
+    if len(found) > 1 and found[0][0].form.startswith('sheet'):
+        found_in = ' and '.join(one.form for one, _ in found)
+        raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
+    # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
+    wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
+    if found:
+        return (wide or found[-1:])[0]
+    return max(sheets, key=lambda s: len(s.rows[0]) if s.rows else 0), None
 
 
-def _best_header(sheet: Sheet, find: Callable[[Sheet, int], Found | None]) -> Found | None:
-    rows = range(min(len(sheet.rows), MOST_LINES_ABOVE))
-    found = [columns for row in rows if (columns := find(sheet, row)) is not None]
-    # A commented line heads a table only where no other one does.
-    plain = [c for c in found if not is_comment(sheet.rows[c.header])]
-    if not any(columns.serves() for columns in plain):
-        plain = found
-    return max(plain, key=_rank, default=None)
-
-
-def _rank(found: Header) -> tuple[bool, int]:
-    return found.serves(), found.score
+def headings_in(row: list[Cell]) -> list[Heading]:
+    """The cells of a row as headings."""
+    return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
 
 
 def shown(headings: Sequence[Heading]) -> str:
@@ -263,16 +221,6 @@ def is_value(cell: Cell) -> bool:
 def is_nothing(cell: Cell) -> bool:
     """Whether a cell is blank or says that there is no reading."""
     return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None
-
-
-def metres(values: np.ndarray, unit_m: float) -> np.ndarray:
-    """Lengths in metres; a division by 1000 comes nearer to the text than a product with 0.001."""
-    return values / round(1.0 / unit_m) if unit_m in (1.0, 1e-2, 1e-3) else values * unit_m
-
-
-def unit_m(heading: Heading) -> float | None:
-    """Metres in the unit of a heading, None where it has no unit of length."""
-    return LENGTHS.get(heading.unit)
 
 
 def _cell(row: list[Cell], column: int) -> Cell:

@@ -11,12 +11,7 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import (
-    FEW_RAYS,
-    FilmIntegrator,
-    Steps,
-    gauge_reading_um,
-)
+from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, gauge_reading_um
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES

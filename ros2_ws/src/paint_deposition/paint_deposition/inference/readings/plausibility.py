@@ -28,11 +28,7 @@ BESIDE = 0.05
 
 
 def check_enough(points: int) -> None:
-    """Refuse a campaign with hardly more points than the pattern has parameters.
-
-    Raises:
-        ReadingsError: one line with the remedy.
-    """
+    """Refuse a campaign with hardly more points than the pattern has parameters."""
     if points < FEWEST_POINTS:
         raise ReadingsError(
             f'readings at {points} points; the pattern has 7 parameters, measure at least '
@@ -41,11 +37,7 @@ def check_enough(points: int) -> None:
 
 
 def check_unit(readings: Readings) -> None:
-    """Refuse readings in another unit.
-
-    Raises:
-        ReadingsError: one line with the remedy.
-    """
+    """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
     if highest < THINNEST_FILM_UM:
         unit, factor = ('mils', UM_PER_MIL) if highest > THINNEST_MILS else ('mm', UM_PER_MM)
@@ -60,9 +52,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
 
     Args:
         sigma_um: (N,) standard deviation of a reading [um].
-
-    Raises:
-        ReadingsError: one line with the remedy.
     """
     film = readings.thickness_um
     below = film < -NEGATIVE_SIGMAS * sigma_um
@@ -83,9 +72,6 @@ def check_panel(
     Args:
         readings: as taken. panel: where points and passes lie.
         measured_um, sigma_um: (P,) point means and their standard deviations [um].
-
-    Raises:
-        ReadingsError: one line with the remedy.
     """
     places = panel.places_m
     nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
@@ -114,9 +100,6 @@ def check_units_beside(
 
     Args:
         measured_um, expected_um: (P,) point means, and the film expected there [um].
-
-    Raises:
-        ReadingsError: one line with the remedy.
     """
     thick = (expected_um > THINNEST_FILM_UM) & (measured_um > 0.0)
     ratio = np.where(thick, expected_um, 1.0) / np.where(thick, measured_um, 1.0)
@@ -167,10 +150,6 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> None:
 
     Args:
         model: its pattern and projection count, its effects do not.
-
-    Raises:
-        ReadingsError: one line with the likely cause.
-        ModelError: a brush that painted it is not in the model.
     """
     plain = model.model_copy(update={'effects': ()})
     for one in campaign.experiments:

@@ -68,7 +68,7 @@ class ModelComparison(PaintingNode):
     def _configure(self) -> None:
         super()._configure()
         self._outputs = {
-            topic: self.watch.publisher(message, topic, topics.LATCHED)
+            topic: self.create_publisher(message, topic, topics.LATCHED)
             for topic, message in (
                 ('comparison/mesh', Marker),
                 ('comparison/stats', ComparisonStats),

@@ -10,7 +10,6 @@ from collections.abc import Callable
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
-from rclpy.qos import ReliabilityPolicy
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
@@ -21,13 +20,11 @@ from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, QosWatch, endpoint_name, of_gun
+from paint_deposition.nodes.runtime.topics import (
+    PROGRESS_TOPIC,
+    of_gun,
+)
 
-RELIABILITIES = {
-    'as_offered': None,
-    'best_effort': ReliabilityPolicy.BEST_EFFORT,
-    'reliable': ReliabilityPolicy.RELIABLE,
-}
 FOLLOW_PERIOD_S = 0.1
 # Messages are taken together: to wake for each pose would cost more than to paint it.
 TAKE_PERIOD_S = 0.02
@@ -37,14 +34,6 @@ PROGRESS_PERIOD_S = 0.2
 NO_FLOW = 'states that spray with flow 0'
 
 
-def several_guns(publishers: list[str]) -> str:
-    """What it means that more than one publishes the poses."""
-    return (
-        f'{len(publishers)} publishers, {" and ".join(publishers)}: their poses are painted as '
-        'the motion of one gun; give each gun a topic or a namespace of its own'
-    )
-
-
 class AtomizerInput:
     """Takes a gun's `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
 
@@ -52,7 +41,7 @@ class AtomizerInput:
     States are passed on as they come, poses in batches of fifty or every twentieth of a second.
 
     Args:
-        node: makes publishers and timers; `watch` makes the subscriptions.
+        node: makes publishers, timers and subscriptions.
         name: of the gun, '' for the only one of a cell.
         frame: of the part, into which the poses are brought.
         on_poses, on_state: get the poses, and the states; a PaintError refuses a state.
@@ -62,7 +51,6 @@ class AtomizerInput:
         refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
         sprays: whether the newest state says that the gun sprays; False before any.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
-        pose_publishers: who publishes the poses now.
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: why the last was.
         unpainted: poses that came while the node was not active.
@@ -75,13 +63,12 @@ class AtomizerInput:
     def __init__(
         self,
         node: PaintNode,
-        watch: QosWatch,
         name: str,
         frame: PartFrame,
         on_poses: Callable[[PoseBatch], None],
         on_state: Callable[[TriggerChange], None],
     ) -> None:
-        self._node, self._watch, self._frame = node, watch, frame
+        self._node, self._frame = node, frame
         self._on_poses, self._on_state = on_poses, on_state
         self.name = name
         self._pose_topic = of_gun(name, 'atomizer/pose')
@@ -91,7 +78,6 @@ class AtomizerInput:
         self.sprays = False
         self.speed = SpeedNow()
         self.programmed_m_per_s = 0.0
-        self.pose_publishers: list[str] = []
         self._newest: PoseStamped | None = None
         self._flushed_s = -math.inf
         self._stamps: list[int] = []
@@ -101,12 +87,11 @@ class AtomizerInput:
         self.reset()
         self._topics = [
             AtomizerTopic(
-                watch,
+                node,
                 message,
                 topic,
                 take,
                 depth=node.values['pose_queue_depth'],
-                reliability=RELIABILITIES[node.values['pose_reliability']],
                 # The last state holds until the next one, whenever it was published.
                 latched=message is AtomizerState,
             )
@@ -126,6 +111,11 @@ class AtomizerInput:
     def poses_refused(self) -> int:
         """Poses refused for their frame since the last reset."""
         return sum(self.refused_frames.values())
+
+    @property
+    def messages_lost(self) -> int:
+        """Messages that the middleware says it lost."""
+        return sum(topic.lost for topic in self._topics)
 
     def reset(self) -> None:
         """Count from zero; poses that were not passed on yet are dropped."""
@@ -171,13 +161,6 @@ class AtomizerInput:
                 self._queue(message)
         self.flush()
 
-    def held_stamps(self) -> tuple[list[int], list[int]]:
-        """Stamps of the poses and of the states that are kept [ns]."""
-        held = list(self._held or [])
-        states = [stamp_ns(kept.header) for kept in held if isinstance(kept, AtomizerState)]
-        poses = [stamp_ns(kept.header) for kept in held if isinstance(kept, PoseStamped)]
-        return poses, states
-
     # --- taking and passing on
 
     def take_waiting(self) -> None:
@@ -217,10 +200,6 @@ class AtomizerInput:
     def _follow_publishers(self) -> None:
         for topic in self._topics:
             topic.follow_publishers()
-        publishers = sorted(map(endpoint_name, self._watch.publishers_of(self._pose_topic)))
-        if len(publishers) > max(1, len(self.pose_publishers)):
-            self._node.get_logger().warning(f'{self._pose_topic}: {several_guns(publishers)}')
-        self.pose_publishers = publishers
 
     # --- poses
 

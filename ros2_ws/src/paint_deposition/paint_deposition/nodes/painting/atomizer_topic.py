@@ -7,10 +7,12 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
+from rclpy.event_handler import SubscriptionEventCallbacks
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
-from paint_deposition.nodes.runtime.topics import QosWatch, accepting
+from paint_deposition.nodes.runtime.topics import accepting
 
 # More than a publisher keeps for those who come late.
 REMEMBERED = 1000
@@ -37,33 +39,32 @@ class AtomizerTopic:
     `latched`. A message that comes twice because the subscription changes counts once.
 
     Args:
-        watch: makes the subscription.
+        node: makes the subscription.
         take: gets each message, in `take_waiting`.
         depth: messages that may wait.
-        reliability: to ask for whatever is offered; None: as offered.
+
+    Attributes:
+        lost: messages that the middleware says it lost.
     """
 
     def __init__(
         self,
-        watch: QosWatch,
+        node: Node,
         message: type,
         topic: str,
         take: Callable[[Any], None],
         *,
         depth: int,
-        reliability: ReliabilityPolicy | None = None,
         latched: bool = False,
     ) -> None:
-        self._watch = watch
+        self._node = node
+        self.lost = 0
         self._message = message
         self._topic = topic
         self._take = take
-        self._reliability = reliability
         self._latched = latched
         self._group = Polled()
-        self._first = QoSProfile(
-            depth=depth, reliability=reliability or ReliabilityPolicy.RELIABLE
-        )
+        self._first = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
         self._subscription: Subscription | None = None
         self._subscribe(self._first)
@@ -83,12 +84,13 @@ class AtomizerTopic:
             self._drain(self._subscription)
 
     def _best(self) -> QoSProfile:
-        offered = [info.qos_profile for info in self._watch.publishers_of(self._topic)]
+        publishers = self._node.get_publishers_info_by_topic(self._topic)
+        offered = [info.qos_profile for info in publishers]
         if not offered:
             return self._first
         profile = accepting(offered, self._first.depth)
         # More reliable in mid-stream would lose what is sent until both ends have met again.
-        if self._reliability is not None or self._profile.reliability > profile.reliability:
+        if self._profile.reliability > profile.reliability:
             profile.reliability = self._profile.reliability
         if not self._latched:
             profile.durability = DurabilityPolicy.VOLATILE
@@ -97,12 +99,16 @@ class AtomizerTopic:
     def _subscribe(self, profile: QoSProfile) -> None:
         before, self._profile = self._subscription, profile
         # The new one is there before the old one goes: nothing is lost between them.
-        self._subscription = self._watch.subscription(
-            self._message, self._topic, self._on_message, profile, self._group
-        )
+        self._subscription = self._node.create_subscription(
+            self._message, self._topic, self._on_message, profile, callback_group=self._group,
+            event_callbacks=SubscriptionEventCallbacks(message_lost=self._count_lost),
+        )  # fmt: skip
         if before is not None:
             self._drain(before)
-            self._watch.destroy_subscription(before)
+            self._node.destroy_subscription(before)
+
+    def _count_lost(self, event: Any) -> None:
+        self.lost += event.total_count_change
 
     def _drain(self, subscription: Subscription) -> None:
         handle = subscription.handle

@@ -9,7 +9,6 @@ from collections.abc import Callable, Mapping
 
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
-from paint_deposition.nodes.painting.atomizer_input import several_guns
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.topics import of_gun
@@ -52,10 +51,9 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         if source.programmed_m_per_s > 0.0
         else 'unknown',
         'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
-        'publishers of poses': ' '.join(source.pose_publishers) or 'none',
         'poses not painted while inactive': source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
-        'messages lost by the middleware': node.watch.lost_messages,
+        'messages lost by the middleware': source.messages_lost,
         'gun': _gun_in_words(film),
     }
     if not node.active:
@@ -82,22 +80,11 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     wrong += sorted(source.refusals_of_states)
     if values['gun'] == NO_BRUSH and counts.received:
         wrong.insert(0, NO_BRUSH)
-    if len(source.pose_publishers) > 1:
-        wrong.insert(0, several_guns(source.pose_publishers))
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     if silent_s > SILENT_S:
         return Status(OK, 'waiting for poses', values)
     return Status(OK, 'painting', values)
-
-
-def topics_status(node: PaintingNode) -> Status:
-    """Publishers and subscribers that are there now and do not fit this node."""
-    found = node.watch.misfits()
-    if found:
-        listed = '; '.join(f'{topic}: {what}' for topic, what in found.items())
-        return Status(ERROR, f'not heard: {listed}', found)
-    return Status(OK, 'every type and quality of service fits')
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
@@ -153,6 +140,5 @@ def painting_tasks(
     }
     return {
         **poses,
-        'topics': lambda: topics_status(node),
         'film': lambda: film_status(node, film_values()),
     }

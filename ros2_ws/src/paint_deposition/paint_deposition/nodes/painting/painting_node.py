@@ -19,7 +19,6 @@ from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.film_preparation import (
-    CatchingUp,
     Repainting,
     index_facing,
     paint_in_one_thread,
@@ -28,7 +27,6 @@ from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
-from paint_deposition.nodes.runtime.topics import QosWatch
 from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -53,21 +51,16 @@ class PaintingNode(ManagedNode, ABC):
         models: of the guns, as the parameters choose them.
         film: what is painted so far, by one gun or several.
         inputs: what comes from the cell, one for each gun.
-        watch: publishers and subscribers whose quality of service does not fit.
-        catching_up: with the recording of a run in which the node was started, while it lasts.
         repainting: the changed models that are being prepared, if any are.
         model_problem: why the last models that were set are not used, '' if they are.
     """
 
-    catching_up: CatchingUp | None = None
     repainting: Repainting | None = None
 
     def _configure(self) -> None:
-        self.watch = QosWatch(self)
         self.inputs = [
             AtomizerInput(
                 self,
-                self.watch,
                 name,
                 self.frame,
                 partial(self._add_poses, number),
@@ -83,22 +76,11 @@ class PaintingNode(ManagedNode, ABC):
         self._show_timer = self._new_show_timer()
 
     def _activate(self) -> None:
-        if self.values['catch_up'] and not self.film.counts.received:
-            self.catching_up = CatchingUp(
-                self.values['catch_up'],
-                self.inputs,
-                partial(bare_films, self.surface, self.points, self.models, self.values),
-                self.resolve_topic_name,
-                self.frame.frame_id,
-                self.values['part_pose'],
-            )
-        else:
-            self.release()
+        self.release()
 
     def _deactivate(self) -> None:
         for source in self.inputs:
             source.take_waiting()
-        self._abort_catching_up('it was deactivated')
 
     def _cleanup(self) -> None:
         self._abort_repainting()
@@ -175,7 +157,6 @@ class PaintingNode(ManagedNode, ABC):
         for source in self.inputs:
             source.reset()
         self.film.reset()
-        self._abort_catching_up('it was reset')
         if self.repainting is not None:
             self._repaint()
 
@@ -276,24 +257,10 @@ class PaintingNode(ManagedNode, ABC):
 
     def _tend(self) -> None:
         """Take over films that are ready, and settle which side of the part is outward."""
-        if self.catching_up is not None and self.catching_up.done:
-            self._take_over_recorded(self.catching_up)
         if self.repainting is not None and self.repainting.done:
             self._take_over(self.repainting)
         if self._may_turn:
             self._turn(self._turned())
-
-    def _take_over_recorded(self, catching_up: CatchingUp) -> None:
-        self.catching_up = None
-        try:
-            self.film = catching_up.result()
-        except PaintError as error:
-            self.get_logger().error(f'not caught up: {error}')
-        else:
-            self.get_logger().info(f'caught up from {catching_up.folder}: {catching_up.summary}')
-            if any(gun.model != now for gun, now in zip(self.film.guns, self.models, strict=True)):
-                self._repaint()
-        self.release()
 
     def _take_over(self, repainting: Repainting) -> None:
         self.repainting = None
@@ -344,13 +311,6 @@ class PaintingNode(ManagedNode, ABC):
         self.film = turned
         if self.repainting is not None:
             self._repaint()
-
-    def _abort_catching_up(self, why: str) -> None:
-        if self.catching_up is not None:
-            self.catching_up.abort()
-            folder, self.catching_up = self.catching_up.folder, None
-            self.get_logger().warning(f'not caught up from {folder}: {why}')
-            self.release()
 
     def _abort_repainting(self) -> None:
         if self.repainting is not None:

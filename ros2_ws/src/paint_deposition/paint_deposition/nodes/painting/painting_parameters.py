@@ -67,17 +67,6 @@ PAINTING = dict(
             'Poses that may wait while the node is busy; too few lose paint [poses]',
             (1, 100_000),
         ),
-        pose_reliability=NodeParameter(
-            'as_offered',
-            'Reliability required of the publishers of poses and states; as_offered and '
-            'best_effort hear all of them, reliable only those that offer it [name]',
-            choices=('as_offered', 'best_effort', 'reliable'),
-        ),
-        catch_up=NodeParameter(
-            '',
-            'Folder of a running recording, to paint what it has before the live poses: for a '
-            'node that is restarted in a run; empty: none [path]',
-        ),
         pose_memory=NodeParameter(
             DEFAULT_LIMIT_POSES,
             'Poses kept, 64 bytes each, to paint the motion again with another model; '

@@ -19,7 +19,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_to_save
-from paint_deposition.nodes.painting.film_messages import ShownFilm
 from paint_deposition.nodes.painting.film_preparation import index_facing
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
@@ -31,7 +30,7 @@ from paint_deposition.part.surface import Surface
 
 # Longer than this, the first poses on a part are painted late.
 LATE_S = 0.05
-# A large part takes some 100 MB.
+# Parts that are kept beside the one in the cell; a large one takes some 100 MB.
 MOST_KEPT = 4
 # A mesh file, when it was changed [ns], its size; None where there is no such file.
 Version = tuple[str, int | None, int | None]
@@ -62,19 +61,11 @@ class Part:
 
 @dataclass(frozen=True)
 class PreparedPart:
-    """A part that can be painted at once.
+    """A part that can be painted at once: its refined surface, the points on it, a film."""
 
-    Attributes:
-        version: of the mesh file when it was read.
-        surface: refined. points: where it is painted.
-        film: of all guns. shown: its messages.
-    """
-
-    version: Version
     surface: Surface
     points: SurfacePoints
     film: LiveFilms
-    shown: ShownFilm
 
 
 def version_of(mesh_file: str) -> Version:
@@ -84,44 +75,6 @@ def version_of(mesh_file: str) -> Version:
     except OSError:
         return mesh_file, None, None  # reading it says what is wrong
     return mesh_file, status.st_mtime_ns, status.st_size
-
-
-class PreparedParts:
-    """Reads parts in a thread, and keeps the latest of them by the version of their mesh."""
-
-    def __init__(self, prepare: Callable[[Version], PreparedPart]) -> None:
-        self._prepare = prepare
-        self._kept: dict[Version, Future[PreparedPart]] = {}
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
-
-    @property
-    def ready(self) -> list[str]:
-        """The mesh files that are prepared."""
-        return [version[0] for version, part in self._kept.items() if part.done()]
-
-    def get(self, version: Version) -> Future[PreparedPart]:
-        """The part of this mesh; it is read unless it has been."""
-        part = self._kept.pop(version, None)
-        if part is None or (part.done() and part.exception()):
-            part = self._thread.submit(self._prepare, version)
-        self._keep(version, part)
-        return part
-
-    def swap(self, into_the_cell: PreparedPart, out_of_it: PreparedPart) -> None:
-        """Forget a part whose film is in use now, and keep the one that has left the cell."""
-        self._kept.pop(into_the_cell.version, None)
-        done: Future[PreparedPart] = Future()
-        done.set_result(out_of_it)
-        self._keep(out_of_it.version, done)
-
-    def close(self) -> None:
-        """Wait for what is being read."""
-        self._thread.shutdown(cancel_futures=True)
-
-    def _keep(self, version: Version, part: Future[PreparedPart]) -> None:
-        self._kept[version] = part
-        while len(self._kept) > MOST_KEPT:
-            self._kept.pop(next(iter(self._kept)))
 
 
 class PartChange:
@@ -144,7 +97,10 @@ class PartChange:
     ) -> None:
         self._node, self._display, self._version = node, display, version
         self.part = Part(node.mesh_file)
-        self._parts = PreparedParts(self._prepare)
+        present: Future[PreparedPart] = Future()
+        present.set_result(PreparedPart(node.surface, node.points, node.film))
+        self._kept = {version: present}
+        self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving parts')
         self.waiting = False
         self._gap_s = 0.0
@@ -154,7 +110,7 @@ class PartChange:
 
     def close(self) -> None:
         """Save the film of a part that has a serial number."""
-        self._parts.close()
+        self._reading.shutdown(cancel_futures=True)
         if self.part.serial and self._node.film.counts.received:
             self._film_to_save()()
         self._saving.shutdown()
@@ -162,6 +118,7 @@ class PartChange:
     def status(self) -> Status:
         """The part, and how the last change went."""
         part = self.part
+        ready = [v[0] for v, kept in self._kept.items() if v != self._version and kept.done()]
         values = {
             'type': part.type or 'unknown',
             'serial number': part.serial or 'unknown',
@@ -169,7 +126,7 @@ class PartChange:
             'mesh': part.mesh_file,
             'since': part.since.isoformat(timespec='seconds'),
             'gap of the last change [ms]': f'{self._gap_s * 1e3:.1f}',
-            'meshes prepared': ' '.join(self._parts.ready) or 'none',
+            'meshes prepared': ' '.join(ready) or 'none',
         }
         if self._unsaved:
             return Status(ERROR, self._unsaved, values)
@@ -205,19 +162,13 @@ class PartChange:
         if not request.mesh_file:
             raise PaintError('prepare without a mesh_file: name the mesh to read ahead of time')
         mesh_file = os.path.expanduser(request.mesh_file)
-        part = await self._node.in_a_thread(self._parts.get(version_of(mesh_file)))
+        part = await self._node.in_a_thread(self._prepared(version_of(mesh_file)))
         response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
         node = self._node
         if self.waiting:
             raise PaintError('another part is being changed: ask again when it is there')
-        if node.catching_up is not None:
-            # Nobody could say which of the poses that wait are the part's before.
-            raise PaintError(
-                f'the film is being caught up from {node.catching_up.folder}: ask again when that '
-                'is done'
-            )
         following = self._requested(request)
         # A request overtakes poses that wait; they belong to the part before.
         node.up_to_date()
@@ -229,8 +180,9 @@ class PartChange:
         ]
         save = self._film_to_save() if node.film.counts.received else None
         try:
-            ready = None if request.coat else await self._ready(following.mesh_file)
-            self._put_in_place(ready, request.part_pose)
+            version = version_of(following.mesh_file)
+            ready = None if request.coat else await self._ready(version)
+            self._put_in_place(version, ready, request.part_pose)
         finally:
             node.release()
         self.part = following
@@ -274,12 +226,9 @@ class PartChange:
             )
         return following
 
-    async def _ready(self, mesh_file: str) -> PreparedPart:
+    async def _ready(self, version: Version) -> PreparedPart:
         """The part of this mesh; the inputs hold what comes while it is read."""
-        version = version_of(mesh_file)
-        if version == self._version:
-            return self._present()
-        read = self._parts.get(version)
+        read = self._prepared(version)
         if read.done():
             return read.result()
         self.waiting = True
@@ -290,23 +239,23 @@ class PartChange:
         finally:
             self.waiting = False
 
-    def _put_in_place(self, ready: PreparedPart | None, part_pose: Sequence[float]) -> None:
+    def _put_in_place(
+        self, version: Version, ready: PreparedPart | None, part_pose: Sequence[float]
+    ) -> None:
         """Set the part's pose, if one is given, and take the bare part, if it is another one."""
-        node, present = self._node, self._present()
+        node = self._node
         pose = list(node.values['part_pose'] or [])
         if len(part_pose):
             self._set_pose(list(part_pose))
         if ready is None:
             return
         try:
-            node.take_part(ready.version[0], ready.surface, ready.points, ready.film)
+            node.take_part(version[0], ready.surface, ready.points, ready.film)
         except PaintError:
             self._set_pose(pose)
             raise
-        self._version = ready.version
-        if ready.version != present.version:
-            self._parts.swap(ready, present)
-        self._display.take(ready.shown, clear=True)
+        self._version = version
+        self._display.take(ready.surface)
 
     def _set_pose(self, part_pose: list[float]) -> None:
         change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
@@ -326,23 +275,26 @@ class PartChange:
 
     # --- parts, files and messages
 
-    def _present(self) -> PreparedPart:
-        """The part in the cell."""
-        node = self._node
-        shown = self._display.of(node.surface)
-        return PreparedPart(self._version, node.surface, node.points, node.film, shown)
+    def _prepared(self, version: Version) -> Future[PreparedPart]:
+        """The part of this mesh; it is read unless it has been."""
+        part = self._kept.pop(version, None)
+        if part is None or (part.done() and part.exception()):
+            part = self._reading.submit(self._prepare, version[0])
+        self._kept[version] = part
+        others = [kept for kept in self._kept if kept not in (version, self._version)]
+        for kept in others[: max(len(others) - MOST_KEPT, 0)]:
+            del self._kept[kept]
+        return part
 
-    def _prepare(self, version: Version) -> PreparedPart:
+    def _prepare(self, mesh_file: str) -> PreparedPart:
         """Read a part that is to come; in a thread of its own."""
         node = self._node
-        surface = read_part(node.values, version[0])
+        surface = read_part(node.values, mesh_file)
         points = surface.points()
         film = bare_films(surface, points, node.models, node.values)
         film.warm_up()
         index_facing(surface)
-        return PreparedPart(
-            version, surface, points, film, ShownFilm(surface, node.frame.frame_id)
-        )
+        return PreparedPart(surface, points, film)
 
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run

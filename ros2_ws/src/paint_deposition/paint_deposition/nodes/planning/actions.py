@@ -1,4 +1,4 @@
-"""The planner's long work as actions: passes on a part, and the diagnosis of a campaign."""
+"""Passes on a part as an action: feedback while they are planned, and a cancel."""
 
 from __future__ import annotations
 
@@ -6,52 +6,44 @@ import os
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
-from nav_msgs.msg import Path as PathMessage
-from paint_msgs.action import Diagnose, PlanPasses
+from nav_msgs.msg import Path
+from paint_msgs.action import PlanPasses
 from rclpy.action.server import ActionServer, CancelResponse, ServerGoalHandle
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.planning.diagnosing import Progress, Task, diagnosed
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.parameters import require_file_name
 from paint_deposition.planning.plan import Plan
 
 FEEDBACK_PERIOD_S = 0.1
 
+# What is being done, and the share of it that is done, 0 to 1; it may raise to end the work.
+Progress = Callable[[str, float], None]
 # Plans with other values of parameters, and publishes the passes.
-PlanAndShow = Callable[[Mapping[str, Any], Progress], tuple[Plan, PathMessage]]
+PlanAndShow = Callable[[Mapping[str, Any], Progress], tuple[Plan, Path]]
 
 
 class Cancelled(Exception):
     """Whoever asked for the work does not want it any more."""
 
 
-class LongWork:
-    """An action server; its goals are worked off one after the other, in a thread.
+class PassesAction:
+    """Offers the action `plan_passes`; its goals are worked off one after the other, in a thread.
 
     A goal that is cancelled ends where the work next reports its progress. A PaintError aborts
-    it; the result then says why.
-
-    Args:
-        node: that offers it; its executor must run.
-        action: the type. name: of the action.
-        work: (goal, progress) -> the action's result, successful.
+    it; the result then says why. The executor of the node must run.
     """
 
-    def __init__(
-        self, node: PaintNode, action: Any, name: str, work: Callable[[Any, Progress], Any]
-    ) -> None:
-        self._node, self._action, self._work = node, action, work
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix=name)
+    def __init__(self, node: PaintNode, plan_and_show: PlanAndShow) -> None:
+        self._node, self._plan_and_show = node, plan_and_show
+        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
         self._closed = False
         self._server = ActionServer(
             node,
-            action,
-            name,
+            PlanPasses,
+            'plan_passes',
             self._execute,
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
@@ -63,7 +55,7 @@ class LongWork:
         self._thread.shutdown(cancel_futures=True)
         self._server.destroy()
 
-    async def _execute(self, goal: ServerGoalHandle) -> Any:
+    async def _execute(self, goal: ServerGoalHandle) -> PlanPasses.Result:
         reported_s, reported = 0.0, ''
 
         def progress(stage: str, share: float) -> None:
@@ -73,40 +65,22 @@ class LongWork:
             now_s = time.monotonic()
             if stage != reported or now_s - reported_s > FEEDBACK_PERIOD_S:
                 reported_s, reported = now_s, stage
-                goal.publish_feedback(self._action.Feedback(stage=stage, share=float(share)))
+                goal.publish_feedback(PlanPasses.Feedback(stage=stage, share=float(share)))
 
-        def work() -> Any:
-            progress('begin', 0.0)
-            return self._work(goal.request, progress)
-
+        work = self._thread.submit(self._plan, goal.request, progress)
         try:
-            result = await self._node.in_a_thread(self._thread.submit(work))
+            result = await self._node.in_a_thread(work)
         except Cancelled:
             goal.canceled()
-            return self._action.Result(message='cancelled')
+            return PlanPasses.Result(message='cancelled')
         except PaintError as error:
             goal.abort()
-            return self._action.Result(message=str(error))
+            return PlanPasses.Result(message=str(error))
         goal.succeed()
         return result
 
-
-class PlanningActions:
-    """Offers the actions `plan_passes` and `diagnose`."""
-
-    def __init__(self, node: PaintNode, plan_and_show: PlanAndShow) -> None:
-        self._node, self._plan_and_show = node, plan_and_show
-        self._actions = [
-            LongWork(node, PlanPasses, 'plan_passes', self._plan_passes),
-            LongWork(node, Diagnose, 'diagnose', self._diagnose),
-        ]
-
-    def close(self) -> None:
-        """Break off what is being done."""
-        for action in self._actions:
-            action.close()
-
-    def _plan_passes(self, goal: PlanPasses.Goal, progress: Progress) -> PlanPasses.Result:
+    def _plan(self, goal: PlanPasses.Goal, progress: Progress) -> PlanPasses.Result:
+        progress('begin', 0.0)
         fields = {
             'mesh_file': os.path.expanduser(goal.mesh_file),
             'speed_m_per_s': goal.speed_m_per_s,
@@ -129,17 +103,3 @@ class PlanningActions:
             mean_um=planned.mean_um,
             sigma_n=planned.sigma_n,
         )
-
-    def _diagnose(self, goal: Diagnose.Goal, progress: Progress) -> Diagnose.Result:
-        values = self._node.values
-        require_file_name('name', goal.name)
-        folder = Path(values['output_directory']).expanduser().absolute() / goal.name
-        if folder.exists():
-            raise PaintError(f'{folder} is there already: choose another name')
-        task = Task(
-            os.path.expanduser(goal.campaign_file),
-            os.path.expanduser(goal.model_file),
-            folder,
-            values['allow_user_effects'],
-        )
-        return Diagnose.Result(success=True, **diagnosed(task, progress))

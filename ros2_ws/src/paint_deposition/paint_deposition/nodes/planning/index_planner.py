@@ -16,8 +16,7 @@ from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.planning.actions import PlanningActions
-from paint_deposition.nodes.planning.diagnosing import Progress
+from paint_deposition.nodes.planning.actions import PassesAction, Progress
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
@@ -63,7 +62,6 @@ PLANNER = dict(
         'Turn the gun by 180 deg for every return pass; else it keeps its orientation and '
         'lays the same profile both ways [true/false]',
     ),
-    output_directory=NodeParameter('runs', 'Where the action `diagnose` writes [path]'),
     **fixed(
         'passes are planned once, when the node starts; restart the node with the new value',
         **mesh_parameters(max_edge_length_m=0.02),
@@ -110,7 +108,7 @@ class IndexPlanner(PaintNode):
         self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
         if self._path is not None:
             self._path_publisher.publish(self._path)
-        self._actions = PlanningActions(self, self._plan_and_show)
+        self._action = PassesAction(self, self._plan_and_show)
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
     def _prepare(self) -> None:
@@ -121,7 +119,7 @@ class IndexPlanner(PaintNode):
             self._path = self._path_of(planned)
 
     def close(self) -> None:
-        self._actions.close()
+        self._action.close()
 
     # --- recommending
 

@@ -27,6 +27,8 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 LOST_AFTER_S = 5.0
 # One that has never reported is not waited for after so long; nodes report as soon as they run.
 UNHEARD_AFTER_S = 20.0
+# More poses than the largest window, by which reports are known.
+REMEMBERED = 20_000
 
 
 @dataclass
@@ -51,7 +53,7 @@ class PoseWindow:
         self._lock = threading.Lock()
         self._published = 0
         self._published_s = 0.0
-        self._stamps: deque[int] = deque()  # of the poses that somebody has not taken yet
+        self._stamps: deque[int] = deque(maxlen=REMEMBERED)
         self._subscribers: dict[str, _Subscriber] = {}
 
     def publish(self, stamp_ns: int, now_s: float) -> None:
@@ -59,8 +61,7 @@ class PoseWindow:
         with self._lock:
             self._published += 1
             self._published_s = now_s
-            if self._subscribers:
-                self._stamps.append(stamp_ns)
+            self._stamps.append(stamp_ns)
 
     def present(self, names: Iterable[str], now_s: float) -> None:
         """Note which subscribers are there now: others are no longer waited for."""
@@ -70,23 +71,18 @@ class PoseWindow:
                 name: known.get(name) or _Subscriber(self._published, now_s)
                 for name in sorted(names)
             }
-            self._forget_taken()
 
     def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
         """Note the newest pose that a subscriber has taken; without a name, all of them."""
         with self._lock:
-            taken = self._number_of(stamp_ns)
+            # Of equal stamps the newest pose is meant.
+            back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
+            taken = 0 if back is None else self._published - back
             for known, subscriber in self._subscribers.items():
-                if name not in (None, known):
-                    continue
-                subscriber.reported_s = now_s
-                if subscriber.unheard:  # what was forgotten meanwhile is not waited for
-                    subscriber.unheard = False
-                    subscriber.taken = self._published - len(self._stamps)
-                if taken > subscriber.taken:
-                    subscriber.taken = taken
-                    subscriber.advanced_s = now_s
-            self._forget_taken()
+                if name in (None, known):
+                    subscriber.reported_s, subscriber.unheard = now_s, False
+                    if taken > subscriber.taken:
+                        subscriber.taken, subscriber.advanced_s = taken, now_s
 
     def ahead(self, now_s: float) -> int:
         """Poses that the slowest subscriber has not taken yet."""
@@ -94,8 +90,7 @@ class PoseWindow:
             for subscriber in self._subscribers.values():
                 if subscriber.taken < self._published:
                     self._drop_hopeless(subscriber, now_s)
-            self._forget_taken()
-            return len(self._stamps)
+            return self._published - self._least_taken()
 
     def slowest(self) -> list[str]:
         """The subscribers that are furthest behind."""
@@ -114,13 +109,6 @@ class PoseWindow:
         with self._lock:
             return {name: s.lost for name, s in self._subscribers.items() if s.lost}
 
-    def _number_of(self, stamp_ns: int) -> int:
-        """How many poses were published up to the newest one of this stamp; 0: not among them."""
-        for back, stamp in enumerate(reversed(self._stamps)):
-            if stamp == stamp_ns:
-                return self._published - back
-        return 0
-
     def _drop_hopeless(self, subscriber: _Subscriber, now_s: float) -> None:
         quiet_since_s = max(self._published_s, subscriber.advanced_s)
         if subscriber.reported_s is None:
@@ -136,11 +124,6 @@ class PoseWindow:
     def _least_taken(self) -> int:
         heard = (s.taken for s in self._subscribers.values() if not s.unheard)
         return min(heard, default=self._published)
-
-    def _forget_taken(self) -> None:
-        least = self._least_taken()
-        while len(self._stamps) > self._published - least:
-            self._stamps.popleft()
 
 
 class FlowControl:

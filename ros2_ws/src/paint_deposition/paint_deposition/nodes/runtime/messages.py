@@ -28,13 +28,9 @@ def header(frame_id: str, stamp_ns: int) -> Header:
     return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
 
 
-def white_marker(
-    kind: int, namespace: str, number: int, frame_id: str, action: int = Marker.ADD
-) -> Marker:
+def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marker:
     """A marker at its frame's origin; viewers multiply the vertices' colours by its white."""
-    marker = Marker(
-        ns=namespace, id=number, type=kind, action=action, header=Header(frame_id=frame_id)
-    )
+    marker = Marker(ns=namespace, id=number, type=kind, header=Header(frame_id=frame_id))
     marker.pose.orientation.w = 1.0
     marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
     marker.color = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)
@@ -54,19 +50,14 @@ class ColouredMesh:
     Args:
         vertices_m: (V, 3) [m]. faces: (F, 3), at least one.
         frame_id: frame of the mesh.
-        namespace, number: of the marker.
+        namespace: of the marker.
     """
 
     def __init__(
-        self,
-        vertices_m: np.ndarray,
-        faces: np.ndarray,
-        frame_id: str,
-        namespace: str,
-        number: int = 0,
+        self, vertices_m: np.ndarray, faces: np.ndarray, frame_id: str, namespace: str
     ) -> None:
         self._corners = faces.ravel()
-        head, tail = _around_the_arrays(frame_id, namespace, number)
+        head, tail = _around_the_arrays(frame_id, namespace)
         points = vertices_m[self._corners].astype(np.float64).tobytes()
         count = struct.pack('=I', len(self._corners))
         gap = b'\0' * (-(len(head) + len(count) - STAMP_OFFSET) % 8)
@@ -89,13 +80,13 @@ class ColouredMesh:
         return bytes(self._buffer)
 
 
-def _around_the_arrays(frame_id: str, namespace: str, number: int) -> tuple[bytes, bytes]:
+def _around_the_arrays(frame_id: str, namespace: str) -> tuple[bytes, bytes]:
     """What a serialised Marker has before its points' count and after its colours.
 
     The middleware's own serialiser says it: a small marker is serialised and searched for its
     arrays. Whatever stands behind them keeps its alignment, since a corner takes 40 bytes.
     """
-    marker = white_marker(Marker.TRIANGLE_LIST, namespace, number, frame_id)
+    marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in SAMPLE_POINTS.tolist()]
     marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in SAMPLE_COLOURS.tolist()]
     sample = serialize_message(marker)

@@ -20,7 +20,6 @@ from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT
 from paint_deposition.planning.improvement.programme import Programme, speed_along
 from paint_deposition.planning.improvement.quadratic_program import WORDS
 from paint_deposition.planning.improvement.retiming import Retiming
-from paint_deposition.planning.plan import TradeOffPoint
 from paint_deposition.planning.requests import ImproveRequest
 
 DEFAULT_TOLERANCE = 0.1
@@ -28,8 +27,6 @@ DEFAULT_TOLERANCE = 0.1
 ALIKE = 2e-3
 # A mean film further from the target than this share is warned of.
 OFF_TARGET = 0.02
-# Speeds that differ by less are given as one; so many stretches at most.
-SAME_SPEED, MOST_STRETCHES = 0.06, 6
 # The new speed is sampled so often along a pass.
 SAMPLES = 60
 # Smaller shifts of a trigger are left out of the sentence [m].
@@ -88,27 +85,13 @@ class LaidFilm:
 
 
 @dataclass(frozen=True)
-class Stretch:
-    """A part of a pass with a mean speed before and after.
-
-    Attributes:
-        begin_m, end_m: coordinates along the axis of the part that the pass follows.
-        before_m_per_s, after_m_per_s: mean speeds; before is NaN where the gun was closed.
-    """
-
-    begin_m: float
-    end_m: float
-    before_m_per_s: float
-    after_m_per_s: float
-
-
-@dataclass(frozen=True)
 class PassChange:
     """What changes in a pass, in the robot's terms.
 
     Attributes:
-        number: of the pass, from 1. axis: 'x', 'y' or 'z', which it follows most.
-        stretches: in running order.
+        number: of the pass, from 1.
+        speed_m_per_s: mean speeds before and after.
+        slowest_m_per_s, fastest_m_per_s: after.
         opens_earlier_m, closes_later_m: along the path; negative is the other way; 0 where the
             pass does not begin or end with the gun.
         opens_earlier_s, closes_later_s: the same at the speed of the new programme.
@@ -116,8 +99,9 @@ class PassChange:
     """
 
     number: int
-    axis: str
-    stretches: tuple[Stretch, ...]
+    speed_m_per_s: tuple[float, float]
+    slowest_m_per_s: float
+    fastest_m_per_s: float
     opens_earlier_m: float
     closes_later_m: float
     opens_earlier_s: float
@@ -127,10 +111,10 @@ class PassChange:
     @property
     def sentence(self) -> str:
         """The change in a line."""
+        before, after = self.speed_m_per_s
         said = [
-            f'{stretch.before_m_per_s:.3f} to {stretch.after_m_per_s:.3f} m/s between '
-            f'{self.axis} = {stretch.begin_m:.2f} and {stretch.end_m:.2f} m'
-            for stretch in self.stretches
+            f'{before:.3f} to {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
+            f'{self.fastest_m_per_s:.3f} m/s'
         ]
         for verb, metres, seconds, sides in (
             ('opens', self.opens_earlier_m, self.opens_earlier_s, ('earlier', 'later')),
@@ -163,8 +147,6 @@ class Improvement:
         before, after: films of both motions.
         program_difference: largest difference between the films of the robot program and of the
             bag, both read back, as a share of the greatest film.
-        sigma_n_interval: 5 and 95 % quantiles of sigma_n before and after over models that the
-            search did not see; None without an uncertain model.
         odd: what is odd in how the gun runs over the part, with its likely cause.
     """
 
@@ -179,7 +161,6 @@ class Improvement:
     before: LaidFilm
     after: LaidFilm
     program_difference: float
-    sigma_n_interval: tuple[tuple[float, float], tuple[float, float]] | None = None
     odd: tuple[str, ...] = ()
 
     @property
@@ -256,18 +237,6 @@ class Improvement:
         )
 
     @property
-    def points(self) -> tuple[TradeOffPoint, TradeOffPoint]:
-        """The programme as given and as improved, in a trade-off."""
-        before, after = (
-            TradeOffPoint(
-                self.request.paint_weight, laid.sigma_n, laid.mean_um, laid.paint_cm3,
-                laid.cycle_s, len(self.changes),
-            )
-            for laid in (self.before, self.after)
-        )  # fmt: skip
-        return before, after
-
-    @property
     def sigma_n_of_path(self) -> float:
         """The most even film of any speeds along this path."""
         return min(self.retiming.sigma_n_of_path, self.after.sigma_n)
@@ -295,7 +264,6 @@ class Improvement:
             name: {'before': value, 'after': self.after.figures()[name]}
             for name, value in self.before.figures().items()
         }
-        interval = self.sigma_n_interval
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
             **both,
@@ -303,7 +271,6 @@ class Improvement:
             'tolerance': self.tolerance,
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
-            'sigma_n_interval': interval and {'before': interval[0], 'after': interval[1]},
             'sigma_n_of_path': self.sigma_n_of_path,
             'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
             'program_difference': self.program_difference,
@@ -324,48 +291,17 @@ def changes(given: Programme, improved: Programme) -> tuple[PassChange, ...]:
         inside = turns[(turns > after.on_m + LEAST_PASS_M) & (turns < after.off_m - LEAST_PASS_M)]
         ends = [after.on_m, *inside.tolist(), after.off_m]
         for first, last in pairwise(ends):
-            axis, stretches = _stretches(given, improved, first, last)
             earlier = before.on_m - after.on_m if first == after.on_m else 0.0
             later = after.off_m - before.off_m if last == after.off_m else 0.0
+            whole = np.array([first, last])
+            speed = speed_along(improved, np.linspace(first, last, SAMPLES + 1))
             found.append(
                 PassChange(
-                    len(found) + 1, axis, stretches, earlier, later,
-                    earlier / stretches[0].after_m_per_s, later / stretches[-1].after_m_per_s,
+                    len(found) + 1,
+                    (float(speed_along(given, whole)[0]), float(speed_along(improved, whole)[0])),
+                    float(speed.min()), float(speed.max()), earlier, later,
+                    earlier / float(speed[0]), later / float(speed[-1]),
                     (before.flow, after.flow),
                 )
             )  # fmt: skip
     return tuple(found)
-
-
-def _stretches(
-    given: Programme, improved: Programme, first_m: float, last_m: float
-) -> tuple[str, tuple[Stretch, ...]]:
-    """The pass between two places of the path, in stretches of about even new speed."""
-    places = np.linspace(first_m, last_m, SAMPLES + 1)
-    ends = places[_cuts(1.0 / speed_along(improved, places))]
-    at = given.positions_at_m(ends)
-    axis = int(np.abs(at[-1] - at[0]).argmax())
-    speeds = zip(speed_along(given, ends), speed_along(improved, ends), strict=True)
-    return 'xyz'[axis], tuple(
-        Stretch(*pair, *map(float, both))
-        for pair, both in zip(pairwise(at[:, axis].tolist()), speeds, strict=True)
-    )
-
-
-def _cuts(slowness: np.ndarray) -> list[int]:
-    """Where stretches of about even slowness begin and end: neighbours merged in turn."""
-    ends = list(range(len(slowness) + 1))
-
-    def cost(a: int, b: int) -> float:
-        inside = slowness[a:b] / slowness.mean()
-        return float(np.sum((inside - inside.mean()) ** 2))
-
-    while len(ends) > 2:
-        triples = zip(ends[:-2], ends[1:-1], ends[2:], strict=True)
-        rises = [cost(a, c) - cost(a, b) - cost(b, c) for a, b, c in triples]
-        least = int(np.argmin(rises))
-        uneven = rises[least] > SAME_SPEED**2 * (ends[least + 2] - ends[least])
-        if uneven and len(ends) - 1 <= MOST_STRETCHES:
-            break
-        del ends[least + 1]
-    return ends

@@ -122,7 +122,7 @@ class _Search:
         self.progress('triggers', 0.0)
         wide = replace(self.given, openings=widened(self.given, self.request))
         nodes = Nodes.of(wide.openings, self.spacing_m)
-        open_ends = may_be_closed(nodes, self.given.openings, self.request)
+        open_ends = _may_be_closed(nodes, self.given.openings, self.request)
         programme, relaxed = self.given, None
         if open_ends.any():
             relaxed, density = self._problem(wide, nodes, None, open_ends)
@@ -250,7 +250,9 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
-def may_be_closed(nodes: Nodes, given: tuple[Opening, ...], request: ImproveRequest) -> np.ndarray:
+def _may_be_closed(
+    nodes: Nodes, given: tuple[Opening, ...], request: ImproveRequest
+) -> np.ndarray:
     """(n,) bool, nodes so near the given ends that the gun may be closed there."""
     near = np.zeros(len(nodes), dtype=bool)
     if not request.trigger_cut_m and not request.trigger_shift_m:

@@ -4,10 +4,12 @@ import json
 from base64 import b64encode
 from collections.abc import Callable
 from datetime import datetime
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from paint_deposition import __version__
 from paint_deposition.effects.learned.law import LearnedLaw
@@ -18,14 +20,13 @@ from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import charts, tables
-from paint_deposition.report.page.charts import profile_figure
 from paint_deposition.report.page.headline import headline, key_figures
 from paint_deposition.report.page.learned import footprint_figure, learned_figure, map_figure
-from paint_deposition.report.page.scene import places_scene, scene_data, section_layout
-from paint_deposition.report.page.tables import film_rows, point_rows, points_csv, shares_in_words
+from paint_deposition.report.page.tables import film_rows, point_rows, shares_in_words
+from paint_deposition.report.pictures.chart import DOTS_PER_INCH
+from paint_deposition.report.pictures.comparison import comparison_figure, part_figure
 
 TEMPLATES = Path(__file__).parent / 'templates'
-SCRIPTS = ('report.js', 'part.js')
 SPRAYS_SHOWN = 5
 
 
@@ -59,9 +60,7 @@ def report_html(data: ReportData) -> str:
         'shares': shares_in_words,
     }
     environment.filters.update(filters)
-    numbers = range(len(data.experiments))
     drawn = [
-        *(profile_figure(data, k) for k in numbers),
         charts.parity_figure(data),
         charts.covariate_figure(data),
         charts.history_figure(data),
@@ -71,14 +70,6 @@ def report_html(data: ReportData) -> str:
         footprint_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
-    content = {
-        'scenes': [scene_data(data, k) for k in numbers],
-        'first': _largest_change(data),
-        'places': [places_scene(data, k) for k in numbers],
-        'figures': figures,
-        'section': section_layout(),
-    }
-    points = point_rows(data)
     places, sprays = data.proposals
     return environment.get_template('report.html.j2').render(
         data=data,
@@ -87,8 +78,7 @@ def report_html(data: ReportData) -> str:
         head=list(data.study.campaign.head.items()),
         film=film_rows(data),
         cpk=CPK_MEANS,
-        points=points,
-        points_csv=points_csv(points).replace('<', ' '),
+        points=point_rows(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
@@ -106,20 +96,20 @@ def report_html(data: ReportData) -> str:
         provenance=_provenance(),
         lined=all(len(p.line_m) for p in data.profiles),
         figures=[figure['name'] for figure in figures],
-        content=_as_json(content),
+        content=_as_json(figures),
+        parts=[_embedded(part_figure(data, k)) for k in range(len(data.experiments))],
+        profiles=_embedded(comparison_figure(data)),
         style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
-        scripts=[(TEMPLATES / name).read_text(encoding='utf-8') for name in SCRIPTS],
+        script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
     )
 
 
-def _largest_change(data: ReportData) -> int:
-    """The experiment on which the model gained most, or is furthest off: it is shown first."""
-    squares = data.residuals_um[0] ** 2
-    if data.improved:
-        squares = squares - data.residuals_um[-1] ** 2
-    rows = [data.rows_of(k) for k in range(len(data.experiments))]
-    return int(np.argmax([np.sum(squares[here]) for here in rows]))
+def _embedded(figure: Figure) -> str:
+    """A picture as the address of an image that needs no file."""
+    content = BytesIO()
+    figure.savefig(content, format='png', dpi=DOTS_PER_INCH, facecolor='white')
+    return f'data:image/png;base64,{b64encode(content.getvalue()).decode("ascii")}'
 
 
 def _provenance() -> list[tuple[str, str]]:
@@ -131,16 +121,12 @@ def _provenance() -> list[tuple[str, str]]:
 
 
 def _as_json(content: Any) -> str:
-    """JSON that may stand inside a script element; arrays as plotly's typed arrays."""
+    """JSON that may stand inside a script element."""
     text = json.dumps(content, default=_encoded, separators=(',', ':'), allow_nan=False)
     return text.replace('<', '\\u003c')
 
 
 def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray) and value.ndim == 1:
-        kind = 'f4' if value.dtype.kind == 'f' else 'i4'
-        little = value.astype(f'<{kind}').tobytes()
-        return {'dtype': kind, 'bdata': b64encode(little).decode('ascii')}
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise TypeError(f'{type(value).__name__} cannot be written into the report')

@@ -1,8 +1,6 @@
 """Rows of the report's tables."""
 
-import csv
 from dataclasses import astuple
-from io import StringIO
 from itertools import product
 from typing import Any
 
@@ -240,13 +238,3 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
                 }
             )  # fmt: skip
     return rows
-
-
-def points_csv(rows: list[dict[str, Any]]) -> str:
-    """The same as a table for a spreadsheet."""
-    text = StringIO()
-    table = csv.writer(text, lineterminator='\n')
-    table.writerow(rows[0])
-    for row in rows:
-        table.writerow(v if isinstance(v, str) else f'{v:.3f}' for v in row.values())
-    return text.getvalue()

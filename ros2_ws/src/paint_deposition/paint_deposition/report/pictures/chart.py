@@ -1,27 +1,26 @@
 """What charts drawn with matplotlib share: quiet axes, and how they reach a file."""
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.figure import Figure, FigureBase
 
 from paint_deposition.files.atomic import replacing
+from paint_deposition.film.colour_scales import TABLE, ColourScale
 from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
 
 DOTS_PER_INCH = 150
 MM = 1e3
 
 
-def new_figure(
-    width_in: float, height_in: float, layout: Literal['constrained'] | None = 'constrained'
-) -> Figure:
-    """An empty figure that draws into memory, without pyplot's global state.
-
-    Finding the constrained layout takes as long as drawing: many axes are better placed by hand.
-    """
-    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout=layout)
+def new_figure(width_in: float, height_in: float) -> Figure:
+    """An empty figure that draws into memory, without pyplot's global state."""
+    figure = Figure(figsize=(width_in, height_in), dpi=DOTS_PER_INCH, layout='constrained')
     FigureCanvasAgg(figure)
     return figure
 
@@ -42,6 +41,21 @@ def quiet(axes: Axes, x_label: str, y_label: str, title: str = '', size: float =
 def legend(axes: Axes, **options: Any) -> None:
     """A legend without a frame."""
     axes.legend(frameon=False, fontsize=9, labelcolor=INK, **options)
+
+
+def colour_bar(figure: FigureBase, axes: Sequence[Axes], label: str, scale: ColourScale) -> None:
+    """A level bar of the colours below all these axes."""
+    bar = figure.colorbar(
+        colours_of(scale), ax=list(axes), location='bottom', shrink=0.6, aspect=30, pad=0.04
+    )
+    bar.set_label(label, color=MUTED)
+    bar.ax.spines['outline'].set_visible(False)
+
+
+def colours_of(scale: ColourScale) -> ScalarMappable:
+    """What matplotlib makes a bar of colours from."""
+    palette = ListedColormap(scale.palette[:TABLE] / 255.0)
+    return ScalarMappable(Normalize(scale.low, scale.high), palette)
 
 
 def save_picture(figure: Figure, path: str | Path) -> Path:

@@ -6,24 +6,21 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 
-from paint_deposition.film.colour_scales import BARE_RGB, TABLE, ColourScale, film_scale
+from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
+from paint_deposition.report.pictures.chart import colours_of, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
-# The part's share of the picture, and the room around it for axes, title and legend [in].
+# The part's share of the picture, and the column beside it [in].
 PART_IN = (7.6, 7.6)
-LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.9, 2.95, 0.6, 0.75
-LEGEND_GAP_IN, BAR_WIDTH_IN, LEAST_HEIGHT_IN = 0.3, 0.24, 4.0
-LINE_IN, INSET_IN = 0.24, (2.1, 1.35)
+BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 2.7, 1.0, 3.4
 BINS = 40
 
 
@@ -53,18 +50,20 @@ def film_picture(
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
-    wanted = statistics.target_um > 0.0
-    figure, rows = _canvas(high - low, 2 if wanted else 1)
-    if wanted:
-        _draw_band(rows[0], part, film_um, spray, statistics)
-        _draw_band_legend(rows[0], surface, film_um, statistics)
-    scale = draw_film(rows[-1].axes, surface, film_um, spray, statistics.painted_above_um, part)
-    _draw_legend(rows[-1], part, scale, film_um, statistics)
-    rows[0].axes.set_title(title, loc='left', fontsize=13, color=INK, pad=24)
-    rows[0].axes.annotate(
-        fill(subtitle, 110), (0.0, 1.0), xytext=(0, 9), xycoords='axes fraction',
-        textcoords='offset points', fontsize=9, color=MUTED,
-    )  # fmt: skip
+    width, height = (high - low) * min(PART_IN / (high - low))
+    rows = 2 if statistics.target_um > 0.0 else 1
+    figure = new_figure(
+        width + BESIDE_IN + AROUND_IN, rows * (max(height, LEAST_HEIGHT_IN) + AROUND_IN)
+    )
+    grid = figure.add_gridspec(rows, 2, width_ratios=[width, BESIDE_IN])
+    axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
+    scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
+    _draw_legend(axes[-1], grid[rows - 1, 1], scale, film_um, statistics)
+    if rows == 2:
+        _draw_band(axes[0], part, film_um, spray, statistics)
+        _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics)
+    figure.suptitle(title, x=0.02, ha='left', fontsize=13, color=INK)
+    axes[0].set_title(fill(subtitle, 110), loc='left', fontsize=9, color=MUTED)
     return figure
 
 
@@ -93,107 +92,65 @@ def draw_film(
     scale = film_scale(film_um)
     low, high = part.window(spray)
     part.dress(axes, low, high)
-    seen_um = part.spread(film_um)
-    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > painted_above_um))
+    part.draw(axes, scale.rgba(film_um, film_um > painted_above_um))
     part.draw_contours(axes, film_um, scale.low, scale.high)
     draw_tool_path(axes, spray, part.view, low, high)
     return scale
 
 
-class _Row:
-    """Axes for the part, and a column beside them that is filled from above [in]."""
-
-    def __init__(self, figure: Figure, box: tuple[float, float, float, float]) -> None:
-        self.figure = figure
-        self.size = figure.get_size_inches()
-        left, bottom, width, height = box
-        self.axes = self._axes(left, bottom, width, height)
-        self.left, self.top, self.bottom = left + width + LEGEND_GAP_IN, bottom + height, bottom
-
-    def _axes(self, left: float, bottom: float, width: float, height: float) -> Axes:
-        across, up = self.size
-        return self.figure.add_axes((left / across, bottom / up, width / across, height / up))
-
-    def axes_below(self, width_in: float, height_in: float, indent_in: float = 0.0) -> Axes:
-        """Axes below what the column holds already."""
-        self.top -= height_in
-        return self._axes(self.left + indent_in, self.top, width_in, height_in)
-
-    def write(self, lines: list[str], size: float = 9.5, colour: str = INK) -> None:
-        """Lines of text below what the column holds already."""
-        across, up = self.size
-        self.figure.text(
-            self.left / across, self.top / up, '\n'.join(lines), va='top', fontsize=size,
-            linespacing=1.6, color=colour,
-        )  # fmt: skip
-        self.top -= LINE_IN * len(lines) * size / 9.5
-
-    def patches(self, entries: list[tuple[str, str]]) -> None:
-        """A coloured patch with a label in each line."""
-        across, up = self.size
-        self.figure.legend(
-            handles=[Patch(color=colour) for colour, _ in entries],
-            labels=[label for _, label in entries], loc='upper left', frameon=False, fontsize=9.5,
-            bbox_to_anchor=((self.left - 0.1) / across, (self.top + 0.08) / up),
-            labelcolor=INK, handlelength=1.2, handleheight=1.0, borderpad=0.2,
-        )  # fmt: skip
-        self.top -= 0.25 * len(entries) + 0.05
-
-
-def _canvas(extent_m: np.ndarray, count: int) -> tuple[Figure, list[_Row]]:
-    """A figure of rows, each with axes as large as the part needs them, the first on top."""
-    width, height = extent_m * min(PART_IN / extent_m)
-    row_in = max(height, LEAST_HEIGHT_IN)
-    pitch = row_in + BOTTOM_IN + 0.3
-    total = TOP_IN + BOTTOM_IN + row_in + (count - 1) * pitch
-    figure = new_figure(LEFT_IN + width + RIGHT_IN, total, layout=None)
-    bottoms = [BOTTOM_IN + k * pitch + 0.5 * (row_in - height) for k in reversed(range(count))]
-    rows = [_Row(figure, (LEFT_IN, bottom, width, height)) for bottom in bottoms]
-    for row in rows:
-        row.top += 0.5 * (row_in - height)
-        row.bottom -= 0.5 * (row_in - height)
-    return figure, rows
-
-
 def _draw_band(
-    row: _Row, part: PartPicture, film_um: np.ndarray, spray: SprayPath, s: FilmStatistics
+    axes: Axes, part: PartPicture, film_um: np.ndarray, spray: SprayPath, s: FilmStatistics
 ) -> None:
     low, high = part.window(spray)
-    part.dress(row.axes, low, high)
-    seen_um = part.spread(film_um)
-    band = np.digitize(seen_um, s.band_um, right=True)
-    band[seen_um <= s.painted_above_um] = 3
-    colours = 255.0 * np.array([to_rgb(colour) for colour in (BELOW, WITHIN, HIGH, BARE)])
-    part.draw_pixels(row.axes, np.rint(colours).astype(np.uint8)[band])
-    draw_tool_path(row.axes, spray, part.view, low, high)
+    part.dress(axes, low, high)
+    ends, colours = [s.painted_above_um], [BARE]
+    for end, colour in zip(s.band_um, (BELOW, WITHIN), strict=True):
+        if end > ends[-1]:
+            ends.append(end)
+            colours.append(colour)
+    part.draw_bands(axes, film_um, ends, [*colours, HIGH])
+    draw_tool_path(axes, spray, part.view, low, high)
 
 
-def _draw_band_legend(row: _Row, surface: Surface, film_um: np.ndarray, s: FilmStatistics) -> None:
+def _draw_band_legend(
+    figure: Figure, place: SubplotSpec, surface: Surface, film_um: np.ndarray, s: FilmStatistics
+) -> None:
     """Shares, histogram and Cpk."""
     low, high = s.band_um
-    row.write([f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm'], 11.0)
-    row.write([f'share of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'], 8.0,
-              colour=MUTED)  # fmt: skip
-    row.top -= 0.08
-    row.patches(
-        [
-            (HIGH, f'{_share(s.above_target)} high, above {high:g} µm'),
-            (WITHIN, f'{_share(s.within_target)} in the band'),
-            (BELOW, f'{_share(s.below_target)} low, below {low:g} µm'),
-        ]
-        + [(BARE, f'bare, up to {s.painted_above_um:g} µm')] * (s.coverage < 1.0)
+    column = place.subgridspec(3, 1, height_ratios=[1.3, 1.2, 0.6])
+    shares = figure.add_subplot(column[0])
+    entries = [
+        (HIGH, f'{100 * s.above_target:.1f} % high, above {high:g} µm'),
+        (WITHIN, f'{100 * s.within_target:.1f} % in the band'),
+        (BELOW, f'{100 * s.below_target:.1f} % low, below {low:g} µm'),
+    ] + [(BARE, f'bare, up to {s.painted_above_um:g} µm')] * (s.coverage < 1.0)
+    title = (
+        f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
+        f'of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'
     )
-    row.top -= 0.3
-    text_in = 5 * LINE_IN
-    height = np.clip(row.top - row.bottom - text_in - 0.5, 0.9, 2.2)
-    _draw_histogram(row.axes_below(2.1, height, 0.4), surface, film_um, s)
-    row.top -= 0.6
-    row.write([f'Cpk {s.cpk:.2f}'.replace('-', '−')], 11.0)
-    row.write(fill(CPK_MEANS, 44).split('\n'), 8.0, MUTED)
+    _draw_patches(shares, entries, title)
+    _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s)
+    cpk = figure.add_subplot(column[2])
+    cpk.set_axis_off()
+    meaning = fill(CPK_MEANS, 40)
+    _write(cpk, f'Cpk {s.cpk:.2f}\n{meaning}'.replace('-', '−'), 8.0)
 
 
-def _share(share: float) -> str:
-    return f'{100 * share:.1f} %'
+def _draw_patches(axes: Axes, entries: list[tuple[str, str]], title: str = '') -> None:
+    """A coloured patch with a label in each line, and nothing else."""
+    axes.set_axis_off()
+    axes.legend(
+        handles=[Patch(color=colour, label=label) for colour, label in entries],
+        loc='upper left', frameon=False, fontsize=9.5, labelcolor=INK, title=title,
+        alignment='left', handlelength=1.2, handleheight=1.0, borderpad=0.0,
+    )  # fmt: skip
+
+
+def _write(axes: Axes, text: str, size: float = 9.5) -> None:
+    axes.text(
+        0.0, 0.0, text, transform=axes.transAxes, va='bottom', fontsize=size, color=INK,
+        linespacing=1.6,
+    )  # fmt: skip
 
 
 def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics) -> None:
@@ -211,37 +168,22 @@ def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmSt
 
 
 def _draw_legend(
-    row: _Row, part: PartPicture, scale: ColourScale, film_um: np.ndarray, s: FilmStatistics
+    axes: Axes, place: SubplotSpec, scale: ColourScale, film_um: np.ndarray, s: FilmStatistics
 ) -> None:
-    lines = [
-        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm',
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm',
-        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²',
-        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
-    ]
-    bare = bool(np.any(film_um <= s.painted_above_um))
-    extent = part.high_m - part.low_m
-    inset = extent * min(INSET_IN / extent)
-    below = LINE_IN * len(lines) + 0.3 * bare + inset[1] + 0.75
-    row.write(['film [µm]'], colour=MUTED)
-    bar = row.figure.colorbar(
-        ScalarMappable(
-            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
-        ),
-        cax=row.axes_below(BAR_WIDTH_IN, row.top - row.bottom - below),
-    )
+    """The bar of the colours, and the figures beside it."""
+    bar = axes.figure.colorbar(colours_of(scale), ax=axes, aspect=25, pad=0.02)
+    bar.set_label('film [µm]', color=MUTED)
     bar.ax.tick_params(colors=MUTED, labelsize=9)
     bar.ax.spines['outline'].set_visible(False)
-    row.top -= 0.2
-    if bare:
-        row.patches(
-            [('#{:02x}{:02x}{:02x}'.format(*BARE_RGB), f'up to {s.painted_above_um:g} µm')]
-        )
-    row.write(lines)
-    row.top -= 0.1
-    row.write(['shape'], 8.0, MUTED)
-    row.top -= 0.05
-    relief = row.axes_below(*inset)
-    relief.set_axis_off()
-    relief.set(xlim=(part.low_m[0], part.high_m[0]), ylim=(part.low_m[1], part.high_m[1]))
-    part.draw_relief(relief)
+    beside = axes.figure.add_subplot(place)
+    beside.set_axis_off()
+    if np.any(film_um <= s.painted_above_um):
+        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
+        _draw_patches(beside, [(colour, f'up to {s.painted_above_um:g} µm')])
+    _write(
+        beside,
+        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
+        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
+        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
+    )

@@ -1,7 +1,6 @@
-"""A calibration, a model beside readings, and where to put the gauge."""
+"""A calibration, and where to put the gauge."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,10 +10,8 @@ from matplotlib.patheffects import Normal, Stroke
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture
 from paint_deposition.report.style import (
@@ -23,19 +20,11 @@ from paint_deposition.report.style import (
     COMPONENTS,
     INK,
     MUTED,
-    TWO_SIDED_95,
-    charts_a_row,
 )
 
 LINE_POINTS = 600
 PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26
 HALO = [Stroke(linewidth=2.4, foreground='white'), Normal()]
-TEXT_PT = 8.0
-# As many letters of a title fit over a chart; one that is longer is written smaller.
-TITLE_LETTERS = 48
-# A profile's charts, and the room around all of them and between [in].
-CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
-LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
 
 
 def write_calibration_pictures(
@@ -127,82 +116,6 @@ def draw_agreement(
     axes.set_aspect('equal')
 
 
-def write_comparison_picture(path: Path, data: ReportData) -> Path:
-    """Write the film along each column or row, and the residual below it."""
-    profiles = data.profiles
-    columns = charts_a_row(len(profiles))
-    rows = -(-len(profiles) // columns)
-    width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
-    height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
-    figure = new_figure(width_in, height_in, layout=None)
-    cells = figure.add_gridspec(
-        rows, columns, left=LEFT_IN / width_in, right=1.0 - RIGHT_IN / width_in,
-        bottom=BOTTOM_IN / height_in, top=1.0 - TOP_IN / height_in,
-        wspace=GAP_IN[0] / CHARTS_IN[0], hspace=GAP_IN[1] / CHARTS_IN[1],
-    )  # fmt: skip
-    film, residual = None, None
-    for k, profile in enumerate(profiles):
-        place = cells[k // columns, k % columns]
-        cell = place.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.12)
-        film = figure.add_subplot(cell[0], sharey=film)
-        residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
-        draw_profile(film, data, profile)
-        draw_residual(residual, data, profile)
-        film.set_xlabel('')
-        film.tick_params(labelbottom=False)
-        if k % columns:
-            for axes in (film, residual):
-                axes.set_ylabel('')
-                axes.tick_params(labelleft=False)
-    if film is not None:
-        film.set_ylim(bottom=0.0)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
-    return save_picture(figure, path)
-
-
-def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw readings with the gauge's noise, and the models' film."""
-    quiet(axes, f'{profile.axis} [mm]', 'film [µm]', size=TEXT_PT)
-    of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
-    title = f'{of}{profile.label}:  {data.errors_in_words(profile.rows)}'
-    title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(title))
-    axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
-    at_mm, line_mm = MM * profile.position_m, MM * profile.line_m
-    measured_um = data.study.measured_um[profile.rows]
-    axes.errorbar(
-        at_mm, measured_um, TWO_SIDED_95 * data.study.sigma_um[profile.rows], fmt='o', ms=3,
-        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge and texture', zorder=5,
-    )  # fmt: skip
-    for k, (name, line) in enumerate(zip(data.model_names, data.lines, strict=True)):
-        # The thin line lies over the bold one, so that both are seen where they agree.
-        style: dict[str, Any] = {'color': line['color'], 'label': name, 'zorder': 3 - 0.1 * k}
-        if len(line_mm):
-            axes.plot(line_mm, profile.lines_um[k], lw=0.85 * line['width'], **style)
-        else:
-            filled = 'full' if k == len(data.models) - 1 else 'none'
-            predicted_um = measured_um - data.residuals_um[k][profile.rows]
-            axes.plot(at_mm, predicted_um, 'o', ms=4, fillstyle=filled, **style)
-    for number, single in enumerate(profile.passes_um):
-        label = '' if number else 'each pass alone'
-        axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
-    axes.set_ylim(bottom=0.0, auto=None)  # Axes that share the scale may need more of it.
-
-
-def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw measured minus predicted, of the last model with the gauge's noise."""
-    quiet(axes, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
-    at_mm, last = MM * profile.position_m, len(data.models) - 1
-    bars_um = TWO_SIDED_95 * data.study.sigma_um[profile.rows]
-    for k, colour in enumerate(data.colours):
-        axes.errorbar(
-            at_mm, data.residuals_um[k][profile.rows],
-            bars_um if k == last else np.zeros(len(at_mm)),
-            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=colour,
-        )  # fmt: skip
-    axes.axhline(0.0, color=MUTED, lw=0.8)
-
-
 def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
     """Draw the part with its numbered points, and how surely each effect would be found."""
     part = PartPicture.of(chosen.surface)
@@ -218,10 +131,10 @@ def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
 def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = None) -> None:
     """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
     part = part or PartPicture.of(chosen.surface)
-    scale, seen_um = film_scale(chosen.film_um), part.spread(chosen.film_um)
+    scale = film_scale(chosen.film_um)
     room = 0.03 * (part.high_m - part.low_m).max()
     part.dress(axes, part.low_m - room, part.high_m + room)
-    part.draw_pixels(axes, scale.rgba(seen_um, seen_um > NO_PAINT_UM))
+    part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
     part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
     places = part.view.flat(chosen.positions_m)
     twice = np.isin(np.arange(len(chosen)), chosen.read_twice)

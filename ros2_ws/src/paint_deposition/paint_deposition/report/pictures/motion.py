@@ -1,28 +1,27 @@
-"""The gun's motion: over its part from three sides, and its speed against the programmed one."""
+"""The gun's motion over its part, from three sides."""
 
 from pathlib import Path
 from textwrap import fill
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection, TriMesh
-from matplotlib.colors import to_rgb
+from matplotlib.collections import LineCollection
+from matplotlib.colors import to_rgba
 from matplotlib.lines import Line2D
-from matplotlib.tri import Triangulation
 
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.motion.driven_speed import TOLERANCE, DrivenSpeed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
+from paint_deposition.report.pictures.chart import new_figure, save_picture
+from paint_deposition.report.pictures.part import draw_triangles
 from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
 
 PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
-WARNING_COLOUR = SLOWER_COLOUR = '#c0392b'
+WARNING_COLOUR = '#c0392b'
 WIDTH_IN, VIEWS_IN, LINE_IN = 11.5, 7.4, 0.22
 TEXT_COLUMNS = 130
 # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
@@ -132,10 +131,9 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
     order = np.argsort(depth)
     # The back of a sheet is seen from some sides: it is darker.
     light = np.where(toward >= 0.0, 0.75 + 0.25 * toward, 0.6)[order]
-    colours = np.clip(np.array(to_rgb(PART_COLOUR)) * light[:, None], 0.0, 1.0)
+    colours = np.array(to_rgba(PART_COLOUR)) * np.column_stack([light] * 3 + [np.ones(len(light))])
     flat = view.flat(surface.vertices_m)
-    triangles = Triangulation(flat[:, 0], flat[:, 1], surface.faces[order])
-    axes.add_collection(TriMesh(triangles, facecolors=colours, edgecolors='none'))
+    draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
     axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
     if np.ptp(flat, axis=0).max() < SMALL * size_m:
         axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
@@ -162,43 +160,3 @@ def _key() -> list[Line2D]:
         ),
         Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
     ]  # fmt: skip
-
-
-def write_speed_picture(path: str | Path, speed: DrivenSpeed, title: str) -> Path:
-    """Draw both speeds over the way, pass behind pass, and mark where the robot is slower.
-
-    Args:
-        path: PNG to write.
-        speed: what to draw.
-        title: what to write on top.
-    """
-    figure = new_figure(11.5, 4.2)
-    axes = figure.add_subplot()
-    driven, programmed = speed.driven_m_per_s, speed.programmed_m_per_s
-    for number in range(1, len(speed.passes) + 1):
-        rows = np.flatnonzero(speed.spray_pass == number)
-        way_m = speed.way_m[rows]
-        if number % 2 == 0:
-            axes.axvspan(way_m[0], way_m[-1], color=GRID, alpha=0.6, linewidth=0)
-        first = number == 1
-        axes.plot(
-            way_m, programmed[rows], color=MUTED, linewidth=1.2, linestyle=(0, (4, 2)),
-            label='programmed' if first else None,
-        )  # fmt: skip
-        axes.plot(
-            way_m, driven[rows], color=ACCENT, linewidth=1.4, label='driven' if first else None
-        )
-        axes.fill_between(
-            way_m, driven[rows], programmed[rows], color=SLOWER_COLOUR, alpha=0.35, linewidth=0,
-            where=(driven[rows] < (1.0 - TOLERANCE) * programmed[rows]).tolist(),
-            label=f'more than {100 * TOLERANCE:.0f} % slower' if first else None,
-        )  # fmt: skip
-        axes.annotate(
-            str(number), (0.5 * (way_m[0] + way_m[-1]), 0.0), xytext=(0, 3),
-            textcoords='offset points', ha='center', fontsize=8, color=MUTED,
-        )  # fmt: skip
-    axes.set_xlim(0.0, speed.way_m[-1])
-    axes.set_ylim(0.0, 1.15 * max(driven.max(), programmed.max()))
-    quiet(axes, 'way sprayed, pass behind pass [m]', 'speed of the TCP [m/s]', title)
-    legend(axes, loc='lower right', ncols=3, bbox_to_anchor=(1.0, 1.0))
-    return save_picture(figure, path)

@@ -4,26 +4,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
+from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.markers import MarkerStyle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
+from matplotlib.tri import Triangulation
 
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.seen_faces import seen_faces
 from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
 
 # Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
 MARGIN_IN_PARTS = 1.0
-# Pixels along the longer side of the part, and how many of them contours may skip.
-PIXELS, COARSER = 1200, 4
-# Light from above left; how much a lean of the surface brightens or darkens it.
-LIGHT, CONTRAST = (-0.45, 0.75), 0.9
-GREY, DARKEST, BRIGHTEST = 0.78, 0.25, 1.0
+# Whether a triangle is hidden is seen from a place so far above it [m].
+LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
 WAY_OFF = '#3a4048'
@@ -32,50 +29,44 @@ HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 
 @dataclass(frozen=True)
 class PartPicture:
-    """What a picture of H x W pixels shows of a part.
+    """What a picture shows of a part.
 
     Attributes:
         view: the directions of the picture.
-        corners: (H, W, 3) vertices of the triangle in each pixel, the lowest row first.
-        weights: (H, W, 3) of these vertices; NaN where there is no part.
-        normals: (V, 3) of the surface.
+        flat_m: (V, 2) places of the vertices in the picture [m].
+        faces: (F, 3) triangles that look at the viewer, the farthest first.
+        seen: (F,) bool, those of them with nothing before their middle.
         edges_m: (E, 2, 2) visible creases and free edges in the picture [m].
-        low_m, high_m: (2,) corners of the part in the picture [m].
     """
 
     view: View
-    corners: np.ndarray
-    weights: np.ndarray
-    normals: np.ndarray
+    flat_m: np.ndarray
+    faces: np.ndarray
+    seen: np.ndarray
     edges_m: np.ndarray
-    low_m: np.ndarray
-    high_m: np.ndarray
 
     @staticmethod
     def of(surface: Surface) -> 'PartPicture':
         """The part from the gun's side, gravity down."""
         view = View.of_front(surface.outward, surface.down)
         flat = view.flat(surface.vertices_m)
-        low, high = flat.min(axis=0), flat.max(axis=0)
-        width, height = np.maximum(PIXELS * (high - low) / (high - low).max(), 1).astype(int)
-        step = (high - low) / (width, height)
-        toward = surface.vertices_m @ view.toward
-        nearest, weights, seen = seen_faces(
-            flat, toward, surface.faces, low, step, int(height), int(width)
-        )
-        return PartPicture(
-            view,
-            surface.faces[np.maximum(nearest, 0)],
-            weights,
-            surface.normals,
-            flat[_borders(surface.faces[seen])],
-            low,
-            high,
-        )
+        first, second = (flat[surface.faces[:, k]] - flat[surface.faces[:, 0]] for k in (1, 2))
+        front = surface.faces[first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]]
+        faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
+        above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
+        seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
+        edges = flat[_borders(faces[seen])]
+        return PartPicture(view, flat, faces, seen, edges)
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
-        """(H, W) values of the vertices (V,) in each pixel, NaN where there is no part."""
-        return np.einsum('hwk,hwk->hw', values[self.corners], self.weights)
+    @property
+    def low_m(self) -> np.ndarray:
+        """(2,) lowest corner of the part in the picture [m]."""
+        return self.flat_m.min(axis=0)
+
+    @property
+    def high_m(self) -> np.ndarray:
+        """(2,) highest corner of the part in the picture [m]."""
+        return self.flat_m.max(axis=0)
 
     def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of a picture of the part with its whole passes [m]."""
@@ -88,44 +79,35 @@ class PartPicture:
         room = 0.03 * (high - low).max()
         return low - room, high + room
 
-    def draw_pixels(self, axes: Axes, rgb: np.ndarray) -> None:
-        """Colours (H, W, 3) uint8, or greys (H, W, 1), as they are: no light falls on them."""
-        rgba = np.empty((*rgb.shape[:2], 4), dtype=np.uint8)
-        rgba[:, :, :3] = rgb[:, :, :3]
-        rgba[:, :, 3] = np.where(np.isfinite(self.weights[:, :, 0]), 255, 0)
-        (left, bottom), (right, top) = self.low_m, self.high_m
-        axes.imshow(
-            rgba, extent=(left, right, bottom, top), origin='lower', interpolation='nearest'
-        )  # fmt: skip
-        axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
+    def draw(self, axes: Axes, rgba: np.ndarray) -> None:
+        """The part in colours of its vertices, (V, 4) uint8: no light falls on them."""
+        draw_triangles(axes, self.flat_m[self.faces], rgba[self.faces] / 255.0)
+        self._draw_edges(axes)
 
-    def draw_relief(self, axes: Axes) -> None:
-        """The bare part in grey, lit from above left."""
-        lean = self.spread(self.normals @ (LIGHT[0] * self.view.right + LIGHT[1] * self.view.up))
-        grey = np.clip(GREY * (1.0 + CONTRAST * np.nan_to_num(lean)), DARKEST, BRIGHTEST)
-        self.draw_pixels(axes, (255.0 * grey).astype(np.uint8)[:, :, np.newaxis])
+    def draw_bands(
+        self, axes: Axes, film_um: np.ndarray, ends_um: list[float], colours: list[str]
+    ) -> None:
+        """The part with a colour for each band of the film, (V,) at the vertices [um]."""
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
+        least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
+        levels = [least - 1.0, *ends_um, most + 1.0]
+        axes.tricontourf(triangles, film_um, levels, colors=colours)
+        self._draw_edges(axes)
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
         levels = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(low, high)
         levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
-        film = self.spread(film_um)[::COARSER, ::COARSER]
-        if not len(levels) or min(film.shape) < 2:
+        if not len(levels) or not self.seen.any():
             return
-        (left, bottom), (right, top) = self.low_m, self.high_m
-        x, y = (
-            start + (COARSER * np.arange(count) + 0.5) * (end - start) / pixels
-            for start, end, count, pixels in zip(
-                (left, bottom), (right, top), film.shape[::-1], self.weights.shape[1::-1],
-                strict=True,
-            )
-        )  # fmt: skip
-        lines = axes.contour(
-            x, y, np.ma.masked_invalid(film), levels, colors=INK, linewidths=0.6, alpha=0.55
-        )
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
+        lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
             label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
+
+    def _draw_edges(self, axes: Axes) -> None:
+        axes.add_collection(LineCollection(list(self.edges_m), colors=INK, linewidths=0.8), False)
 
     def dress(self, axes: Axes, low: np.ndarray, high: np.ndarray) -> None:
         """Axes with the coordinates of the mesh, to these corners [m]."""
@@ -142,6 +124,13 @@ class PartPicture:
             axes.xaxis.set_major_formatter(lambda value, _: f'{-value:g}')
         if self.view.up.min() < -SNAP_COSINE:
             axes.yaxis.set_major_formatter(lambda value, _: f'{-value:g}')
+
+
+def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
+    """Draw triangles (F, 3, 2) with colours (F, 3, 4) from 0 to 1 at their corners, in order."""
+    x, y = corners_m.reshape(-1, 2).T
+    triangles = Triangulation(x, y, np.arange(len(x)).reshape(-1, 3))
+    axes.add_collection(TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True))
 
 
 def _borders(faces: np.ndarray) -> np.ndarray:

@@ -1,22 +1,25 @@
-"""A recommended index, what evenness costs in paint, and a programme before and after."""
+"""A recommended index, and a programme before and after."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.patches import Patch
 
-from paint_deposition.film.colour_scales import OVER_RGB, TABLE, UNDER_RGB, ColourScale, film_scale
+from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.planning.improvement.improvement import Improvement, LaidFilm
 from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
-from paint_deposition.planning.plan import TradeOffPoint
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
+from paint_deposition.report.pictures.chart import (
+    MM,
+    colour_bar,
+    legend,
+    new_figure,
+    quiet,
+    save_picture,
+)
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 
@@ -100,34 +103,6 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
     legend(axes, loc='upper right', ncols=3)
 
 
-def write_trade_off(
-    path: str | Path, given: TradeOffPoint, points: Sequence[TradeOffPoint]
-) -> Path:
-    """Draw unevenness over paint for a programme as given and for each weight."""
-    figure = new_figure(7.0, 4.6)
-    axes = figure.subplots()
-    quiet(axes, 'paint sprayed [cm³]', r'$\sigma_N$ [%]', 'What evenness costs in paint')
-    order = sorted(points, key=lambda point: point.paint_cm3)
-    axes.plot(
-        [p.paint_cm3 for p in order], [100.0 * p.sigma_n for p in order], 'o-', color=ACCENT,
-        linewidth=1.6, markersize=6,
-    )  # fmt: skip
-    axes.plot(given.paint_cm3, 100.0 * given.sigma_n, 's', color=BEFORE, markersize=8)
-    axes.annotate(
-        f'as given, {given.cycle_time_s:.1f} s', (given.paint_cm3, 100.0 * given.sigma_n),
-        xytext=(8, 6), textcoords='offset points', fontsize=9, color=INK,
-    )  # fmt: skip
-    for point in order:
-        axes.annotate(
-            f'{point.paint_weight:g}: {point.passes} passes, {point.cycle_time_s:.1f} s',
-            (point.paint_cm3, 100.0 * point.sigma_n), xytext=(8, -3),
-            textcoords='offset points', fontsize=8, color=MUTED,
-        )  # fmt: skip
-    axes.set_ylim(bottom=0.0)
-    axes.margins(x=0.2)
-    return save_picture(figure, path)
-
-
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
@@ -149,14 +124,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         _draw_film(one, part, scale, driven, laid)
         one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
-    bar = top.colorbar(
-        ScalarMappable(
-            Normalize(scale.low, scale.high), ListedColormap(scale.palette[:TABLE] / 255.0)
-        ),
-        ax=axes, location='bottom', shrink=0.4, aspect=40, pad=0.04,
-    )  # fmt: skip
-    bar.set_label('film [µm]', color=MUTED)
-    bar.outline.set_visible(False)
+    colour_bar(top, axes, 'film [µm]', scale)
     top.legend(
         handles=[
             Patch(color='#{:02x}{:02x}{:02x}'.format(*rgb), label=f'{side} {end:.3g} µm')
@@ -192,8 +160,7 @@ def _scale(result: Improvement) -> ColourScale:
 def _draw_film(
     axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: LaidFilm
 ) -> None:
-    seen = part.spread(laid.film_um)
-    part.draw_pixels(axes, scale.rgba(seen, seen > 1.0))
+    part.draw(axes, scale.rgba(laid.film_um, laid.film_um > 1.0))
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     draw_tool_path(axes, path, part.view, low, high)
 

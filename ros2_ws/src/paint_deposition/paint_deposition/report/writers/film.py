@@ -11,7 +11,6 @@ from paint_deposition.files.atomic import replacing
 from paint_deposition.files.gauge_readings import write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.meshes import write_mesh_ply
-from paint_deposition.files.parquet import write_parquet
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
@@ -27,7 +26,6 @@ def _write_simulation(
     folder: Path,
     made_from: Mapping[str, Any] | None = None,
     pictures: str = 'png',
-    parquet: bool = False,
 ) -> list[Path]:
     from paint_deposition.report.pictures.film import write_film_picture
 
@@ -38,9 +36,6 @@ def _write_simulation(
     files = write_film(
         folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
     )
-    if parquet:
-        table = folder / 'film.parquet'
-        files.append(write_film_table(table, result.surface, result.film_um))
     if result.readings is not None and result.predicted_um is not None:
         files.append(folder / 'predicted.csv')
         write_predictions(files[-1], result.readings, result.predicted_um)
@@ -98,18 +93,3 @@ def write_film(
             np.savetxt(temporary, rows, '%.9g', ',', header=CSV_HEADER, comments='')
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
-
-
-def write_film_table(path: Path, surface: Surface, film_um: np.ndarray) -> Path:
-    """Write the film at the vertices as Parquet, to the last bit, whole or not at all.
-
-    The columns of the CSV, and what a mean over the surface needs: ``nx``, ``ny``, ``nz``, the
-    outward unit normal, and ``area_m2``, the share of the surface that belongs to the vertex.
-    """
-    import pyarrow as pa
-
-    positions = dict(zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True))
-    normals = dict(zip(('nx', 'ny', 'nz'), surface.normals.T, strict=True))
-    film = {'thickness_um': film_um}
-    area = {'area_m2': surface.vertex_areas_m2}
-    return write_parquet(path, pa.table(positions | film | normals | area))

@@ -5,26 +5,20 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.files.provenance import origin
-from paint_deposition.film.colour_scales import residual_scale
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
-from paint_deposition.inference.comparison.residual_field import spread_over_surface
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
-from paint_deposition.report.pictures.inference import (
-    write_calibration_pictures,
-    write_comparison_picture,
-)
+from paint_deposition.report.pictures.chart import save_picture
+from paint_deposition.report.pictures.comparison import comparison_figure
+from paint_deposition.report.pictures.inference import write_calibration_pictures
 from paint_deposition.report.writers.fitted_model import write_fitted
 from paint_deposition.report.writers.write import written
 
@@ -58,7 +52,7 @@ def _write_side_by_side(result: SideBySide, folder: Path, pictures: str = 'png')
     models = {name: comparison.model for name, comparison in result.by_name.items()}
     figures = folder / 'comparison.json'
     write_json(figures, result.to_dict() | _provenance(data.study, models))
-    files = [figures, write_comparison_picture(folder / f'comparison.{pictures}', data)]
+    files = [figures, save_picture(comparison_figure(data), folder / f'comparison.{pictures}')]
     for name, comparison in result.by_name.items():
         files.append(folder / f'residuals_{file_name(name)}.csv')
         write_table(files[-1], _residual_rows(comparison))
@@ -91,16 +85,15 @@ def _provenance(
 def _write_results(
     folder: Path, name: str, figures: dict[str, Any], data: ReportData, pictures: str
 ) -> list[Path]:
-    """Figures, the last model's residuals as a table and as meshes, picture and report."""
+    """Figures, the last model's residuals as a table, picture and report."""
     last = data.comparisons[-1]
     files = [folder / name, folder / 'residuals.csv']
     write_json(files[0], figures | _provenance(last.study, last.model))
     write_table(files[1], _residual_rows(last))
     return [
         *files,
-        write_comparison_picture(folder / f'comparison.{pictures}', data),
+        save_picture(comparison_figure(data), folder / f'comparison.{pictures}'),
         write_report(folder / 'report.html', data),
-        *write_residual_meshes(folder, last),
     ]
 
 
@@ -124,32 +117,6 @@ def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
                 *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
                 str(int(used)),
             ]
-
-
-def write_residual_meshes(folder: Path, comparison: Comparison) -> list[Path]:
-    """Write ``residual_<experiment>.ply``: vertex colours and property ``residual_um``.
-
-    Residual = measured minus predicted, interpolated between readings; grey and NaN where no
-    reading is near. All experiments share one scale of colours.
-    """
-    campaign = comparison.study.campaign
-    fields = []
-    for number, experiment in enumerate(campaign.experiments):
-        at = experiment.measured_points
-        residual_um = comparison.points.residual_um[campaign.experiment_of == number]
-        surface = experiment.surface
-        fields.append(spread_over_surface(surface, at.positions_m, at.normals, residual_um))
-    everything = np.concatenate(fields)
-    scale = residual_scale(everything[np.isfinite(everything)])
-    paths: list[Path] = []
-    for experiment, field in zip(campaign.experiments, fields, strict=True):
-        path = folder / f'residual_{file_name(experiment.name)}.ply'
-        if path in paths:
-            path = path.with_stem(f'{path.stem}_{len(paths) + 1}')
-        colours = scale.rgba(field, np.isfinite(field))
-        write_mesh_ply(path, experiment.surface, colours, residual_um=field)
-        paths.append(path)
-    return paths
 
 
 def file_name(name: str) -> str:

@@ -3,7 +3,7 @@
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +23,7 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan, TradeOffPoint
+from paint_deposition.planning.plan import Plan
 from paint_deposition.report.writers.film import write_film
 from paint_deposition.report.writers.write import writable
 
@@ -103,13 +103,6 @@ def write_plan(
         write_json(folder / name, figures)
     film = write_film(folder, result.surface, result.film_um, result.statistics, overwrite=True)
     return [folder / one for one in (name, *names, *(file.name for file in film))]
-
-
-def write_trade_off_table(path: str | Path, points: Sequence[TradeOffPoint]) -> Path:
-    """One row a weight."""
-    rows = [[f'{value:.6g}' for value in astuple(point)] for point in points]
-    write_table(path, [[item.name for item in fields(TradeOffPoint)], *rows])
-    return Path(path)
 
 
 def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:

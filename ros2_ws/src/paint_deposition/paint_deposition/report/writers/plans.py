@@ -1,134 +1,140 @@
-"""How plans and recommendations are written."""
+"""How plans, improved programmes, recommendations and chosen points are written."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from scipy.spatial.transform import Rotation
+
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.provenance import origin
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.part.orientation import across_axis
 from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan, TradeOffPoint
+from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import write_film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
-from paint_deposition.report.pictures.planning import (
-    write_improvement_picture,
-    write_trade_off,
-    write_uniformity,
-)
-from paint_deposition.report.writers.measuring import write_chosen_readings
-from paint_deposition.report.writers.passes import (
-    write_plan,
-    write_trade_off_table,
-)
+from paint_deposition.report.pictures.planning import write_improvement_picture, write_uniformity
+from paint_deposition.report.writers.passes import write_plan
 from paint_deposition.report.writers.write import input_files, with_provenance, written
 
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
 ROBOT_FRAME = 'base_link'
+COLUMNS = (
+    'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
+    'expected_um', 'speaks_for',
+)  # fmt: skip
 
 
 @written.register
 def _recommendation(
     result: Recommendation,
-    folder: str | Path,
+    folder: Path,
     made_from: Mapping[str, Any] | None = None,
     model: DepositionModel | None = None,
     pictures: str = 'png',
 ) -> list[Path]:
-    files = [Path(folder) / 'recommendation.json', Path(folder) / f'uniformity.{pictures}']
-    write_json(
-        files[0], result.to_dict() | {'provenance': origin(model, input_files(made_from or {}))}
-    )
+    files = [folder / 'recommendation.json', folder / f'uniformity.{pictures}']
+    provenance = origin(model, input_files(made_from or {}))
+    write_json(files[0], result.to_dict() | {'provenance': provenance})
     write_uniformity(files[1], result)
     return files
 
 
 @written.register(Plan)
 @written.register(PartPlan)
-def _plan(
-    result: Plan | PartPlan,
-    folder: str | Path,
+@written.register(Improvement)
+def _passes(
+    result: Plan | PartPlan | Improvement,
+    folder: Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
-    trade_off: Sequence[TradeOffPoint] = (),
 ) -> list[Path]:
-    of_part = {'down': result.surface.down, 'notes': result.surface.notes}
-    about = with_provenance(of_part | dict(made_from or {}), result.model)
+    surface = result.surface
+    if isinstance(result, Improvement):
+        said: dict[str, Any] = {'notes': (*surface.notes, *result.given.notes)}
+    else:
+        said = {'down': surface.down, 'notes': surface.notes}
+    about = with_provenance(said | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_plan(folder, result, about, part)
+    if isinstance(result, Improvement):
+        return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = write_film_picture(
-        Path(folder) / f'film.{pictures}', result.surface, result.film_um, result.path,
-        result.statistics, 'Planned passes and their film', result.sentence,
+        folder / f'film.{pictures}', surface, result.film_um, result.path, result.statistics,
+        'Planned passes and their film', result.sentence,
     )  # fmt: skip
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
-        geometry = spray_geometry(result.surface, result.path, result.model, frame_id)
+        geometry = spray_geometry(surface, result.path, result.model, frame_id)
         geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
-        files.append(Path(folder) / f'passes.{pictures}')
-        write_geometry_picture(
-            files[-1], result.surface, result.path, geometry, 'Planned passes over the faces'
-        )
-        return [*files, film]
-    plain, weighed = result.plain or result, []
-    if trade_off:
-        weighed = _write_trade_off(Path(folder), plain.point, trade_off, pictures)
-    return [*files, film, *weighed]
-
-
-@written.register
-def _improvement(
-    result: Improvement,
-    folder: str | Path,
-    made_from: Mapping[str, Any] | None = None,
-    part_pose: Sequence[float] | None = None,
-    frame_id: str = ROBOT_FRAME,
-    pictures: str = 'png',
-    trade_off: Sequence[TradeOffPoint] = (),
-) -> list[Path]:
-    notes = {'notes': (*result.surface.notes, *result.given.notes)}
-    about = with_provenance(notes | dict(made_from or {}), result.model)
-    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_plan(folder, result, about, part)
-    picture = Path(folder) / f'improvement.{pictures}'
-    files.append(write_improvement_picture(picture, result))
-    if trade_off:
-        files += _write_trade_off(Path(folder), result.points[0], trade_off, pictures)
-    return files
-
-
-def _write_trade_off(
-    folder: Path,
-    given: TradeOffPoint,
-    points: Sequence[TradeOffPoint],
-    pictures: str,
-) -> list[Path]:
-    """Table and picture of other weights of the paint."""
-    picture = folder / f'pareto.{pictures}'
-    table = write_trade_off_table(folder / 'pareto.csv', points)
-    return [table, write_trade_off(picture, given, points)]
+        files.append(folder / f'passes.{pictures}')
+        title = 'Planned passes over the faces'
+        write_geometry_picture(files[-1], surface, result.path, geometry, title)
+    return [*files, film]
 
 
 @written.register
 def _chosen_readings(
     result: ChosenReadings,
-    folder: str | Path,
+    folder: Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     pictures: str = 'png',
 ) -> list[Path]:
+    """Figures, ``points.csv`` to be filled in and read as gauge readings, and a robot's poses.
+
+    With ``part_pose`` the poses are in the robot's frame.
+    """
     of_part = {'down': result.surface.down, 'notes': result.surface.notes}
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
-    files = write_chosen_readings(folder, result, about, part)
-    picture = Path(folder) / f'points.{pictures}'
-    return [*files, write_measuring_picture(picture, result)]
+    files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv')]
+    positions, quaternions = result.positions_m, _gauge_quaternions(result)
+    write_json(files[0], result.to_dict() | about)
+    write_table(files[1], _points(result))
+    write_table(files[2], _poses(result.names, positions, quaternions, part))
+    return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
+
+
+def _gauge_quaternions(chosen: ChosenReadings) -> np.ndarray:
+    """(P, 4) x, y, z, w: the gauge's z axis into the surface, its x axis level to the right."""
+    into = -chosen.normals
+    right = across_axis(chosen.surface.outward, chosen.surface.down)
+    across = right - (into @ right)[:, np.newaxis] * into
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    return Rotation.from_matrix(np.stack([across, np.cross(into, across), into], 2)).as_quat()
+
+
+def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
+    """A line a reading: all points once, then those that are read twice."""
+    yield COLUMNS
+    face_mm = 1e3 * chosen.from_edges_m
+    for k in [*range(len(chosen)), *chosen.read_twice]:
+        place = (*chosen.positions_m[k], *chosen.normals[k])
+        yield [
+            chosen.names[k], *(f'{value:.4f}' for value in place), '',
+            *(f'{value:.0f}' for value in face_mm[k]), f'{chosen.expected_um[k]:.1f}',
+            ' '.join(chosen.speaks_for[k]),
+        ]  # fmt: skip
+
+
+def _poses(
+    names: Sequence[str], positions_m: np.ndarray, quaternions: np.ndarray, part: Rigid | None
+) -> Iterator[Sequence[object]]:
+    yield 'point', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw'
+    for name, *pose in zip(names, positions_m, quaternions, strict=True):
+        position, quaternion = part.applied(*pose) if part else pose
+        yield [name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)]

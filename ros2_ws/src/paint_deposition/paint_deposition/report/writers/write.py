@@ -35,13 +35,10 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
             history and uncertainties are carried on.
         made_from: of a film, a plan, an improvement, chosen points or a recommendation, more to
             say in its figures, such as the files used.
-        parquet: of a film, whether its table is also written as film.parquet, to the last bit.
         model: of a recommendation, what it was computed with.
         part_pose, frame_id: of a plan or an improvement, where the part stands in the robot's
             frame, [x y z qx qy qz qw], and the name of that frame; its files have their poses in
             that frame then. The first of them also of chosen points.
-        trade_off: of plan or improvement, ``Point``s of other weights of the paint, for a table
-            and a picture.
 
     Returns:
         The paths written.

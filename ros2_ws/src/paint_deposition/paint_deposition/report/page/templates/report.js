@@ -1,6 +1,6 @@
 'use strict';
-// What the page shows: charts in groups, the part in panes, tables that sort, tables to download.
-const page = (() => {
+// What the page shows: charts in groups, tables that sort.
+(async () => {
   const root = document.documentElement;
   const errors = [];
   const failed = (what, error) => {
@@ -13,7 +13,7 @@ const page = (() => {
   const content = JSON.parse(document.getElementById('content').textContent);
   const options = {
     displaylogo: false, responsive: true,
-    modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d', 'tableRotation'],
+    modeBarButtonsToRemove: ['select2d', 'lasso2d', 'autoScale2d'],
     toImageButtonOptions: {format: 'png', scale: 2},
   };
   // A finger has no place to rest on: the tools would hide the chart.
@@ -89,17 +89,6 @@ const page = (() => {
     body.append(...[...body.rows].sort(order));
   });
 
-  const download = (name, text) => {
-    const link = document.createElement('a');
-    link.href = URL.createObjectURL(new Blob([text], {type: 'text/csv'}));
-    link.download = name;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-  };
-  for (const button of document.querySelectorAll('button[data-table]')) {
-    const source = document.getElementById(button.dataset.table);
-    button.addEventListener('click', () => download(button.dataset.name, source.textContent));
-  }
-
-  return {root, content, options, flat, make, rest, draw, drawGroup, download, failed};
+  for (const figure of content) await drawGroup(figure);
+  root.dataset.ready = '';
 })();

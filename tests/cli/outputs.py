@@ -1,14 +1,12 @@
 """The JSON of each command: keys that stay and the types of their values; more may be added.
 
 Lengths are in m, times in s, angles in rad unless the name says otherwise, films in um; null is a
-number that is not known. ``python -m paint_deposition.report.outputs stats`` prints a JSON schema.
+number that is not known.
 """
 
 # The types are made by functions, which mypy cannot follow.
 # mypy: ignore-errors
 
-import json
-import sys
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
@@ -87,11 +85,6 @@ output(
     geometry=figures(passes=int, sentence=str, warnings=Words), picture=str | None,
 )  # fmt: skip
 
-Driven = figures(
-    'way_m programmed_m_per_s driven_m_per_s slowest_m_per_s slower slower_at_ends film'
-)
-output('driven_speed', 'on_programme', Driven, picture=str | None,
-       passes=list[figures('', Driven, number=int)])  # fmt: skip
 output(
     'recording', path=str, triggers=Words,
     topics=list[figures(name=str, type=str, message_count=int)],
@@ -116,16 +109,6 @@ output(
 )  # fmt: skip
 output('recovery', folder=str, messages=int, topics=dict[str, int], damaged_chunks=int,
        breaks=Words, skipped_topics=Words)  # fmt: skip
-output(
-    'runs', folder=str,
-    runs=list[
-        figures(
-            'gap_s duration_s', run=str, type=str, serial=str, coat=int, since=str, until=str,
-            recording=Literal['complete', 'unfinished', 'none'], poses=int | None,
-            gaps=int | None, film=dict[str, Number], atomizers=list[dict],
-        )
-    ],
-)  # fmt: skip
 output('location', 'rms_m', part_pose=Pose, residuals_m=dict[str, float], warnings=Words)
 
 Residuals = figures(
@@ -186,7 +169,7 @@ Planned = figures(
 output(
     'plan',
     'index_m speed_m_per_s standoff_m overspray_m acceleration_m_per_s2 smoothing_radius_m',
-    Planned, lines_m=list[Number], standoffs_m=list[Number], leans_deg=list[Number], travel=str,
+    Planned, lines_m=list[Number], travel=str,
     gun_turns=bool,
     plain=figures('sigma_n mean_um paint_cm3 capture_fraction cycle_time_s', passes=int) | None,
     plane=figures('index_m sigma_n sigma_n_on_part', passes=int),
@@ -194,7 +177,7 @@ output(
 output(
     'plan_of_faces', 'margin_m sigma_n_unblended', Planned, speeds_m_per_s=list[float],
     faces=list[figures('area_m2', outward=Direction)],
-    one_raster=figures('sigma_n coverage'), gun=figures('radius_m length_m before_m'),
+    gun=figures('radius_m length_m before_m'),
     contacts=list[figures('begin_s end_s depth_m', place_m=Direction, by_gun=bool)],
 )  # fmt: skip
 output(
@@ -204,12 +187,11 @@ output(
         BeforeAfter,
         'mean_um sigma_n min_um max_um within paint_cm3 on_part_cm3 spraying_s cycle_s',
     ),
-    sigma_n_interval=figures(before=Pair, after=Pair) | None,
     binding_limits=list[figures('sigma_n', name=str)],
     passes=list[
         figures('opens_earlier_m closes_later_m opens_earlier_s closes_later_s', number=int,
-                axis=Literal['x', 'y', 'z'], flow=Pair, sentence=str,
-                stretches=list[figures('begin_m end_m before_m_per_s after_m_per_s')])
+                flow=Pair, sentence=str,
+                speed_m_per_s=Pair)
     ],
     request=ImproveRequest,
     sentence=str, model_sha256=Sha256, notes=Words, warnings=Words,
@@ -237,13 +219,13 @@ output(
     pooled=figures(
         'level_sd_percent noise_factor misfit_share',
         causes=list[
-            figures('value sd probability one_part all_parts', effect=str, parameter=str,
+            figures('value sd probability all_parts', effect=str, parameter=str,
                     unit=str, members=Words)
         ],
     ) | None,
     charts=list[
-        figures('centre', Series, baseline_parts=Count, limits=figures('shewhart ewma cusum'),
-                alarms=figures(shewhart=Words, ewma=Words, cusum=Words))
+        figures('centre', Series, baseline_parts=Count, limits=figures('shewhart ewma'),
+                alarms=figures(shewhart=Words, ewma=Words))
     ],
     false_alarms=figures('one_in_parts'),
     changes=list[
@@ -252,7 +234,3 @@ output(
     ],
     errors=list[figures(run=str, error=str)], remarks=list[figures(part=str, remark=str)],
 )  # fmt: skip
-
-
-if __name__ == '__main__':
-    json.dump(OUTPUTS[sys.argv[1]].model_json_schema(), sys.stdout, indent=2)

@@ -1,0 +1,142 @@
+"""The columns of a table of poses, known by their names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from pathlib import Path
+
+import numpy as np
+
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.tables.headings import TIMES, Heading
+from paint_deposition.files.tables.sheets import text_of
+from paint_deposition.files.tables.table import Table, find_table, headings_in, is_comment
+
+# No run is longer: the unit is another one.
+LONGEST_RUN_S = 1e6
+POSITION = ('x', 'y', 'z')
+QUATERNION = ('qx', 'qy', 'qz', 'qw')
+ROTATION_VECTOR, ROLL_PITCH_YAW = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
+# What a heading says of a pose beside the coordinate itself.
+BESIDE = (
+    'tcp', 'tool', 'pose', 'position', 'pos', 'actual', 'act', 'robot', 'header', 'field', 'p',
+)  # fmt: skip
+# What stands before an axis in the columns of an orientation, and what it makes of it.
+ROTATED = {
+    **dict.fromkeys(('orientation', 'quaternion', 'quat', 'q'), 'q'),
+    **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
+    **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
+}
+
+
+@dataclass(frozen=True)
+class PoseTable:
+    """A table whose columns are found by their names, see ``column_name``."""
+
+    table: Table
+    names: list[str]
+
+    @staticmethod
+    def read(path: Path) -> PoseTable:
+        """Find the headings and the rows below them.
+
+        Raises:
+            RecordingError: the file cannot be read, or holds no rows.
+        """
+        sheet, header = find_table(path, RecordingError, _known)
+        if header is None:
+            first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
+            raise RecordingError(
+                f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first})'
+            )
+        headings = headings_in(sheet.rows[header])
+        table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError)
+        below = range(header + 1, len(sheet.rows))
+        table = table.select([k for k in below if not is_comment(sheet.rows[k])])
+        if not len(table):
+            raise RecordingError(f'{path}: no poses below the row of headings')
+        if not sheet.form.startswith('commas'):
+            table, _ = table.with_decimal(range(len(headings)))
+        return PoseTable(table, [column_name(heading) for heading in headings])
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def find(self, *names: str) -> int | None:
+        """The column that is called by the first of these names that occurs.
+
+        Raises:
+            RecordingError: two columns are called so.
+        """
+        for name in names:
+            found = [column for column, its in enumerate(self.names) if its == name]
+            if len(found) > 1:
+                raise RecordingError(f'{self.written(found)} could all be {name}; keep one')
+            if found:
+                return found[0]
+        return None
+
+    def find_all(self, names: Sequence[str]) -> list[int] | None:
+        """The columns of all these names, None if one of them is missing."""
+        found = [column for name in names if (column := self.find(name)) is not None]
+        return found if len(found) == len(names) else None
+
+    def units(self, columns: Sequence[int]) -> set[str]:
+        """The units of columns, '' for one without."""
+        return {self.table.headings[column].unit for column in columns}
+
+    def written(self, columns: Sequence[int]) -> str:
+        """Headings as the file has them; of all columns where none are given."""
+        return self.table.written(columns or range(len(self.names)))
+
+    def numbers(self, columns: Sequence[int]) -> np.ndarray:
+        """The values (N, C) of columns.
+
+        Raises:
+            RecordingError: every cell that is no number, with its line, up to a few.
+        """
+        read = [self.table.numbers(column, finite=False, switch=True) for column in columns]
+        self.table.refuse_complaints()
+        return np.stack(read, axis=1)
+
+    def stamps_ns(self, column: int) -> tuple[np.ndarray, str]:
+        """Times (N,) int64 [ns], exact, and their unit."""
+        (unit,) = self.units([column])
+        written = self.written([column])
+        if (unit or 's') not in TIMES:
+            raise RecordingError(f"{written}: '{unit}' is no unit of time")
+        scale = TIMES[unit or 's']
+        times = self.numbers([column])[:, 0]
+        if not np.isfinite(times).all():
+            raise RecordingError(f'{written} has a time that is not finite')
+        # Written out, a time of a few letters may have a thousand million digits.
+        span_s = (times.max() - times.min()) * scale
+        if span_s > LONGEST_RUN_S or np.abs(times).max() * scale * 1e9 >= 2**63:
+            raise RecordingError(
+                f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
+            )
+        try:
+            cells = [text.replace(',', '.') for text in self.table.texts(column)]
+            stamps = [round(Decimal(cell) * round(scale * 1e9)) for cell in cells]
+        except InvalidOperation:
+            raise RecordingError(f'{written} has a word for a number; give numbers') from None
+        return np.array(stamps, dtype=np.int64), unit or 's'
+
+
+def column_name(heading: Heading) -> str:
+    """'x' of 'X [mm]' and 'tcp.position.x', 'qw' of '/pose/orientation/w'."""
+    *before, last = heading.words or ('',)
+    turned = [ROTATED[word] for word in before if word in ROTATED]
+    if turned and last in ('x', 'y', 'z', 'w'):
+        return turned[-1] + last
+    kept = [word for word in heading.words if word not in BESIDE] or [last]
+    # A logger's path to a coordinate: what is before it names the message.
+    known = (*POSITION, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW)
+    return kept[-1] if kept[-1] in known else ''.join(kept)
+
+
+def _known(headings: list[Heading]) -> int:
+    names = {column_name(heading) for heading in headings}
+    return len(names - {''}) if {*POSITION} <= names else 0

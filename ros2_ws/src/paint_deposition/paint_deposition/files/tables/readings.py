@@ -1,0 +1,243 @@
+"""Tables of gauge readings and of measuring points: their rows, units and numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
+from paint_deposition.files.tables.reading_columns import (
+    ALIASES,
+    AXES,
+    FILM_UNITS,
+    LENGTH_UNITS,
+    NORMALS,
+    ON_FACE,
+    Layout,
+    columns_of,
+    has_place,
+    not_found,
+)
+from paint_deposition.files.tables.sheets import Sheet, text_of
+from paint_deposition.files.tables.table import (
+    Table,
+    find_table,
+    headings_in,
+    is_comment,
+    is_nothing,
+    is_value,
+)
+
+# Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
+LARGEST_PART_M = 20.0
+STATISTIC = re.compile(
+    r'(mean|average|avg|mittel\w*|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
+    r'lowest|highest|coefficient|vari\w*|statist\w*|number of|count|anzahl|sum|total|n|s|x)\b'
+)
+
+
+@dataclass(frozen=True)
+class ReadingTable:
+    """Rows of readings or points, apart from all that stands around them.
+
+    Attributes:
+        table: their cells.
+        at: columns of each quantity; several of the thickness where each row holds repeats.
+        layout: what the user said of it.
+        order: number of each row from 1, those without a reading counted.
+        film_unit_m: metres in the unit of the thickness where a line above or a column has it.
+        left_out: what was not taken for a row, for the user.
+    """
+
+    table: Table
+    at: dict[str, list[int]]
+    layout: Layout
+    order: list[int]
+    film_unit_m: float | None
+    left_out: str
+
+    @staticmethod
+    def read(
+        path: Path, films: bool, layout: Layout, labels: Collection[str] = ()
+    ) -> ReadingTable:
+        """Find the table in a file.
+
+        Args:
+            path: of a text file or workbook.
+            films: whether it holds readings, not only places.
+            layout: what the user says of it.
+            labels: of the listed points: a row with one of them is no statistic.
+
+        Raises:
+            ReadingsError: no such table; its lines are complained of later, all at once.
+        """
+        numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
+
+        def known(headings: list[Heading]) -> int:
+            at = columns_of(headings, layout)
+            return len(at) if ('thickness' in at if films else has_place(at)) else 0
+
+        sheet, header = find_table(path, ReadingsError, known, layout.sheet)
+        first = 0 if numbered or header is None else header + 1
+        headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
+        if numbered:
+            headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
+        at = columns_of(headings, layout)
+        if header is None and not (numbered and known(headings)):
+            raise ReadingsError(f'{path}: {not_found(sheet, films, layout)}')
+        rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
+        table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
+        table = table.select(rows)
+        _refuse_rivals(table, at)
+        numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
+        numeric += at['thickness'] if films else []
+        table, doubt = table.with_decimal(numeric, layout.decimal)
+        if doubt:
+            raise table.error(doubt)
+        kept, order, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
+        if not kept:
+            table.refuse_complaints()
+            raise table.error('no readings below the header')
+        table = table.select(kept)
+        return ReadingTable(
+            table, at, layout, order, _unit_beside(table, at, sheet, header or 0), left_out
+        )
+
+    def __len__(self) -> int:
+        return len(self.table)
+
+    def has(self, *quantities: str) -> bool:
+        """Whether there is a column for each."""
+        return all(quantity in self.at for quantity in quantities)
+
+    def texts(self, quantity: str) -> list[str]:
+        """A column as texts; empty ones where there is none."""
+        return self.table.texts(self.at[quantity][0]) if self.has(quantity) else [''] * len(self)
+
+    def heading(self, quantity: str) -> str:
+        """What stands over the column; the quantity's own name where there is none."""
+        return self.table.headings[self.at[quantity][0]].text if self.has(quantity) else quantity
+
+    def numbers(self, quantity: str, may_be_empty: bool = False) -> np.ndarray:
+        """A column (N,) of numbers as written."""
+        return self.table.numbers(self.at[quantity][0], may_be_empty=may_be_empty)
+
+    def lengths_m(self, quantities: Sequence[str]) -> tuple[np.ndarray, str]:
+        """Columns of lengths (N, len(quantities)) [m], and their unit in words.
+
+        Raises:
+            ReadingsError: their units differ, or are none of a position.
+        """
+        values = np.column_stack([self.numbers(quantity) for quantity in quantities])
+        given = self.layout.unit.get('position')
+        headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
+        units = {given} if given else {heading.unit_m for heading in headings}
+        if len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
+            found = ' and '.join(UNIT_NAMES[unit] if unit else 'no unit' for unit in units)
+            raise self.table.error(
+                f'{", ".join(quantities)} are in {found}; give all in one of m, mm, cm, inch'
+            )
+        unit, how = units.pop(), ''
+        if unit is None:
+            largest = float(np.nanmax(np.abs(values), initial=0.0))
+            unit = 1e-3 if largest > LARGEST_PART_M else 1.0
+            how = f' (no unit is given; the largest is {largest:.4g})'
+        # A division by 1000 comes nearer to the text than a product with 0.001.
+        metric = unit in (1.0, 1e-2, 1e-3)
+        metres = values / round(1.0 / unit) if metric else values * unit
+        return metres, f'{", ".join(quantities)} in {UNIT_NAMES[unit]}{how}'
+
+    def films_um(self) -> tuple[np.ndarray, np.ndarray, str]:
+        """All readings (N,) [um], the row of each, and what they are in words.
+
+        A row gives as many readings as it has columns of repeats that are not blank.
+        """
+        films = self.at['thickness']
+        values = np.column_stack([self.table.numbers(k, may_be_empty=True) for k in films])
+        row, which = np.nonzero(np.isfinite(values))
+        unit = self.layout.unit.get('thickness', self.table.headings[films[0]].unit_m)
+        unit = unit or self.film_unit_m
+        headings = ', '.join(f"'{self.table.headings[k].text}'" for k in films)
+        source = '' if headings == "'thickness_um'" else f' from {headings}'
+        how = '' if unit else ' (no unit is given)'
+        factor = round((unit or 1e-6) * 1e6, 9)
+        words = f'thickness in {UNIT_NAMES[unit or 1e-6]}{how}{source}'
+        return values[row, which] * factor, row, words
+
+
+def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
+    """Refuse several columns of one quantity; those of the thickness may differ in a number."""
+    every = [heading.text for heading in table.headings]
+    for quantity, columns in at.items():
+        texts = [every[k] for k in columns]
+        if len({*texts}) < len(texts) or every.count(texts[0]) > 1:
+            raise table.error(f"two columns are called '{texts[0]}'; keep one")
+        stems = {re.sub(r'\d+', '', text) for text in texts}
+        if len(columns) > 1 and (quantity != 'thickness' or len(stems) > 1):
+            named = ', '.join(map(repr, texts))
+            raise table.error(
+                f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
+            )
+
+
+def _unit_beside(
+    table: Table, at: dict[str, list[int]], sheet: Sheet, header: int
+) -> float | None:
+    """Metres in the unit of the thickness that a column, or a line above the table, has."""
+    if 'unit' in at:
+        texts = sorted({text for text in table.texts(at['unit'][0]) if text})
+        units = {length_of(text) for text in texts}
+        if len(units) > 1 or not units <= {*FILM_UNITS}:
+            found = ', '.join(map(repr, texts))
+            raise table.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
+        return next(iter(units), None)
+    for row in sheet.rows[:header]:
+        cells = [part for cell in row for part in text_of(cell).split(':') if part]
+        if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
+            return length_of(cells[1])
+    return None
+
+
+def _rows_of_readings(
+    table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
+) -> tuple[list[int], list[int], str]:
+    """Rows that are readings or points, their numbers, and in words what else there is.
+
+    A row with a place is one, whatever its label. One without a place, or in a table without
+    places, is a statistic if it begins with the name of one and not with the label of a listed
+    point. A missing reading keeps its number.
+    """
+    kept: list[int] = []
+    order: list[int] = []
+    count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
+    width = len(table.headings)
+    places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
+    (label,) = at.get('point') or at.get('number') or [-1]
+    for k, row in enumerate(table.rows):
+        cells = [*row, *[''] * (width - len(row))]
+        values = [cells[c] for c in at['thickness']] if films else []
+        placed = any(is_value(cells[c]) for c in places)
+        begins = next(text_of(cell) for cell in cells if cell != '')
+        listed = label >= 0 and text_of(cells[label]) in labels
+        missing = bool(values) and all(map(is_nothing, values))
+        named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
+        if named and not placed and not listed:
+            count['of statistics'] += 1
+        elif not placed and not any(map(is_value, values)):
+            # A remark has no reading either, but no other number and no n/a in its place.
+            missing &= any(values) or any(map(is_value, cells))
+            count['without a reading' if missing else 'of other text'] += 1
+        elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
+            table.complain(k, f'{len(row)} values under {width} column names')
+        elif missing:
+            count['without a reading'] += 1
+        else:
+            kept.append(k)
+            order.append(len(kept) + count['without a reading'])
+    parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
+    return kept, order, f'left out: {", ".join(parts)}' if parts else ''

@@ -1,0 +1,154 @@
+"""A model beside readings: along columns and rows, and over each part."""
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paint_deposition.film.colour_scales import film_scale, residual_scale
+from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.comparison.profiles import Profile
+from paint_deposition.inference.comparison.residual_field import spread_over_surface
+from paint_deposition.inference.diagnosis.proposals import Place
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.pictures.chart import MM, colour_bar, new_figure, quiet
+from paint_deposition.report.pictures.part import HALO, PartPicture, draw_tool_path
+from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
+
+TEXT_PT = 8.0
+# As many letters of a title fit over a chart; one that is longer is written smaller.
+TITLE_LETTERS = 48
+# A profile's charts, and the room around all of them and between [in].
+CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
+LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
+# A part is drawn into so much room [in]; few readings beyond the end of the colours do not take
+# the contrast from all others.
+PART_IN, SHOWN_SHARE = 4.6, 0.98
+
+
+def part_figure(data: ReportData, index: int) -> Figure:
+    """A part with the residuals of each model, and with the film that the last one predicts.
+
+    Readings are dots; the film has the numbered places to measure next.
+    """
+    experiment, rows = data.experiments[index], data.rows_of(index)
+    surface, count = experiment.surface, len(experiment)
+    points = experiment.points
+    positions, normals = points.positions_m[:count], points.normals[:count]
+    part = PartPicture.of(surface)
+    low, high = part.window(experiment.path)
+    width, height = PART_IN * (high - low) / (high - low).max()
+    names = [f'residual, {name}' for name in data.model_names]
+    figure = new_figure((len(names) + 1) * max(width + 0.7, 2.6), height + 1.9)
+    *residuals, film = figure.subplots(1, len(names) + 1, sharex=True, sharey=True)
+    largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), SHOWN_SHARE))
+    scale = residual_scale(np.array([largest]))
+    places = part.view.flat(positions)
+    for axes, name, residual_um in zip(residuals, names, data.residuals_um, strict=True):
+        field = spread_over_surface(surface, positions, normals, residual_um[rows])
+        part.dress(axes, low, high)
+        part.draw(axes, scale.rgba(field, np.isfinite(field)))
+        colours = scale.rgba(residual_um[rows], np.ones(count, dtype=bool)) / 255.0
+        axes.scatter(*places.T, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
+        axes.set_title(name, loc='left', fontsize=10, color=INK)
+    film_um = data.painted[index][-1].film_um
+    films = film_scale(film_um)
+    part.dress(film, low, high)
+    part.draw(film, films.rgba(film_um, film_um > NO_PAINT_UM))
+    draw_tool_path(film, experiment.path, part.view, low, high)
+    for number, place in enumerate(data.proposals[0], start=1):
+        if place.experiment == experiment.name:
+            _draw_place(film, part, number, place)
+    film.set_title(f'film predicted, {data.model_names[-1]}', loc='left', fontsize=10, color=INK)
+    colour_bar(figure, residuals, 'measured minus predicted [µm]', scale)
+    colour_bar(figure, [film], 'film [µm]', films)
+    for axes in (*residuals[1:], film):
+        axes.set_ylabel('')
+    return figure
+
+
+def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:
+    x, y = part.view.flat(place.position_m).tolist()
+    axes.plot(x, y, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
+    axes.annotate(
+        str(number), (x, y), xytext=(5, 5), textcoords='offset points', fontsize=10, color='white',
+        path_effects=HALO, zorder=6,
+    )  # fmt: skip
+
+
+def comparison_figure(data: ReportData) -> Figure:
+    """The film along each column or row, and the residual below it."""
+    profiles = data.profiles
+    columns = charts_a_row(len(profiles))
+    rows = -(-len(profiles) // columns)
+    width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
+    height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
+    figure = new_figure(width_in, height_in)
+    figure.set_layout_engine('none')  # with so many axes it would take as long as to draw them
+    cells = figure.add_gridspec(
+        rows, columns, left=LEFT_IN / width_in, right=1.0 - RIGHT_IN / width_in,
+        bottom=BOTTOM_IN / height_in, top=1.0 - TOP_IN / height_in,
+        wspace=GAP_IN[0] / CHARTS_IN[0], hspace=GAP_IN[1] / CHARTS_IN[1],
+    )  # fmt: skip
+    film, residual = None, None
+    for k, profile in enumerate(profiles):
+        place = cells[k // columns, k % columns]
+        cell = place.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.12)
+        film = figure.add_subplot(cell[0], sharey=film)
+        residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
+        draw_profile(film, data, profile)
+        draw_residual(residual, data, profile)
+        film.set_xlabel('')
+        film.tick_params(labelbottom=False)
+        if k % columns:
+            for axes in (film, residual):
+                axes.set_ylabel('')
+                axes.tick_params(labelleft=False)
+    if film is not None:
+        film.set_ylim(bottom=0.0)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
+    return figure
+
+
+def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
+    """Draw readings with the gauge's noise, and the models' film."""
+    quiet(axes, f'{profile.axis} [mm]', 'film [µm]', size=TEXT_PT)
+    of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
+    title = f'{of}{profile.label}:  {data.errors_in_words(profile.rows)}'
+    title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(title))
+    axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
+    at_mm, line_mm = MM * profile.position_m, MM * profile.line_m
+    measured_um = data.study.measured_um[profile.rows]
+    axes.errorbar(
+        at_mm, measured_um, TWO_SIDED_95 * data.study.sigma_um[profile.rows], fmt='o', ms=3,
+        color=INK, elinewidth=0.8, label='measured, bars: 95 % gauge and texture', zorder=5,
+    )  # fmt: skip
+    for k, (name, line) in enumerate(zip(data.model_names, data.lines, strict=True)):
+        # The thin line lies over the bold one, so that both are seen where they agree.
+        style: dict[str, Any] = {'color': line['color'], 'label': name, 'zorder': 3 - 0.1 * k}
+        if len(line_mm):
+            axes.plot(line_mm, profile.lines_um[k], lw=0.85 * line['width'], **style)
+        else:
+            filled = 'full' if k == len(data.models) - 1 else 'none'
+            predicted_um = measured_um - data.residuals_um[k][profile.rows]
+            axes.plot(at_mm, predicted_um, 'o', ms=4, fillstyle=filled, **style)
+    for number, single in enumerate(profile.passes_um):
+        label = '' if number else 'each pass alone'
+        axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
+    axes.set_ylim(bottom=0.0, auto=None)  # Axes that share the scale may need more of it.
+
+
+def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
+    """Draw measured minus predicted, of the last model with the gauge's noise."""
+    quiet(axes, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
+    at_mm, last = MM * profile.position_m, len(data.models) - 1
+    bars_um = TWO_SIDED_95 * data.study.sigma_um[profile.rows]
+    for k, colour in enumerate(data.colours):
+        axes.errorbar(
+            at_mm, data.residuals_um[k][profile.rows],
+            bars_um if k == last else np.zeros(len(at_mm)),
+            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=colour,
+        )  # fmt: skip
+    axes.axhline(0.0, color=MUTED, lw=0.8)
