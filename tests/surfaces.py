@@ -4,10 +4,10 @@ from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
+import trimesh
 from scipy.spatial import Delaunay
 
 from paint_deposition.part.edges import Edges
-from plain_mesh import mean_normals
 
 Depth = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -48,7 +48,7 @@ def solid(
     """
     inward = np.tile([0.0, 1.0, 0.0], (len(vertices_m), 1))
     if drawn_along == 'normals':
-        inward = -mean_normals(vertices_m, faces)
+        inward = -trimesh.Trimesh(vertices_m, faces, process=False).vertex_normals
     inner = vertices_m + thickness_m * inward
     count = len(vertices_m)
     edges = Edges.of(faces).single

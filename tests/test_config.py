@@ -85,6 +85,7 @@ def test_readings_are_readings(config):
     assert all(re.search(rf'\b{name}\b', text) for name in (*REQUIRED, *OPTIONAL))
 
 
+@pytest.mark.slow
 def test_campaign_can_be_read_and_tells_of_every_key(config):
     campaign = read_campaign(config / 'campaign.yaml')
     assert [experiment.name for experiment in campaign.experiments] == ['panel', 'door']

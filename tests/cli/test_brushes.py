@@ -34,6 +34,7 @@ def bag(tmp_path, *changes):
     return write_pose_bag(tmp_path / 'run', motion)
 
 
+@pytest.mark.slow
 def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
     run = bag(tmp_path, (0.5, 1.0, 1), (1.5, 1.0, 2), (2.5, 0.0, 0))
     done = paint(

@@ -18,22 +18,15 @@ def mesh(tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('faces', ['one', 'auto'])
-def test_a_part_that_is_too_near_is_warned_of(faces, mesh, tmp_path):
-    options = ('--faces', faces, '--target-um', 20, '--max-edge-length-m', 0.06)
-    done = paint('plan', '--mesh', mesh, *options, '--keep-off-m', 0.4, '-o', tmp_path / 'near')
-    assert done.returncode == 0
-    assert 'warning: the part is too near before the gun at (' in done.stderr
-
-
-@pytest.mark.slow
 def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(mesh, tmp_path):
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []
-    for more in ((), ('--optimise',)):
+    for more in (('--keep-off-m', 0.4), ('--optimise',)):
         done = paint('plan', '--mesh', mesh, *options, *more, '-o', tmp_path / 'plan')
         assert done.returncode == 0, done.stderr
         plans.append(json.loads(done.stdout))
+        near = 'warning: the part is too near before the gun at (' in done.stderr
+        assert near == ('--keep-off-m' in more)
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert {'trajectory', 'passes.csv', 'passes.mod', 'passes.png', 'film.png'} <= names
     assert len(plans[0]['faces']) == 2

@@ -15,7 +15,7 @@ from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.motion.part_frame import Rigid
 
-DOOR = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.03)
+DOOR = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.05)
 PAINTED = (*DOOR, '--trajectory', SAMPLES / 'door_horizontal')
 
 

@@ -50,6 +50,7 @@ def test_the_pose_of_the_part_brings_poses_to_it(panel, expected, tmp_path):
     assert np.array_equal(simulated(panel, bag, tmp_path / 'out', *quoted)[0], film)
 
 
+@pytest.mark.slow
 def test_poses_of_another_frame_are_warned_of_with_both_names(panel, expected, tmp_path):
     """Taken as they are: the mesh may be in that frame, too."""
     bag = write_pose_bag(tmp_path / 'run', level_pass(frame_id='cell'))

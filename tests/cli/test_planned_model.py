@@ -82,7 +82,7 @@ def test_the_film_is_the_planned_one(motion, exact, plan, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('motion', ['trajectory', 'passes.mod', 'passes.csv'])
+@pytest.mark.parametrize('motion', ['trajectory', 'passes.mod'])
 def test_a_plan_in_the_robots_frame_lays_the_same_film(motion, plan, placed, tmp_path):
     """The bag tells the pose of the part itself; the module has it in its work object."""
     expected, _ = simulated(plan / motion, tmp_path / 'expected')

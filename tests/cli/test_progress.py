@@ -4,6 +4,8 @@ import io
 import time
 from contextlib import redirect_stderr
 
+import pytest
+
 from paint_deposition.cli.progress import Progress
 
 
@@ -20,6 +22,7 @@ def shown(terminal: Terminal, count: int) -> list[str]:
     return [line.strip() for line in terminal.getvalue().split('\r') if line.strip()]
 
 
+@pytest.mark.slow
 def test_the_clock_runs_within_a_step_and_a_known_share_is_a_bar():
     terminal = Terminal()
     with redirect_stderr(terminal), Progress('diagnose', after_s=0.0) as show:

@@ -20,6 +20,7 @@ def cut_run(tmp_path):
     return folder
 
 
+@pytest.mark.slow
 def test_inspect_a_real_bag(shared_data):
     done = paint('inspect', shared_data / 'bags/evo_ROS_example.bag')
     assert done.returncode == 0

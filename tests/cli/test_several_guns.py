@@ -181,6 +181,7 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
     assert campaign.experiments[0].files['trajectory 2'] == str(bags['lower'])
 
 
+@pytest.mark.slow
 def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, tmp_path):
     bell = DepositionModel()
     film = pd.simulate(surface, [UPPER, LOWER], [bell, THIN]).film_um

@@ -104,6 +104,7 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
     assert np.abs(predicted - expected).max() < 1e-4
 
 
+@pytest.mark.slow
 def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel, one_pass, tmp_path):
     readings = tmp_path / 'readings.csv'
     readings.write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0.1,0,0.1,9\n')
@@ -172,6 +173,7 @@ def test_poses_without_numbers_are_refused(panel, tmp_path):
     )
 
 
+@pytest.mark.slow
 def test_some_bad_poses_are_dropped_and_counted(panel, one_pass, tmp_path):
     entries = pose_entries(level_pass())
     messages = Messages()

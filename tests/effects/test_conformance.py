@@ -21,6 +21,7 @@ from booth import (
 )
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
+from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.user_effects import read_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import Ray, in_precision
@@ -34,6 +35,7 @@ TWO_SIDED = [
     if effect.parameters()[name]['low'] < effect.parameters()[name]['neutral']
 ]
 WITH_LAW = [e for e in ALL if e.flux_factor is not None or e.pattern_scale is not None]
+LEARNED_LAWS = [law for law in CURVES.values() if law.flux_factor is not None]
 UNIT_SUFFIXES = {
     'm': '_m', 's': '_s', 'rad': '_rad', 'um': '_um', '1/pass': '_per_pass',
     '1/(m/s)': '_per_m_per_s', '1': '',
@@ -158,7 +160,8 @@ def test_the_kernel_computes_the_law(effect: type[Effect]):
     np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
 
 
-@pytest.mark.parametrize('effect', WITH_LAW, ids=lambda effect: effect.id)
+@pytest.mark.slow
+@pytest.mark.parametrize('effect', [*WITH_LAW, *LEARNED_LAWS], ids=lambda effect: effect.id)
 def test_the_law_stays_in_single_precision(effect: type[Effect]):
     """One number of double precision would carry the whole loop of the kernel into it."""
     ray = Ray(*np.array([0.1, 0.2, 1.7, 0.6, 0.4], np.float32))
@@ -196,15 +199,13 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect],
     np.testing.assert_allclose(readings, sheet[some], rtol=0, atol=tolerance * sheet.max())
 
 
-@pytest.mark.parametrize(('precision', 'tolerance'), [('double', 2e-9), ('single', 3e-6)])
-def test_laws_multiply(precision: str, tolerance: float):
+@pytest.mark.slow
+def test_laws_multiply():
     points = door().points().select(slice(None, None, 7))
     path = path_of(spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
     model = MODEL.model_copy(update={'effects': tuple(chosen)})
-    integrator = FilmIntegrator(points, model, precision)
+    integrator = FilmIntegrator(points, model, 'single')
     integrator.add(path)
     expected = reference_film_um(points, path, model)
-    np.testing.assert_allclose(
-        integrator.raw_um, expected, rtol=0.0, atol=tolerance * expected.max()
-    )
+    np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=3e-6 * expected.max())

@@ -79,5 +79,3 @@ def test_what_is_edited_between_runs_counts_in_the_next(run):
     assert run(gain=4.0) == (pytest.approx(1.0 + 4.0 * 0.25), 0)
     # In a file of its own that the effect's file imports.
     assert run(lift=0.75) == (pytest.approx(1.0 + 2.0 * 0.75), 0)
-    # As it was first: found on disk.
-    assert run() == (pytest.approx(1.0 + 2.0 * 0.25), 1)

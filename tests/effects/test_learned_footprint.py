@@ -27,6 +27,7 @@ def at(x_m: float, y_m: float) -> Ray:
     return Ray(x_m, y_m, 1.1, 0.9, 0.4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('real', 'tolerance'), [(np.float64, 1e-12), (np.float32, 1e-5)])
 def test_the_compiled_factor_is_one_plus_h_in_its_own_precision(real, tolerance):
     compiled = njit(in_precision(LAW.flux_factor, real))

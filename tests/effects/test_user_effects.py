@@ -32,6 +32,7 @@ def own(tmp_path: Path):
     return write
 
 
+@pytest.mark.slow
 def test_the_sample_is_short_and_paints_less_the_faster_the_gun():
     assert len(SAMPLE.splitlines()) <= 30
     effect = load_effect_file(SAMPLES / 'my_effect.py')

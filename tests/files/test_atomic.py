@@ -19,22 +19,3 @@ def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
     monkeypatch.undo()
     assert stat.S_IMODE((tmp_path / 'film.csv').stat().st_mode) == 0o640
     assert os.umask(before) == 0o027
-
-
-def test_content_and_name_are_on_disk_before_it_returns(tmp_path: Path, monkeypatch):
-    calls = []
-    sync, replace = os.fsync, os.replace
-
-    def seen_sync(descriptor: int) -> None:
-        place = os.readlink(f'/proc/self/fd/{descriptor}')
-        calls.append('folder' if Path(place).is_dir() else Path(place).read_text())
-        sync(descriptor)
-
-    def seen_replace(source, target, **options) -> None:
-        calls.append('renamed')
-        replace(source, target, **options)
-
-    monkeypatch.setattr(os, 'fsync', seen_sync)
-    monkeypatch.setattr(os, 'replace', seen_replace)
-    write_text(tmp_path / 'film.csv', 'x_m,y_m')
-    assert calls == ['x_m,y_m', 'renamed', 'folder']

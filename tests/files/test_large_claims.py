@@ -110,12 +110,13 @@ def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
 NESTED = {
     'arrays of RAPID': ('rapid', lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]')),
     'signs of RAPID': ('rapid', lambda: RAPID.replace(b'100*(1+2)', b'-' * 20_000 + b'1')),
-    'lists of a model': ('model', lambda: b'effects: ' + b'[' * 20_000),
-    'lists of a campaign': ('campaign', lambda: b'experiments: ' + b'[' * 20_000),
+    'lists of a model': ('model', lambda: b'effects: ' + b'[' * 4_000),
+    'lists of a campaign': ('campaign', lambda: b'experiments: ' + b'[' * 4_000),
     'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),
 }  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('what', NESTED)
 def test_what_is_nested_without_end_is_refused_in_a_line(what, tmp_path):
     name, content = NESTED[what]

@@ -63,6 +63,7 @@ def test_every_effect_reads_back(effect, tmp_path: Path):
 NUMBERS = st.floats(1e-12, 1.0)
 
 
+@pytest.mark.slow
 @given(NUMBERS, NUMBERS, st.floats(0.005, 1.0), st.floats(0.0, 0.1))
 def test_numbers_read_back_to_the_bit(tmp_path_factory, k1, k2, sigma, shift):
     model = DepositionModel(

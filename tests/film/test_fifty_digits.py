@@ -102,6 +102,7 @@ def _random_path(rng) -> SprayPath:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(('precision', 'tolerance'), [('double', DOUBLE), ('single', SINGLE)])
 def test_the_film_is_right_to_its_last_digits(worlds, precision, tolerance):
     for model, points, path, film in worlds:

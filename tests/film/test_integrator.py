@@ -1,15 +1,10 @@
 """The integral: no paint is lost or invented, and the film does not depend on how it was cut."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
@@ -29,28 +24,17 @@ MODEL = DepositionModel()
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
 )
-SHADED = DepositionModel(effects=(Occlusion(strength=1.0),))
 
 
-def painted(points, motion, model=MODEL, precision='double', occluder=None):
+def painted(points, motion, model=MODEL, precision='double'):
     path = motion if isinstance(motion, SprayPath) else spray_path(motion, 0.25)[0]
-    integrator = FilmIntegrator(points, model, precision, occluder)
+    integrator = FilmIntegrator(points, model, precision)
     integrator.add(path)
     return integrator
 
 
 def largest_error(film, expected):
     return np.abs(film - expected).max() / expected.max()
-
-
-class Screen:
-    """A vertical wall in the plane x = 0: what is left of it is not seen from its right."""
-
-    def sees(self, eyes_m, points_m):
-        return eyes_m[..., 0] * points_m[..., 0] >= 0.0
-
-    def horizon_sines(self, points_m, normals):
-        return np.ones(len(points_m))
 
 
 @pytest.mark.parametrize('tilt_rad', [0.0, 0.3])
@@ -72,6 +56,7 @@ def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
     assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
 
 
+@pytest.mark.slow
 def test_a_long_pass_is_the_flux_integrated_along_it():
     """Every line across the pass has the same film: the flux summed along the direction."""
     speed = 1.2 / 4.0 / 4.0
@@ -85,21 +70,6 @@ def test_a_long_pass_is_the_flux_integrated_along_it():
     flux = NARROW.planar.flux_um_per_s(x, y[:, np.newaxis])
     expected = np.trapezoid(flux, x, axis=1)[::-1] / speed  # tool y is the world's -y
     assert largest_error(film, expected) < 2e-5
-
-
-@settings(max_examples=25)
-@given(cuts=st.lists(st.integers(0, 200), max_size=8), shaded=st.booleans())
-def test_batches_change_no_bit(cuts, shaded):
-    model, occluder = (SHADED, Screen()) if shaded else (MODEL, None)
-    points = lying_plane(0.5, 30)
-    path, _ = spray_path(weaving(np.arange(0.0, 3.0, 0.02)))
-    whole = painted(points, path, model, 'single', occluder)
-    pieces = FilmIntegrator(points, model, 'single', occluder)
-    edges = [0, *sorted(min(cut, len(path)) for cut in cuts), len(path)]
-    for start, stop in pairwise(edges):
-        pieces.add(path.select(slice(start, stop)))
-    assert np.array_equal(pieces.film_um, whole.film_um)
-    assert pieces.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
 
 
 # The weaving way at 0.3 m/s with a tool that sways, as a robot's log may show it.
@@ -210,31 +180,6 @@ def test_moving_part_and_gun_together_changes_nothing():
     assert largest_error(painted(moved, moved_log).film_um, still) < 1e-9
     single = painted(moved, moved_log, precision='single').film_um
     assert largest_error(single, still) < 2e-6
-
-
-def test_a_screen_takes_the_paint_from_behind_it():
-    points = lying_plane(0.5, 30)
-    right = straight_pass(np.linspace(0, 1, 51), (0.1, -0.2, 0.25), (0.1, 0.2, 0.25))
-    open_, shaded = painted(points, right), painted(points, right, SHADED, occluder=Screen())
-    left = points.positions_m[:, 0] < 0.0
-    assert np.all(shaded.film_um[left] == 0.0)
-    assert np.allclose(shaded.film_um[~left], open_.film_um[~left], rtol=1e-12)
-
-
-@pytest.mark.parametrize('count', [1, 2])
-def test_shadows_reach_over_batches_on_few_points(count):
-    """What was seen last holds for the next batch until the gun has moved on."""
-    points = SurfacePoints(
-        np.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])[:count], np.tile([0, 0, 1.0], (count, 1))
-    )
-    path, _ = spray_path(
-        straight_pass(np.linspace(0, 1, 51), (0.1, 0.0, 0.25), (0.1, 0.009, 0.25))
-    )
-    film = FilmIntegrator(points, SHADED, occluder=Screen())
-    for row in range(len(path)):
-        film.add(path.select(slice(row, row + 1)))
-    assert film.film_um[0] == 0.0
-    assert np.all(film.film_um[1:] > 0.0)
 
 
 def test_progress_names_the_sub_steps_done():

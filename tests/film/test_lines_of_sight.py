@@ -15,7 +15,6 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from scenes import straight_pass
-from surfaces import triangulated
 
 OPEN = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03))
 SHADED = OPEN.with_effect(Occlusion(strength=0.8))
@@ -32,13 +31,6 @@ def tray():
     ]
     whole = concatenate(walls)
     return Surface.from_triangles(whole.vertices, np.asarray(whole.faces), 0.03)
-
-
-@pytest.fixture(scope='module')
-def bulge():
-    return Surface.from_triangles(
-        *triangulated(lambda x, z: 0.3 * (x**2 + z**2), 0.02, 0.4, 0.25), 0.03
-    )
 
 
 @pytest.fixture(scope='module')
@@ -95,23 +87,3 @@ def test_a_prepared_path_serves_a_wider_pattern(tray, path):
     film = FilmIntegrator(tray.points(), wide, 'double', tray.occluder)
     film.add(path)
     assert np.abs(prepared.film_um - film.film_um).max() < 1e-5 * film.film_um.max()
-
-
-@pytest.mark.parametrize(('part', 'most'), [('tray', 0.35), ('bulge', 0.001)])
-def test_most_points_need_no_ray(part, most, request, path):
-    surface = request.getfixturevalue(part)
-
-    class Counting:
-        rays = 0
-
-        def sees(self, eyes_m, points_m):
-            self.rays += len(points_m)
-            return surface.occluder.sees(eyes_m, points_m)
-
-        def horizon_sines(self, points_m, normals):
-            return surface.occluder.horizon_sines(points_m, normals)
-
-    counting = Counting()
-    FilmIntegrator(surface.points(), SHADED, 'single', counting).add(path)
-    tracings = 1.0 / SIGHT_STEP_M
-    assert counting.rays < most * tracings * len(surface.vertices_m)

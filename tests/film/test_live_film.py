@@ -63,6 +63,7 @@ def _painted(events, model=MODEL, **options):
     return film
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'model', [MODEL, LAGGING, DRIFTING], ids=['plain', 'whole strokes', 'over time']
 )
@@ -87,6 +88,7 @@ def test_looking_at_the_film_changes_nothing():
     assert np.array_equal(film.up_to_date().film_um, _offline(motion, LAGGING).film_um)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('batch', [1, 25])
 @pytest.mark.parametrize('delay_s', [0.0, 0.05, 0.0999])
 def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
@@ -98,6 +100,7 @@ def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
     assert film.counts.late_triggers == 0
 
 
+@pytest.mark.slow
 def test_a_state_that_comes_too_late_is_counted_and_counts_from_there_on():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = _painted(_events(motion, 1, state_delay_s=0.15))

@@ -6,6 +6,7 @@
 import os
 
 import numpy as np
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
@@ -97,6 +98,7 @@ def offline(points: SurfacePoints, motion: Trajectory, model: DepositionModel) -
     return integrator
 
 
+@pytest.mark.slow
 @many
 @given(points=parts(), motion=motions(), model=models())
 def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, model):
@@ -111,6 +113,7 @@ def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, mod
         assert landed_cm3 <= 1.3 * film.emitted_cm3
 
 
+@pytest.mark.slow
 @many
 @given(
     points=parts(), motion=motions(), model=models(),

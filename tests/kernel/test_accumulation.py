@@ -3,20 +3,10 @@
 import numba
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
-from paint_deposition.film.layout import model_constants, step_rows
-from paint_deposition.kernel.blocks import (
-    LANES,
-    LARGEST_BLOCK,
-    SMALLEST_BLOCK,
-    Blocks,
-)
-from paint_deposition.kernel.eq2_flux import within_reach
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
@@ -85,6 +75,7 @@ def test_the_pattern_shift_moves_the_pattern_over_the_model_plane():
     assert np.allclose(shifted, moved, rtol=0, atol=2e-6 * moved.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('precision', ['single', 'double'])
 def test_what_is_left_out_of_reach_is_nothing(precision):
     """A small pattern on a large plane: most blocks are skipped most of the time."""
@@ -97,31 +88,6 @@ def test_what_is_left_out_of_reach_is_nothing(precision):
     expected = reference_film_um(points, path, model)
     error = np.abs(film_um(points, path, model, precision) - expected)
     assert error.max() < 1e-6 * expected.max()
-
-
-@settings(max_examples=200)
-@given(seed=st.integers(0, 100_000), share=st.floats(0.0, 0.9999))
-def test_no_block_with_a_lit_point_is_skipped(seed, share):
-    """A point within the cone, and any sphere that has it on its surface."""
-    rng = np.random.default_rng(seed)
-    path, _ = spray_path(weaving(rng.uniform(0.0, 9.0) + np.linspace(0.0, 0.02, 2)))
-    model = DepositionModel(
-        planar=PlanarPattern(r_m=rng.uniform(0, 0.2), sigma1_m=0.03, sigma2_m=0.04)
-    )
-    row, constants = step_rows(model, path, np.zeros(3))[0], model_constants(model)[0]
-    along = rng.uniform(1.001 * model.projection.nearest_m, 1.0)
-    aside = share * model.reach_m * along / model.projection.model_plane_m
-    angle = rng.uniform(-np.pi, np.pi)
-    in_tool = np.array([aside * np.cos(angle), aside * np.sin(angle), along])
-    lit = row[:3] + path.rotation[0] @ in_tool
-    for radius in (0.0, 0.01, 0.3):
-        centre = lit + radius * Rotation.random(rng=rng).apply([0.0, 0.0, 1.0])
-        assert within_reach(np.append(centre, radius), row, constants)
-        # The worst place: at right angles to the cone.
-        slope = model.reach_m / model.projection.model_plane_m
-        out = path.rotation[0] @ np.array([np.cos(angle), np.sin(angle), -slope])
-        out /= np.linalg.norm(out)
-        assert within_reach(np.append(lit + radius * out, radius), row, constants)
 
 
 def test_the_number_of_threads_changes_no_bit():
@@ -138,24 +104,3 @@ def test_the_number_of_threads_changes_no_bit():
         numba.set_num_threads(threads)
     assert films[0].max() > 1.0
     assert np.array_equal(films[0], films[1])
-
-
-@pytest.mark.parametrize('count', [1, 2, 31, 33, 1000, 5000])
-def test_blocks_hold_every_point_once_within_their_spheres(count):
-    rng = np.random.default_rng(count)
-    positions = rng.normal(0.0, 1.0, (count, 3)) + 7.0
-    normals = Rotation.random(count, rng=rng).apply([0.0, 0.0, 1.0])
-    blocks = Blocks.of(positions, normals, np.float64)
-    assert sorted(blocks.order.tolist()) == list(range(count))
-    assert np.allclose(blocks.points.T + blocks.origin_m, positions[blocks.order], atol=1e-14)
-    assert np.array_equal(blocks.normals.T, normals[blocks.order])
-    sizes = np.diff(blocks.bounds)
-    assert sizes.sum() == count
-    assert np.all((sizes > 0) & (sizes <= LARGEST_BLOCK))
-    full = sizes.max()
-    assert np.count_nonzero(sizes != full) <= 1
-    if count > SMALLEST_BLOCK:
-        assert full % LANES == 0
-    for block, (start, stop) in enumerate(zip(blocks.bounds, blocks.bounds[1:], strict=False)):
-        away = np.linalg.norm(blocks.points[:, start:stop].T - blocks.spheres[block, :3], axis=1)
-        assert away.max() <= blocks.spheres[block, 3] * (1 + 1e-12) + 1e-15

@@ -46,14 +46,6 @@ def empty_cache(tmp_path, monkeypatch):
     return tmp_path
 
 
-@pytest.mark.usefixtures('empty_cache')
-def test_compiled_code_is_found_again():
-    assert scaling(2.0)(10.0) == 20.0
-    again = scaling(2.0)
-    assert again(10.0) == 20.0
-    assert sum(again.stats.cache_hits.values()) == 1
-
-
 def test_variants_have_files_of_their_own_so_that_processes_cannot_swap_them(empty_cache):
     assert [scaling(factor)(10.0) for factor in (2.0, 3.0)] == [20.0, 30.0]
     assert len(list(empty_cache.rglob('*.nbi'))) == 2

@@ -8,6 +8,8 @@ from numba import njit
 
 from paint_deposition.kernel.fast_math import exp, exp2, log, power
 
+pytestmark = pytest.mark.slow
+
 
 @njit
 def exp2_all(x):

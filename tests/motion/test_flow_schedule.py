@@ -19,29 +19,6 @@ def flow_at(flow, stamps):
     return flows[np.searchsorted(cuts, stamps, side='right')]
 
 
-def test_without_changes_the_gun_always_sprays():
-    flow = schedule([])
-    assert not flow
-    assert flow_at(flow, [-5, 0, 10**18]).tolist() == [1.0, 1.0, 1.0]
-
-
-def test_before_the_first_change_the_gun_is_off():
-    flow = schedule([(10, 1.0), (20, 0.0), (30, 0.5)])
-    assert flow_at(flow, [0, 9, 10, 19, 20, 30, 99]).tolist() == [0, 0, 1, 1, 0, 0.5, 0.5]
-
-
-def test_a_state_that_is_repeated_cuts_nothing():
-    flow = schedule([(stamp, 1.0 if stamp >= 30 else 0.0) for stamp in range(0, 100, 10)])
-    cuts, flows, _ = flow.steps()
-    assert cuts.tolist() == [30]
-    assert flows.tolist() == [0.0, 1.0]
-
-
-def test_of_changes_at_one_time_the_last_to_come_counts():
-    assert flow_at(schedule([(10, 1.0), (10, 0.0)]), [10]).tolist() == [0.0]
-    assert flow_at(schedule([(5, 1.0), (10, 0.0), (10, 1.0)]), [10]).tolist() == [1.0]
-
-
 @given(
     changes=st.lists(
         st.tuples(st.integers(0, 50), st.sampled_from([0.0, 0.5, 1.0])),
@@ -76,11 +53,3 @@ def test_beginning_again_keeps_what_came_early_for_it():
     assert flow.restart() == 2
     assert flow_at(flow, [10, 60, 1500]).tolist() == [0.0, 1.0, 1.0]
     assert flow.restart() == 0
-
-
-def test_beginning_again_after_forgetting_closes_the_gun():
-    flow = schedule([(10, 1.0), (20, 0.0), (30, 1.0)])
-    flow.forget(35)
-    flow.restart()
-    assert flow
-    assert flow_at(flow, [0, 15, 40]).tolist() == [0.0, 0.0, 0.0]

@@ -57,6 +57,7 @@ def to_and_fro(times_s=TIMES_S):
     )
 
 
+@pytest.mark.slow
 @given(sizes=st.lists(st.integers(1, 60), min_size=1, max_size=6), whole_strokes=st.booleans())
 def test_batches_do_not_matter_to_the_last_bit(sizes, whole_strokes):
     trajectory = to_and_fro(TIMES_S[(TIMES_S < 1.0) | (TIMES_S > 1.4)])

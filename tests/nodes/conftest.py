@@ -56,10 +56,13 @@ def onlooker(ros_context, spin):
 
 @pytest.fixture
 def call(wait_until):
-    """`call(node, type, name, request)`: the response of a service."""
+    """`call(node, type, name, request)`: the response of a service, found once."""
+    clients = {}
 
     def call(node, service, name, request):
-        client = node.create_client(service, name)
+        if (node, name) not in clients:
+            clients[node, name] = node.create_client(service, name)
+        client = clients[node, name]
         wait_until(client.service_is_ready, what=f'service {name}')
         future = client.call_async(request)
         wait_until(future.done, what=f'answer of {name}')

@@ -12,7 +12,7 @@ pytest.importorskip('rclpy')
 from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
 
-from nodes.cell import Onlooker, Robot, two_passes, write_panel
+from nodes.cell import Robot, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.nodes.runtime import topics
@@ -67,26 +67,16 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
 
 
 def test_a_folder_that_cannot_be_written_is_told_in_a_line(
-    ros_domain, ros_context, spin, wait_until, read_only, tmp_path
+    ros_domain, simulator, onlooker, call, read_only, tmp_path
 ):
     with NodeProcess(tmp_path / 'rec', 'run_recorder', output_directory=read_only) as recorder:
         assert recorder.wait() == 2
         (line,) = recorder.err.splitlines()
         assert line.startswith(f'error: cannot create {read_only}/run_')
         assert line.endswith('Read-only file system')
-    mesh = write_panel(tmp_path / 'panel.stl')
-    caller = Onlooker(ros_context, {})
-    spin(caller)
-    with NodeProcess(
-        tmp_path / 'sim', 'deposition_simulator', mesh_file=mesh, output_directory=read_only,
-        **COARSE,
-    ) as sim:  # fmt: skip
-        client = caller.create_client(SaveFilm, '/deposition_simulator/save_film')
-        wait_until(client.service_is_ready, what='the service')
-        future = client.call_async(SaveFilm.Request(name='film'))
-        wait_until(future.done, what='the answer')
-        assert not future.result().success
-        assert 'Read-only file system' in future.result().message
-        assert '\n' not in future.result().message
-        sim.terminate()
-        assert sim.wait() == 0, sim.err
+    simulator(output_directory=str(read_only))
+    request = SaveFilm.Request(name='film')
+    saved = call(onlooker({}), SaveFilm, '/deposition_simulator/save_film', request)
+    assert not saved.success
+    assert 'Read-only file system' in saved.message
+    assert '\n' not in saved.message

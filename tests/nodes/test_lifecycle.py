@@ -27,7 +27,6 @@ from nodes.cell import (
     values_of,
     write_panel,
 )
-from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
@@ -254,14 +253,6 @@ class Slow(ManagedNode):
 
 sys.exit(run_node(Slow))
 """
-
-
-def test_an_interrupt_breaks_off_what_a_manager_let_it_load(ros_domain, wait_until, tmp_path):
-    with NodeProcess(tmp_path / 'slow', '', code=SLOW, autostart='false') as process:
-        wait_until(lambda: 'loading' in process.out, what='the node')
-        process.interrupt_as_launch_does()
-        assert process.wait() == 0
-        assert 'Traceback' not in process.err
 
 
 def of_this_process() -> tuple[int, int]:

@@ -24,7 +24,6 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import topics
 
 SIMULATOR = 'deposition_simulator'
-COMPARISON = 'model_comparison'
 PLAYER = 'bag_player'
 RECORDER = 'run_recorder'
 EDGE_M = 0.03
@@ -39,49 +38,22 @@ def call(onlooker, call):
     return partial(call, onlooker({}))
 
 
-def test_a_bag_gives_one_film_at_any_rate_live_and_offline(ros_domain, call, wait_until, tmp_path):
-    mesh = write_panel(tmp_path / 'panel.stl')
-    bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=1000))
-    simulator = NodeProcess(
-        tmp_path / 'simulator',
-        SIMULATOR,
-        mesh_file=mesh,
-        output_directory=tmp_path,
-        **COARSE,
-    )
-    with simulator:
-        for name, rate in (('fast', 0.0), ('double', 2.0)):
-            with NodeProcess(
-                tmp_path / name, PLAYER, bag=bag, state_topic='/atomizer/state', rate=rate
-            ) as player:
-                wait_until(lambda p=player: p.exit_code is not None, what=name)
-                assert player.exit_code == 0, player.err
-            saved = call(SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name=name))
-            assert saved.success, saved.message
-            assert call(Trigger, '/deposition_simulator/reset', Trigger.Request()).success
-        simulator.interrupt_as_launch_does()
-        assert simulator.wait() == 0, simulator.err
-    assert (tmp_path / 'fast.csv').read_bytes() == (tmp_path / 'double.csv').read_bytes()
-    live = np.loadtxt(tmp_path / 'fast.csv', delimiter=',', skiprows=1)
-    surface = read_mesh(mesh, 1.0, EDGE_M)
-    integrator = FilmIntegrator(surface.points(), DepositionModel(), 'double')
-    integrator.add(spray_path(read_trajectory(bag, None, '/atomizer/state'))[0])
-    offline = integrator.film_um
-    assert offline.max() > 5.0
-    assert np.abs(live[:, 3] - offline).max() < 1e-6 * offline.max()
-
-
-def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wait_until, tmp_path):
+def test_a_replay_waits_for_who_is_still_loading_and_gives_the_offline_film(
+    ros_domain, call, onlooker, wait_until, tmp_path
+):
     """The recorder is there at once, the simulator seconds later; both get every pose."""
     mesh = write_panel(tmp_path / 'panel.stl')
     bag = write_pose_bag(tmp_path / 'motion', two_passes(poses=300))
+    replay = {'bag': bag, 'state_topic': '/atomizer/state', 'wait_for_subscribers': 2}
     statistics = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)})
     with (
-        NodeProcess(tmp_path / 'player', PLAYER, bag=bag, wait_for_subscribers=2) as player,
+        NodeProcess(tmp_path / 'player', PLAYER, **replay) as player,
         NodeProcess(
             tmp_path / 'recorder', RECORDER, output_directory=tmp_path, name='run'
         ) as recorder,
-        NodeProcess(tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, **COARSE) as simulator,
+        NodeProcess(
+            tmp_path / 'simulator', SIMULATOR, mesh_file=mesh, output_directory=tmp_path, **COARSE
+        ) as simulator,
     ):
         wait_until(lambda: player.exit_code is not None, what='the replay')
         assert player.exit_code == 0, player.err
@@ -89,11 +61,19 @@ def test_a_replay_waits_for_who_is_still_loading(ros_domain, call, onlooker, wai
             lambda: statistics.shows('thickness/stats', lambda m: m.poses_received == 300),
             what='every pose painted',
         )
+        saved = call(SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name='film'))
+        assert saved.success, saved.message
         assert call(Trigger, '/run_recorder/stop', Trigger.Request()).success
         assert recorder.wait() == 0, recorder.err
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
     assert len(read_trajectory(tmp_path / 'run')) == 300
+    live_um = np.loadtxt(tmp_path / 'film.csv', delimiter=',', skiprows=1)[:, 3]
+    integrator = FilmIntegrator(read_mesh(mesh, 1.0, EDGE_M).points(), DepositionModel(), 'double')
+    integrator.add(spray_path(read_trajectory(bag, None, '/atomizer/state'))[0])
+    offline_um = integrator.film_um
+    assert offline_um.max() > 1.0
+    assert np.abs(live_um - offline_um).max() < 1e-6 * offline_um.max()
 
 
 def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(

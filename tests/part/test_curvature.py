@@ -8,6 +8,7 @@ def well_inside(points, margin_m=0.04, half_width_m=0.2):
     return np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < half_width_m - margin_m
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('radius_m', [0.25, 0.5, 2.0, -0.3, -1.0])
 @pytest.mark.parametrize(('spacing_m', 'jitter'), [(0.01, 0.0), (0.02, 0.3)])
 def test_cylinder(make_surface, cylinder, radius_m, spacing_m, jitter):

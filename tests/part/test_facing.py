@@ -2,17 +2,10 @@
 
 import numpy as np
 
-from paint_deposition.part.facing import Facing, facing, toward_the_gun
+from paint_deposition.part.facing import facing, toward_the_gun
 
 EYES = np.array([[0.0, -0.25, 0.0], [0.1, -0.25, 0.1], [-0.1, -0.25, 0.0], [3.0, -0.25, 0.0]])
 AHEAD = np.tile([0.0, 1.0, 0.0], (4, 1))
-
-
-def test_counts_front_and_back(make_surface, ball):
-    surface = make_surface(ball(0.5), 0.05)
-    assert facing(surface, EYES, AHEAD) == Facing(front=3, back=0)
-    assert facing(surface, EYES * [1, -3, 1], -AHEAD) == Facing(front=0, back=3)
-    assert facing(surface, EYES, -AHEAD) == Facing(front=0, back=0)
 
 
 def test_a_part_that_faces_the_gun_stays_as_it_is(make_surface, ball):

@@ -57,6 +57,7 @@ def test_the_door_is_a_clean_sheet_that_stands(door):
     assert (door.normals[:, 1] < -0.8).all()
 
 
+@pytest.mark.slow
 def test_the_script_draws_the_door_again(samples, tmp_path):
     subprocess.run([sys.executable, samples / 'make_door.py', tmp_path], check=True)
     for name in ('door.stl', 'panel.stl'):

@@ -88,6 +88,7 @@ def test_a_hood_lies_in_the_booth_and_its_front_is_below(triangles):
     assert downhill_axis(surface.outward, surface.down)[0] < -0.98
 
 
+@pytest.mark.slow
 def test_readings_see_the_covariates_of_the_vertices_they_lie_on(make_surface, cylinder):
     points = make_surface(cylinder(-0.3), 0.02).points()
     surface = make_surface(cylinder(-0.3), 0.02)

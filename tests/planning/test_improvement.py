@@ -214,19 +214,6 @@ def test_impossible_limits_are_named(panel, even, wanted, words):
 # --- files and models
 
 
-@pytest.mark.slow
-def test_bag_and_robot_program_lay_the_same_film(levelled, panel, tmp_path):
-    pd.write(levelled, tmp_path)
-    films = [
-        pd.simulate(panel, pd.read_recording(tmp_path / name), SKEWED).film_um
-        for name in ('trajectory', 'passes.mod', 'passes.csv')
-    ]
-    np.testing.assert_allclose(films[0], levelled.after.film_um, rtol=1e-6)
-    for film in films[1:]:
-        assert np.abs(film - films[0]).max() < 1e-3 * films[0].max()
-    assert levelled.program_difference < 1e-3
-
-
 def _known(**widths):
     """What is known of the bell: these standard deviations, next to none else."""
     p = SKEWED.planar

@@ -18,6 +18,8 @@ from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
 from planning.test_surface_map import sheet
 
+pytestmark = pytest.mark.slow
+
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.1, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )

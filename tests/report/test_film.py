@@ -55,6 +55,7 @@ def draw(tmp_path, film_um, path, **options):
     return (255 * imread(file)[:, :, :3]).round().astype(int)
 
 
+@pytest.mark.slow
 def test_the_film_is_coloured_and_bare_metal_is_grey(tmp_path):
     log = serpentine((0.5,))
     film = painted(door(), log).film_um
@@ -90,6 +91,7 @@ def colour_bar(figure, pixels) -> tuple[np.ndarray, np.ndarray]:
     return pixels[len(pixels) - 1 - rows, int(box.x0 + 0.5 * box.width)], film
 
 
+@pytest.mark.slow
 def test_the_film_is_read_back_from_the_picture_through_its_colour_bar():
     surface = door()
     # Thin to thick along a slant, on a door whose creases any light would show.

@@ -139,26 +139,6 @@ def test_flow_grows_by_the_amplitude_a_pass(name):
     assert first < 1.0 < last
 
 
-def test_a_bent_bracket_keeps_its_pivot():
-    place = scene()
-    truth = hidden('tcp_tilt~bent_bracket', 0.05, pivot_m=0.1)
-    found = truth.on_motion(place.nominal, place)
-    pivots = [m.tcp_m - 0.1 * m.turn[:, :, 2] for m in (place.nominal, found)]
-    assert np.allclose(*pivots)
-    turned = np.sum(found.turn[:, :, 2] * place.nominal.turn[:, :, 2], axis=1)
-    assert np.allclose(turned, np.cos(0.05))
-
-
-def test_a_swinging_door_moves_at_its_lower_edge():
-    place = scene()
-    found = hidden('part_misalignment~swing', 0.01, side=1.0).on_motion(place.nominal, place)
-    hanger = np.array([0.0, 0.9])
-    before, after = (m.tcp_m[:, 1:] - hanger for m in (place.nominal, found))
-    assert np.allclose(np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1))
-    moved = np.linalg.norm(after - before, axis=1) / np.linalg.norm(before, axis=1)
-    assert np.allclose(moved, 0.01 / 0.9, rtol=1e-3)
-
-
 @pytest.mark.parametrize('effect', ['pattern_spread', 'air_drift'])
 def test_droplets_of_mean_size_are_carried_alike_by_every_form(effect):
     plume = conner_plume(PATTERN, 1 << 12, seed=1)
@@ -192,11 +172,6 @@ def test_every_fluid_runs_down_and_none_is_lost(name):
     left = after.sum() + (0.1 / 20.0**3 * 5.0**3) / (z[1] - z[0]) * (name == 'sag')
     assert left == pytest.approx(bump.sum(), rel=2e-4)
     assert (after * z).sum() < (bump * z).sum()
-
-
-def test_below_the_yield_stress_nothing_moves():
-    thin = np.full((1, 50), 7.9)
-    assert np.array_equal(hidden('sag~yield', 0.3).run_down(thin, 0.02), thin)
 
 
 @pytest.mark.parametrize('name', [*forms('fog_gradient'), *forms('overspray_fog')])

@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import trimesh
 
 from . import conner
 from .bench import still_air
@@ -54,7 +53,7 @@ def test_pattern_scales_with_its_lengths():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('tilt_deg', [0.0, 25.0])
+@pytest.mark.parametrize('tilt_deg', [25.0])
 def test_all_solids_of_a_still_gun_are_on_a_wide_plane(tilt_deg):
     plane = Part('panel', 2.4, 2.4)
     tilt = np.deg2rad(tilt_deg)
@@ -89,27 +88,6 @@ def test_clean_film_on_a_door_is_equation_2():
     assert abs(np.mean(film - theory)) < 0.05
     assert np.std(film - theory) / theory.mean() < 0.01
     assert np.std(film - theory) < 0.3
-
-
-@pytest.mark.slow
-def test_parcels_land_where_embree_finds_the_surface():
-    rng = np.random.default_rng(2)
-    door = draw_door(rng)
-    motion = drive(door, Plan(index_m=0.3, passes=3), rng)
-    x, z = scatter(door, 100, rng, 0.02)
-    cut = slices(motion, lambda t: PATTERN.K1_cm3_per_s * motion.commanded(t))
-    plume = conner_plume(PATTERN, 1 << 17, seed=5)
-    landed = fly(door, cut, plume, still_air(cut, plume), door.point(x, z), 0.30, 0.05, 200_000)
-    tcp, turn = motion.pose(landed.time_s)
-    start = tcp - 0.05 * turn[:, :, 2]
-    mesh = trimesh.Trimesh(*door.surface_mesh(0.006), process=False)
-    found, ray, _ = mesh.ray.intersects_location(start, landed.position_m - start, False)
-    assert ray.size > 0.999 * start.shape[0]
-    assert np.linalg.norm(found - landed.position_m[ray], axis=1).max() < 5e-4
-    normal = door.normal(landed.position_m[:, 0], landed.position_m[:, 2])
-    flight = landed.position_m - start
-    cos = -np.sum(flight * normal, axis=1) / np.linalg.norm(flight, axis=1)
-    assert np.abs(cos - landed.cos_incidence).max() < 0.01
 
 
 def test_curvature_is_that_of_the_height_function():

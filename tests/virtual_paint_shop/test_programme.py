@@ -12,6 +12,8 @@ from .gauge import GaugeNoise, scatter
 from .programme import Painted, motion_of
 from .truths import library
 
+pytestmark = pytest.mark.slow
+
 PARCELS = 300_000
 
 

@@ -184,24 +184,6 @@ def test_wet_film_runs_down():
     assert centre(film, COLUMN[1]) < centre(clean, COLUMN[1]) - 0.002
 
 
-@pytest.mark.parametrize('name', ['unknown:masking_tape', 'unknown:poor_ground'])
-def test_local_causes_only_take_paint(name):
-    grid = np.meshgrid(np.linspace(-0.4, 0.4, 15), np.linspace(0.1, 0.9, 15))
-    clean, film = change(name, (grid[0].ravel(), grid[1].ravel()), 0.3, passes=3)
-    gain = film / np.maximum(clean, 1e-6)
-    assert gain.max() <= 1.0
-    assert 0.65 < gain.min() < 0.8
-
-
-def test_ripples():
-    clean, film = change('unknown:thermal_stripe', ROW, 0.1, drawn={'wavelength_m': 0.3})
-    assert np.ptp(film / clean) == pytest.approx(0.2, abs=0.01)
-    clean, film = change('unknown:pump_pulsation', ROW, 0.3)
-    assert 0.02 < np.ptp(film / clean) < 0.6
-    clean, film = change('unknown:charge_swirl', ROW, 0.03)
-    assert np.std(film - clean) > 0.01
-
-
 @pytest.mark.parametrize('name', sorted(n for n in library() if n.startswith('footprint:')))
 def test_other_bells_keep_the_solids_and_change_the_shape(name):
     clean, film = change(name, COLUMN, 0.5, drawn={'angle_rad': 0.3})

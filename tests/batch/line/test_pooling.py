@@ -11,6 +11,8 @@ from paint_deposition.batch.line.pooling import amplitudes, pooled
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 
+pytestmark = pytest.mark.slow
+
 FIRST = amplitudes()[0]
 
 

@@ -64,10 +64,10 @@ def test_a_run_is_another_case_when_its_readings_have_changed(line):
 
 
 @pytest.mark.slow
-def test_a_line_without_any_run_that_can_be_used_says_why(line, tmp_path):
+def test_a_line_without_any_run_that_can_be_used_says_why(line, tmp_path, at_worker):
     folder, names = line
     (folder / 'door.stl').write_text('solid nothing\nendsolid nothing\n')
-    done = paint('line', folder, '-o', tmp_path / 'out', '--workers', 1)
+    done = paint('line', folder, '-o', tmp_path / 'out', *at_worker)
     done.stderr = done.stderr.partition('\n')[2]  # which workers there are
     assert_refused(done, 'none of 5 runs can be used', names[0], 'door.stl')
 

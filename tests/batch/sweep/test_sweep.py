@@ -73,7 +73,7 @@ def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_worker):
     output = tmp_path / 'out'
     told = json.loads(installed_paint('sweep', sweep_file, '-o', output, '--json').stdout)
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
@@ -81,7 +81,7 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
     first = pq.read_table(output / 'cases.parquet')
     kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
-    again = json.loads(paint('sweep', sweep_file, '-o', output, '--workers', 1, '--json').stdout)
+    again = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
     assert again['computed'] == 1
     assert pq.read_table(output / 'cases.parquet').equals(first)
     assert first['speed_factor'].to_pylist() == SPEEDS * 2
@@ -117,19 +117,19 @@ def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path,
 
 
 @pytest.mark.slow
-def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
+def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_worker):
     """Names of files and lists of effects are drawn over, too; a bare part is no best case."""
     told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
     told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     assert done.returncode == 0, done.stderr
     assert 'warning: case 1: ' in done.stderr
     assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
     assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
     told['cases'] = told['cases'][:1] * 2
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', '--workers', 1)
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     done.stderr = done.stderr.splitlines()[-1]  # after the notes
     assert_refused(done, 'none of 2 cases has a result; case 1: ')
 

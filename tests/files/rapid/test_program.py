@@ -239,6 +239,7 @@ def planned_moves(draw) -> list[Move]:
     return moves
 
 
+@pytest.mark.slow
 @given(moves=planned_moves())
 def test_what_is_written_is_read_back(tmp_path_factory, moves):
     path = tmp_path_factory.mktemp('rapid') / 'passes.mod'

@@ -192,6 +192,7 @@ def test_a_folder_of_several_recordings_asks_for_one(tmp_path):
     assert 'name one of them: monday_0.mcap tuesday_0.mcap' in text
 
 
+@pytest.mark.slow
 def test_no_flipped_bit_goes_unnoticed(tmp_path):
     """Chunks carry checksums: a damaged file is refused or reads exactly as it was written."""
     written = straight_pass(400)

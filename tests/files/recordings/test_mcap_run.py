@@ -7,7 +7,6 @@ import sys
 
 import pytest
 import yaml
-from mcap.reader import make_reader
 from mcap.records import Channel, Header, Metadata, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
@@ -96,19 +95,6 @@ def test_records_in_the_file(run):
     assert isinstance(found[-2], Statistics) or any(isinstance(r, Statistics) for r in found)
 
 
-def test_time_ordered_readers_have_their_indexes(run):
-    with (run / 'run_0.mcap').open('rb') as stream:
-        reader = make_reader(stream)
-        summary = reader.get_summary()
-        assert summary.chunk_indexes
-        assert summary.chunk_indexes[0].message_index_offsets
-        assert not summary.attachment_indexes
-        messages = [
-            (c.topic, m.log_time, m.publish_time, m.data) for _, c, m in reader.iter_messages()
-        ]
-    assert messages == [('/gun', 2_000, 1_900, TRUE_CDR), ('/gun', 5_000, 4_900, FALSE_CDR)]
-
-
 @pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
 def test_other_readers_agree(tmp_path, compression):
     with RunWriter(tmp_path / 'run', compression=compression) as writer:
@@ -185,6 +171,7 @@ with RunWriter(sys.argv[1], compression='none') as writer:
 """
 
 
+@pytest.mark.slow
 def test_the_first_refused_write_is_the_last(tmp_path, repository):
     """A limit on the file's size fails exactly as a full disk: some bytes, then an error."""
     run = tmp_path / 'run'

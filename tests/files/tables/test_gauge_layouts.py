@@ -288,6 +288,7 @@ def refused_or_read(path):
         assert len(read_readings(path)) > 0
 
 
+@pytest.mark.slow
 @settings(max_examples=150, deadline=None)
 @given(data=st.data())
 def test_no_damaged_file_is_worse_than_refused(tmp_path_factory, data):

@@ -89,7 +89,7 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     )
     assert len(node.surface.faces) > 100_000
     viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
-    motion = two_passes(poses=1500, trigger=False)
+    motion = two_passes(poses=750, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
     player = 'bag_player'
     with NodeProcess(tmp_path / 'player', player, bag=bag) as replay:

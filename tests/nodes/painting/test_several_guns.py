@@ -12,7 +12,7 @@ pytest.importorskip('rclpy')
 
 from paint_msgs.msg import ThicknessField, ThicknessStats
 
-from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes, values_of, write_panel
+from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes, values_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
@@ -128,20 +128,6 @@ def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until)
         ),
         what=str(status),
     )
-
-
-def test_a_part_drawn_inside_out_is_turned_whoever_comes_first(simulator, guns, painted,
-                                                               wait_until, tmp_path):  # fmt: skip
-    """The second gun's poses may turn it before the first gun's first pose has come."""
-    reverse = write_panel(tmp_path / 'reverse.stl', reverse=True)
-    node = simulator(atomizers=GUNS, mesh_file=str(reverse))
-    first, second = guns(node)
-    second.send(LOW)
-    painted(node, len(LOW))
-    wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned')
-    first.send(HIGH)
-    film = painted(node, len(HIGH) + len(LOW))
-    assert np.array_equal(film, offline_um(node, HIGH) + offline_um(node, LOW))
 
 
 def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait_until):

@@ -17,7 +17,7 @@ from paint_deposition.files.model_file import read_model, write_model
 MOTION = two_passes()
 
 
-@pytest.mark.parametrize('effect', ['incidence_attraction', 'corner_slowdown', 'sag'])
+@pytest.mark.parametrize('effect', ['incidence_attraction', 'corner_slowdown'])
 def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, wait_until,
                                                     tmp_path, effect):  # fmt: skip
     model = DepositionModel().with_effect(effect_class(effect).typical())

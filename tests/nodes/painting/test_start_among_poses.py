@@ -28,7 +28,7 @@ def test_no_pose_is_left_out_while_it_activates_itself(
     monkeypatch.setenv('PYTHONPATH', str(repository / 'tests'), prepend=':')
     with NodeProcess(tmp_path / 'robot', '', code=STREAM) as robot:
         wait_until(lambda: 'ready' in robot.out, what='the robot')
-        for _ in range(5):
+        for _ in range(3):
             node = simulator(publish_rate_hz=1.0)
             wait_until(lambda node=node: node.film.counts.received > 100, what='poses painted')
             assert node.inputs[0].unpainted == 0

@@ -6,23 +6,7 @@ pytest.importorskip('rclpy')
 
 from files.recorded import straight_pass
 from nodes.processes import NodeProcess
-from nodes.replay.listener import recorded
 from paint_deposition.files.recordings.bags import write_pose_bag
-
-
-def test_the_process_ends_with_what_it_did(ros_domain, listen, wait_until, pass_bag, tmp_path):
-    listener = listen()
-    with NodeProcess(
-        tmp_path / 'player',
-        'bag_player',
-        bag=pass_bag,
-        state_topic='/atomizer/state',
-        rate='0.0',
-    ) as process:
-        wait_until(lambda: process.exit_code is not None, what='the end')
-        assert process.exit_code == 0
-        assert 'replayed 700 poses, 2 states' in process.err
-    assert listener.poses == recorded(pass_bag)
 
 
 def test_an_interrupt_ends_a_waiting_player(ros_domain, wait_until, pass_bag, tmp_path):

@@ -69,7 +69,7 @@ class Blocks:
             origin,
             np.ascontiguousarray(local, dtype=precision),
             np.ascontiguousarray(normals.T, dtype=precision).take(order, axis=1),
-            np.column_stack([centre.T, radius]),
+            np.ascontiguousarray(np.column_stack([centre.T, radius])),
             bounds,
         )
 

@@ -46,6 +46,7 @@ class RecordedTopic:
         self.messages = self.messages_before = 0
         self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
+        self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
         package, kind, message = type_name.split('/')
@@ -89,7 +90,9 @@ class RecordedTopic:
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
-        self._take(self.name, cdr, info['received_timestamp'], info['source_timestamp'])
+        # Readers order messages by it; a busy middleware's times of receipt go back a little.
+        self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
+        self._take(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
     def _count_missed(self, info: Mapping[str, Any]) -> None:
         number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
