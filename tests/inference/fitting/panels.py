@@ -1,5 +1,7 @@
 """Panels of the virtual paint shop as campaigns, and campaigns that the model itself painted."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -82,16 +84,34 @@ def column(low_m=0.1, high_m=1.9, count=40, x_m=0.0) -> np.ndarray:
     return np.stack([np.full(count, x_m), np.zeros(count), z], axis=1)
 
 
-def gauged(model: DepositionModel, seed: int, columns: int = 3) -> Campaign:
-    """A panel painted by a model, two readings a point, with noise and texture as assumed."""
+ORDERS = ((0.3, 1.1, 0.7, 1.5), (1.5, 0.7, 1.1, 0.3))
+
+
+def gauged(
+    model: DepositionModel,
+    seed: int,
+    columns: int = 3,
+    orders: Sequence[Sequence[float]] = ORDERS[:1],
+) -> Campaign:
+    """Panels painted by a model, two readings a point, with noise and texture as assumed.
+
+    Args:
+        seed: of noise and texture.
+        columns: of readings.
+        orders: heights of the passes on each panel, in their order [m].
+    """
     x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.03, 1.97, 20))
     points_m = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
-    path, _ = spray_path(passes((0.3, 1.1, 0.7, 1.5), samples=80))
-    integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
-    integrator.add(path)
-    texture = np.random.default_rng([seed, 1]).normal(1.0, TEXTURE_SHARE, x.size)
-    readings = readings_at(points_m, integrator.gauge_um * texture, noise_um=0.7, seed=seed)
-    return Campaign((Experiment.of('panel', PANEL, path, readings),))
+    panels = []
+    for number, heights_m in enumerate(orders):
+        path, _ = spray_path(passes(heights_m, samples=80))
+        integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
+        integrator.add(path)
+        random = np.random.default_rng([seed, 1 + number])
+        film_um = integrator.gauge_um * random.normal(1.0, TEXTURE_SHARE, x.size)
+        readings = readings_at(points_m, film_um, noise_um=0.7, seed=seed + 100 * number)
+        panels.append(Experiment.of(f'panel {number + 1}', PANEL, path, readings))
+    return Campaign(tuple(panels))
 
 
 def painted_by(
