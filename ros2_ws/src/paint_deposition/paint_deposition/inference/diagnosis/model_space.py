@@ -31,6 +31,8 @@ SURE = 0.8
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
 DRAWS = 1000
+# A deviation of the footprint shows from this many of its standard deviations on.
+SHOWS = 2.0
 # So many sizes of the remainder are kept at most, of nature and beyond it, and none whose share
 # of the posterior is smaller.
 MOST_SIZES, LEAST_SHARE = 4, 0.02
@@ -129,7 +131,8 @@ class RemainderFigures:
         setting_share, part_share: by how much the film of a setting differs from any law, and
             parts of one setting from each other, as shares of the thickest film.
         length_m: over which neighbours differ alike [m].
-        footprint_of_peak: largest deviation of the footprint from eq. (1), over its peak.
+        footprint_of_peak: largest deviation of the footprint from eq. (1) that shows, over its
+            peak.
     """
 
     setting_share: float
@@ -140,10 +143,15 @@ class RemainderFigures:
     def __str__(self) -> str:
         setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
         parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
+        footprint = (
+            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak'
+            if peak
+            else 'no deviation of the footprint from two Gaussians shows'
+        )
         return (
             f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
             f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm; '
-            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak.'
+            f'{footprint}.'
         )
 
 
@@ -257,13 +265,18 @@ class ModelSpace:
     def figures(self) -> RemainderFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
         null = self.central.null
-        amplitudes = null.whiten(self.remainder.footprint).T @ null.deviation
+        seen = null.whiten(self.remainder.footprint)
+        mean = self.remainder.of_peak @ (seen.T @ null.deviation)
+        spread = np.eye(seen.shape[1]) - seen.T @ seen
+        sd = np.sqrt(
+            np.einsum('kn,nm,km->k', self.remainder.of_peak, spread, self.remainder.of_peak)
+        )
         found = [one.sizes for one in self.nature]
         return RemainderFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.remainder.lengths_m[one.length] for one in found]),
-            float(np.abs(self.remainder.of_peak @ amplitudes).max()),
+            float(np.max(np.abs(mean), where=np.abs(mean) > SHOWS * sd, initial=0.0)),
         )
 
 

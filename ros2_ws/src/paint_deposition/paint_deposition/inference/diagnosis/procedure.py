@@ -182,6 +182,8 @@ def _conclude(run: Run, best: Trial, p_value: float) -> Diagnosis:
 def _others(run: Run, best: Trial) -> tuple[EffectClass, ...]:
     """Effects that may act beside those that were accepted."""
     known = {member for found in run.accepted for member in found.members}
+    if run.testable:
+        known |= set(run.testable[0])
     found = []
     for cause in best.space.alone:
         probability = best.space.inclusion(cause)
