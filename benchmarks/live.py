@@ -31,7 +31,7 @@ RATE_HZ = 250
 SPEED_M_PER_S = 0.5
 RECORDER = 'run_recorder'
 WATCHED = (
-    '', 'thickness/changes', 'thickness/field', 'thickness/cloud', 'thickness/mesh', RECORDER,
+    '', 'thickness/field', 'thickness/cloud', 'thickness/mesh', RECORDER,
 )  # fmt: skip
 # Poses before are not counted: queues and caches fill.
 WARM_S = 2.0

@@ -129,14 +129,13 @@ class Effect(BaseModel):
     signature: ClassVar[str] = ''
     rivals: ClassVar[tuple[str, ...]] = ()
     source: ClassVar[str] = ''
-    # Covariates along which the law may be off, each with the direction in which a law of any form
-    # over it must go: it rises (1), falls (-1), or either (0).
+    # Covariates along which the law may be off, each with the way in which the film goes with it:
+    # it rises (1), falls (-1), or either (0).
     covariates: ClassVar[Mapping[str, int]] = over()
-    # The range of a covariate in which the effect acts at all; default everywhere.
-    acts_within: ClassVar[Mapping[str, tuple[float, float]]] = over()
-    # What such a law is: a 'factor' on what arrives or an 'addition' to the film; '' where a curve
-    # over a covariate is not that effect.
+    # What a law of any form over them would be: a 'factor' on what arrives or an 'addition' to the
+    # film; '' where a curve over a covariate is not that effect.
     free_law: ClassVar[str] = ''
+    # Whether the law is exact, as that of a wrong offset: then it cannot be off.
     exact: ClassVar[bool] = False
     # What the cell must switch off for the effect to vanish: 'voltage', 'draught', or '' where
     # nothing does.

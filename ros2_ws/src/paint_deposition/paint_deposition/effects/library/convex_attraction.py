@@ -1,7 +1,5 @@
 """Attraction to convex lines and corners."""
 
-import math
-
 import numpy as np
 
 from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, over, parameter
@@ -19,7 +17,6 @@ class ConvexAttraction(Effect):
     family = 'curvature'
     needs = 'voltage'
     covariates = over(curvature_per_m=-1)
-    acts_within = over(curvature_per_m=(-math.inf, 0.0))
     free_law = 'factor'
     signature = 'a ridge along convex lines, whichever way the passes run'
     rivals = ('gauge_curvature_bias',)

@@ -1,7 +1,5 @@
 """Recesses that the field does not reach."""
 
-import math
-
 import numpy as np
 
 from paint_deposition.effects.base import REFERENCE_CURVATURE_PER_M, Effect, over, parameter
@@ -20,7 +18,6 @@ class FaradayShielding(Effect):
     family = 'curvature'
     needs = 'voltage'
     covariates = over(curvature_per_m=-1, sky_view_factor=1)
-    acts_within = over(curvature_per_m=(0.0, math.inf))
     free_law = 'factor'
     signature = 'concave zones low, whichever way the passes run'
     rivals = ('gauge_curvature_bias', 'occlusion')

@@ -47,9 +47,9 @@ MOST_OF_FLUX = 1.0
 OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.02
 # Distance between parts that share no field, and step of the pattern's sideways move [m].
 FAR_M, STEP_M = 1e6, 1e-3
-# Paths that keep within this distance [m], angle of the axis [rad] and share of the time are the
-# same; they are compared at this many places.
-SAME_PATH_M, SAME_AXIS_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
+# Paths that keep within this distance [m], angle [rad] and share of the time are the same; they are
+# compared at this many places.
+SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 
 @dataclass(frozen=True)
@@ -269,8 +269,9 @@ def _alike(first: Experiment, second: Experiment) -> bool:
         for clock in clocks
     ]
     places = [e.path.position_m[r] for e, r in zip((first, second), rows, strict=True)]
-    axes = [e.path.rotation[r][:, :, 2] for e, r in zip((first, second), rows, strict=True)]
+    turns = [e.path.rotation[r] for e, r in zip((first, second), rows, strict=True)]
     return bool(
         np.abs(places[0] - places[1]).max() < SAME_PATH_M
-        and np.abs(axes[0] - axes[1]).max() < SAME_AXIS_RAD
+        and np.abs(turns[0] - turns[1]).max() < SAME_TURN_RAD
+        and np.abs(first.surface.down - second.surface.down).max() < SAME_TURN_RAD
     )
