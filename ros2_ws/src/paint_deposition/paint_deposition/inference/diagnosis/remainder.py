@@ -47,8 +47,8 @@ MOST_OF_FLUX = 1.0
 OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.02
 # Distance between parts that share no field, and step of the pattern's sideways move [m].
 FAR_M, STEP_M = 1e6, 1e-3
-# Paths that keep within this distance [m], angle [rad] and share of the time are the same; they are
-# compared at this many places.
+# Paths that keep within this distance [m], angle [rad] and share of the time are the same.
+# They are compared at this many places.
 SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 

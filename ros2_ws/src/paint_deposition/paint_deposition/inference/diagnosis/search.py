@@ -196,7 +196,8 @@ class Search:
 
     def stages(self) -> list[Stage]:
         """From nothing to the best set, each with one effect more than the one before."""
-        found, here = [], self.nothing
+        found: list[Stage] = []
+        here = self.nothing
         while True:
             room = len(here.names) < MOST_EFFECTS
             stage = Stage(here, [self.with_effect(here, name) for name in here.proposed if room])
