@@ -53,10 +53,12 @@ environment_fingerprint() {
     } | sha256sum
 }
 
-# What compiled messages depend on besides their own sources.
+# What compiled messages depend on besides their own sources: code generated from a message that is
+# gone would stay, so the names of all messages count.
 toolchain_fingerprint() {
     {
         printf '%s\n' "$root" "$(ros_source)"
+        (cd "$workspace/src/paint_msgs" && find . -type f | sort)
         grep '^version' "$venv/pyvenv.cfg"
         cat "$root/requirements/ros.txt" "$root/setup/workspace.sh"
     } | sha256sum
