@@ -154,7 +154,7 @@ class Diagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""
-        return (*self.warnings, *self.study.notes, *self.left_over)
+        return (*self.warnings, *self.left_over, *self.study.notes)
 
     @property
     def left_over(self) -> tuple[str, ...]:
