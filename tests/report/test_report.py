@@ -36,8 +36,11 @@ CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')
 
 @pytest.fixture(scope='module')
 def diagnosis(tmp_path_factory):
+    """What a diagnosis that is sure of a draught would say."""
     campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    return replace(refit(campaign, DepositionModel(), AirDrift), library=EFFECTS)
+    found = refit(campaign, DepositionModel(), AirDrift)
+    sure = replace(found.classes[0], probability=0.97)
+    return replace(found, verdict='effect_missing', classes=(sure,), library=EFFECTS)
 
 
 @pytest.fixture(scope='module')
