@@ -43,6 +43,10 @@ def log_odds(probability: float) -> float:
     return float(np.log(probability / (1.0 - probability)))
 
 
+# Of something unknown over a covariate, and of a setting beyond nature.
+LOG_ODDS_UNKNOWN = log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
+
+
 class CauseEvidence:
     """Log evidence of each explanation alone, against one null model.
 
@@ -98,8 +102,7 @@ class CauseEvidence:
 
 def log_share(explanation: Explanation) -> float:
     """Logarithm of the prior odds of an explanation at one size against nothing missing."""
-    unknown = explanation.cause == UNKNOWN
-    odds = log_odds(PRIOR_UNKNOWN) - np.log(2.0) if unknown else log_odds(PRIOR_EFFECT)
+    odds = LOG_ODDS_UNKNOWN if explanation.cause == UNKNOWN else log_odds(PRIOR_EFFECT)
     return float(odds + np.log(explanation.share / len(SIZES)))
 
 
@@ -119,7 +122,7 @@ class Weighed(NamedTuple):
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
         prior = sizes.log_prior + float(np.log(share))
         if sizes.is_beyond_nature:
-            prior += log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
+            prior += LOG_ODDS_UNKNOWN
         return Weighed(sizes, null, evidence + prior)
 
 
