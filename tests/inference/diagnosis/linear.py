@@ -97,7 +97,10 @@ def no_remainder(count: int) -> Remainder:
     """Nothing that nature leaves over at so many readings."""
     none = np.zeros((count, count))
     lengths_m = (0.02, 0.05, 0.1)
-    return Remainder(none[:, :1], none[:1, :1], none, 3 * (none,), 3 * (none,), False, lengths_m)
+    fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
+    return Remainder(
+        none[:, :1], none[:1, :1], none, fields, fields, False, lengths_m, one_setting
+    )  # fmt: skip
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

@@ -86,6 +86,7 @@ class Remainder:
             painted alike.
         is_repeated: whether any were.
         lengths_m: of these fields [m].
+        setting_of: (P,) number of the setting of each point, see ``painted_alike``.
     """
 
     footprint: np.ndarray
@@ -95,6 +96,7 @@ class Remainder:
     parts: tuple[np.ndarray, ...]
     is_repeated: bool
     lengths_m: tuple[float, ...]
+    setting_of: np.ndarray
 
     @staticmethod
     def of(study: Study, fit: Fit) -> 'Remainder':
@@ -105,7 +107,7 @@ class Remainder:
         thickest = np.array([film[owner == k].max() for k in range(len(campaign.experiments))])
         scale = np.sqrt(film * thickest[owner]) / study.sigma_um
         group = painted_alike(campaign.experiments)
-        repeated = (np.bincount(group)[group] > 1)[owner]
+        repeated, setting_of = (np.bincount(group)[group] > 1)[owner], group[owner]
         lengths_m = tuple(length * _width_m(model) for length in LENGTHS)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
@@ -114,17 +116,17 @@ class Remainder:
 
         return Remainder(
             *_footprint(study, model),
-            _shapes(study, fit, group[owner]),
-            tuple(field(group[owner], scale, length_m) for length_m in lengths_m),
+            _shapes(study, fit, setting_of),
+            tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
             bool(repeated.any()),
             lengths_m,
+            setting_of,
         )
 
     def around(self, study: Study, fit: Fit) -> 'Remainder':
         """The same where pattern and place of a spray vary as around another fit."""
-        group = painted_alike(study.campaign.experiments)[study.campaign.experiment_of]
-        return replace(self, shapes=_shapes(study, fit, group))
+        return replace(self, shapes=_shapes(study, fit, self.setting_of))
 
     def choices(self) -> list[Sizes]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
