@@ -99,7 +99,8 @@ def no_remainder(count: int) -> Remainder:
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
     return Remainder(
-        none[:, :1], none[:1, :1], none, fields, fields, False, lengths_m, one_setting
+        3 * (none[:, :1],), 3 * (none[:1, :1],), none, fields, fields, False, lengths_m,
+        one_setting,
     )  # fmt: skip
 
 

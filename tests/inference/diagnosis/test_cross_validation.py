@@ -115,7 +115,7 @@ def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> Line
     null = NullModel.of(np.hstack([base.columns, *effects]), base.raw + change)
     study = Points(np.full(POINTS, SIGMA_UM) if sigma_um is None else sigma_um)
     names = frozenset(f'effect {k}' for k in range(len(forms)))
-    return LinearTrial(LinearRun(study), names, null, NOTHING_LEFT, [Sizes(0.0, 0.0, 0, 0.0)])
+    return LinearTrial(LinearRun(study), names, null, NOTHING_LEFT, [Sizes(0.0, 0.0, 0, 0, 0.0)])
 
 
 def stages_of(change: np.ndarray, **options) -> list[Stage]:
@@ -180,7 +180,7 @@ def test_what_acts_lowers_the_nested_error_to_the_noise():
 
 
 def test_a_law_must_say_more_than_any_footprint_could():
-    wave = replace(NOTHING_LEFT, footprint=3.0 * CURVES[0].columns)
+    wave = replace(NOTHING_LEFT, footprint=(3.0 * CURVES[0].columns,))
     stages = [replace(one, here=replace(one.here, usual=wave)) for one in stages_of(WAVE)]
     assert nested(stages[-1:]) == pytest.approx([nested(stages_of(WAVE))[0]] * (1 + MOST_LAWS))
 

@@ -37,7 +37,7 @@ READINGS, NULL_RUNS = 60, 300
 CHANCE = 0.01
 # Places along a part, and the film over the noise.
 PLACE, FILM = np.linspace(0.0, 3.0, READINGS), 40.0
-SMALL, LARGE, BEYOND = (Sizes(share, 0.0, 1, 0.0) for share in (0.006, 0.06, BEYOND_NATURE))
+SMALL, LARGE, BEYOND = (Sizes(share, 0.0, 1, 2, 0.0) for share in (0.006, 0.06, BEYOND_NATURE))
 # A change that neighbours share, and one that they do not, of one length.
 WAVE = np.sin(2.0 * PLACE)
 JAGGED = np.linalg.norm(WAVE) * np.linalg.qr(
@@ -56,6 +56,10 @@ def field(columns: np.ndarray, share: float = 1.0) -> Explanation:
     return Explanation(UNKNOWN, columns, np.zeros(columns.shape[1]), share)
 
 
+# Sizes of the footprint, over the largest.
+SHARES = (0.1, 0.3, 1.0)
+
+
 @pytest.fixture
 def remainder() -> Remainder:
     """Smooth fields along the part, and one deviation of the footprint."""
@@ -63,7 +67,10 @@ def remainder() -> Remainder:
     fields = tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0))
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
     return replace(
-        no_remainder(READINGS), settings=fields, footprint=footprint, of_peak=0.1 * np.eye(1)
+        no_remainder(READINGS),
+        settings=fields,
+        footprint=tuple(size * footprint for size in SHARES),
+        of_peak=tuple(size * 0.1 * np.eye(1) for size in SHARES),
     )
 
 
@@ -263,8 +270,8 @@ def test_the_size_that_made_the_readings_is_found(plain, remainder):
 
 
 def test_the_deviation_of_the_footprint_is_told(plain, remainder):
-    loud = replace(remainder, footprint=3.0 * remainder.footprint)
-    there = shifted(plain, 2.0 * loud.footprint[:, 0])
+    loud = replace(remainder, footprint=tuple(3.0 * c for c in remainder.footprint))
+    there = shifted(plain, 2.0 * loud.footprint[SMALL.footprint][:, 0])
     figures = space_of(there, [], loud).figures
     assert figures.footprint_of_peak == pytest.approx(0.2, abs=0.02)
     assert figures.length_m == remainder.lengths_m[SMALL.length]
@@ -278,8 +285,9 @@ def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, remainder):
     without, with_it = (probable_sizes(there, remainder, e, np.inf) for e in ([], [edge]))
     for kept in (without, with_it):
         beyond = [size.is_beyond_nature for size in kept]
-        assert 0 < beyond.count(False) <= MOST_SIZES
-        assert 0 < beyond.count(True) <= MOST_SIZES
+        assert {size.footprint for size in kept} == set(range(len(SHARES)))
+        assert beyond.count(False) <= MOST_SIZES * len(SHARES)
+        assert beyond.count(True) == len(SHARES)
     assert min(s.setting for s in with_it) < min(s.setting for s in without)
     weights = [Weighed.of(there, remainder, s, np.inf).log_weight for s in without
                if not s.is_beyond_nature]  # fmt: skip

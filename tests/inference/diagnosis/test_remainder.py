@@ -10,7 +10,7 @@ from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.remainder import (
-    FOOTPRINT,
+    FOOTPRINTS,
     LENGTHS,
     RADII,
     SIDEWAYS,
@@ -102,7 +102,7 @@ def test_parts_painted_alike_share_the_setting_and_differ_by_the_part(study, rem
 def test_parts_painted_otherwise_share_the_footprint_alone(study, remainder):
     for sizes in remainder.choices():
         assert not between(study, remainder.of_parts(sizes), DOOR, FIRST).any()
-    assert between(study, remainder.of_footprint, DOOR, FIRST).any()
+        assert between(study, remainder.of_footprint(sizes), DOOR, FIRST).any()
 
 
 def test_fields_fall_with_the_root_of_the_film_and_with_the_distance(alone):
@@ -139,18 +139,19 @@ def knots_m(alone) -> np.ndarray:
 def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_flux(
     alone, knots_m
 ):
-    of_peak = alone[1].of_peak.reshape(RADII, WAVES, -1)
-    sd = np.sqrt(np.sum(of_peak[:, 1:] ** 2, axis=2))
     flux = mean_flux(knots_m)
-    expected = np.minimum(FOOTPRINT, flux)[:, np.newaxis]
-    assert sd == pytest.approx(np.repeat(expected, WAVES - 1, axis=1), rel=0.05)
-    at_peak = flux.argmax()
-    assert sd[at_peak] == pytest.approx(FOOTPRINT, rel=0.05)
-    assert flux[-1] < 0.05 * FOOTPRINT
+    for size, of_peak in zip(FOOTPRINTS, alone[1].of_peak, strict=True):
+        sd = np.sqrt(np.sum(of_peak.reshape(RADII, WAVES, -1)[:, 1:] ** 2, axis=2))
+        expected = np.minimum(size, flux)[:, np.newaxis]
+        assert sd == pytest.approx(np.repeat(expected, WAVES - 1, axis=1), rel=0.05)
+        assert sd[flux.argmax()] == pytest.approx(size, rel=0.05)
+    assert flux[-1] < min(FOOTPRINTS)
 
 
 def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
-    tails = alone[1].of_peak.reshape(RADII, WAVES, -1)[:, :, :2]
+    tails = alone[1].of_peak[0].reshape(RADII, WAVES, -1)[:, :, :2]
+    for of_peak in alone[1].of_peak:
+        assert np.array_equal(of_peak.reshape(RADII, WAVES, -1)[:, :, :2], tails)
     assert not tails[:, 1:].any()
     step = 1e-4
     for k, power in enumerate(((1.0 + step, 1.0), (1.0, 1.0 + step))):
@@ -161,12 +162,13 @@ def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
 
 def test_the_footprint_changes_the_readings_as_its_knots_say(alone):
     study, remainder = alone
-    amounts = np.random.default_rng(1).normal(size=remainder.footprint.shape[1])
+    columns, of_peak = remainder.footprint[-1], remainder.of_peak[-1]
+    amounts = np.random.default_rng(1).normal(size=columns.shape[1])
     basis = footprint_basis(study, MODEL, RADII)
     flux = np.repeat(mean_flux(np.linspace(0.0, basis.settings['reach_m'], RADII)), WAVES)
-    relative = remainder.of_peak @ amounts / flux
+    relative = of_peak @ amounts / flux
     expected = basis.film_um @ relative / study.sigma_um
-    assert remainder.footprint @ amounts == pytest.approx(expected, abs=1e-3)
+    assert columns @ amounts == pytest.approx(expected, abs=1e-3)
 
 
 def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):

@@ -34,7 +34,7 @@ def nested_rmse_um(
         found = _found_without(stages, out)
         plain = run.plain(found.fit)
         beside = found.beside(found.fit).select(~out)
-        footprint = found.remainder.of_footprint[np.ix_(~out, ~out)]
+        footprint = found.remainder.of_footprint(found.best.sizes)[np.ix_(~out, ~out)]
         kept = [option.select(~out) for option in options]
         laws = choose_laws(beside, footprint, kept, run.freedom)
         learned = [size * options[k].columns for k, size in laws]

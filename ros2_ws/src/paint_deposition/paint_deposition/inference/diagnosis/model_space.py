@@ -33,9 +33,9 @@ CREDIBLE = 0.95
 DRAWS = 1000
 # A deviation of the footprint shows from this many of its standard deviations on.
 SHOWS = 2.0
-# So many sizes of the remainder are kept at most, of nature and beyond it, and none whose share
-# of the posterior is smaller.
-MOST_SIZES, LEAST_SHARE = 4, 0.02
+# Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
+# the posterior is smaller: with more effects another footprint may be the more probable one.
+MOST_SIZES, LEAST_SHARE = 2, 0.02
 
 
 def log_odds(probability: float) -> float:
@@ -268,12 +268,11 @@ class ModelSpace:
     def figures(self) -> RemainderFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
         null = self.central.null
-        seen = null.whiten(self.remainder.footprint)
-        mean = self.remainder.of_peak @ (seen.T @ null.deviation)
+        size = self.nature[int(self.share.argmax())].sizes.footprint
+        seen, of_peak = null.whiten(self.remainder.footprint[size]), self.remainder.of_peak[size]
+        mean = of_peak @ (seen.T @ null.deviation)
         spread = np.eye(seen.shape[1]) - seen.T @ seen
-        sd = np.sqrt(
-            np.einsum('kn,nm,km->k', self.remainder.of_peak, spread, self.remainder.of_peak)
-        )
+        sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
         found = [one.sizes for one in self.nature]
         return RemainderFigures(
             float(self.share @ [one.setting for one in found]),
@@ -306,10 +305,11 @@ def probable_sizes(
         with_law = one.log_weight + log_odds(PRIOR_EFFECT) + float(best)
         found.append((float(np.logaddexp(one.log_weight, with_law)), sizes))
     kept = []
-    for beyond in (False, True):
-        here = sorted((f for f in found if f[1].is_beyond_nature == beyond), key=lambda f: -f[0])
+    for kind in dict.fromkeys((s.is_beyond_nature, s.footprint) for _, s in found):
+        here = [(w, s) for w, s in found if (s.is_beyond_nature, s.footprint) == kind]
         least = float(np.logaddexp.reduce([weight for weight, _ in here])) + np.log(LEAST_SHARE)
-        kept += [sizes for weight, sizes in here[:MOST_SIZES] if weight > least]
+        most = sorted(here, key=lambda one: -one[0])[: 1 if kind[0] else MOST_SIZES]
+        kept += [sizes for weight, sizes in most if weight > least]
     return kept
 
 

@@ -137,7 +137,7 @@ def _learn(
     """
     without: set[str] = set()
     beside = best.beside(run.fit)
-    footprint = best.remainder.of_footprint
+    footprint = best.remainder.of_footprint(best.best.sizes)
     while True:
         enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
         left = [option for option in options if option.learns not in without]

@@ -24,9 +24,9 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
-# The footprint deviates by this share of its peak, as a standard deviation, at any place. That is
-# wide on purpose: what a footprint could show as well is no effect, however large it is.
-FOOTPRINT = 0.2
+# The footprint deviates by one of these shares of its peak, as a standard deviation, at any place.
+# What readings allow a footprint to show as well is no effect; how far it goes they tell, too.
+FOOTPRINTS = (0.02, 0.06, 0.2)
 # Sizes that are considered for settings and single parts, as shares of the part's thickest film,
 # and the prior of each: its median, and the factor that is one standard deviation. They fall with
 # the root of the film: sprays of flat fans differ by 0.5 to 5 % of the peak, a third as much where
@@ -58,13 +58,14 @@ class Sizes:
 
     Attributes:
         setting, part: shares of the thickest film; the latter 0 where no parts were painted alike.
-        length: number among LENGTHS.
+        length, footprint: numbers among LENGTHS and FOOTPRINTS.
         log_prior: of this choice, among those of nature or among those beyond it.
     """
 
     setting: float
     part: float
     length: int
+    footprint: int
     log_prior: float
 
     @property
@@ -78,8 +79,9 @@ class Remainder:
     """What nature leaves over at P points, over the noise.
 
     Attributes:
-        footprint: (P, n) deviations that all parts share, for amplitudes of unit variance.
-        of_peak: (K, n) what they are at the knots of a footprint, as shares of its peak.
+        footprint: for each size (P, n), deviations that all parts share, for amplitudes of unit
+            variance.
+        of_peak: for each (K, n), what they are at the knots of a footprint, as shares of its peak.
         shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
         settings, parts: for each length (P, P), covariances of fields of size one over parts
             painted alike together, and over each by itself; of the latter only where parts were
@@ -89,8 +91,8 @@ class Remainder:
         setting_of: (P,) number of the setting of each point, see ``painted_alike``.
     """
 
-    footprint: np.ndarray
-    of_peak: np.ndarray
+    footprint: tuple[np.ndarray, ...]
+    of_peak: tuple[np.ndarray, ...]
     shapes: np.ndarray
     settings: tuple[np.ndarray, ...]
     parts: tuple[np.ndarray, ...]
@@ -115,7 +117,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
-            *_footprint(study, model),
+            *_footprints(study, model),
             _shapes(study, fit, setting_of),
             tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
@@ -133,12 +135,12 @@ class Remainder:
         parts = PARTS if self.is_repeated else (0.0,)
         found = [
             Sizes(
-                setting, part, length,
+                setting, part, length, footprint,
                 (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
                 + (_log_prior(part, *USUAL_PART) if part else 0.0),
             )
-            for setting, part, length in product(
-                (*SETTINGS, BEYOND_NATURE), parts, range(len(LENGTHS))
+            for setting, part, length, footprint in product(
+                (*SETTINGS, BEYOND_NATURE), parts, range(len(LENGTHS)), range(len(FOOTPRINTS))
             )
         ]  # fmt: skip
         total = {
@@ -153,12 +155,12 @@ class Remainder:
 
     def covariance(self, sizes: Sizes) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
-        return self.of_footprint + self.of_parts(sizes)
+        return self.of_footprint(sizes) + self.of_parts(sizes)
 
-    @property
-    def of_footprint(self) -> np.ndarray:
+    def of_footprint(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of the footprint, which all parts share."""
-        return self.footprint @ self.footprint.T
+        columns = self.footprint[sizes.footprint]
+        return columns @ columns.T
 
     def of_parts(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of settings and of parts."""
@@ -171,17 +173,24 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
     return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
 
 
-def _footprint(study: Study, model: DepositionModel) -> tuple[np.ndarray, np.ndarray]:
+def _footprints(
+    study: Study, model: DepositionModel
+) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
     basis = footprint_basis(study, model, RADII)
     flux, tails = _flux_and_tails(model.patterns, basis)
-    share = np.minimum(FOOTPRINT / flux, MOST_OF_FLUX)[:, np.newaxis]
-    roots = [
-        share * basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
-        for length in FOOTPRINT_LENGTHS
-    ]
-    at_knots = np.hstack([TAILS * tails, *roots])
-    columns = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-    return columns, flux[:, np.newaxis] * at_knots
+    fields = np.hstack(
+        [
+            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
+            for length in FOOTPRINT_LENGTHS
+        ]
+    )
+    columns, of_peak = [], []
+    for size in FOOTPRINTS:
+        share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
+        at_knots = np.hstack([TAILS * tails, share * fields])
+        columns.append(basis.film_um @ at_knots / study.sigma_um[:, np.newaxis])
+        of_peak.append(flux[:, np.newaxis] * at_knots)
+    return tuple(columns), tuple(of_peak)
 
 
 def _flux_and_tails(
