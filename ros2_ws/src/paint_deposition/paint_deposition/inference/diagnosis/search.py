@@ -162,6 +162,7 @@ class Search:
     def __init__(self, run: Run) -> None:
         self.run = run
         self._trials: dict[frozenset[str], Trial] = {}
+        self._tried: set[frozenset[str]] = set()
         laws = [*of_effects(run.study, run.fit, run.candidates)]
         usual = Remainder.of(run.study, run.fit)
         sizes = probable_sizes(run.plain(run.fit), usual, laws, run.freedom)
@@ -171,7 +172,8 @@ class Search:
     def with_effect(self, parent: Trial, name: str) -> Trial:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
         names = parent.names | {name}
-        if names not in self._trials:
+        if names not in self._tried:
+            self._tried.add(names)
             self._refitted(parent.effects | {name: parent.space.by_law(name)}, parent)
         return self._trials[names]
 
@@ -201,15 +203,28 @@ class Search:
         while True:
             room = len(here.names) < MOST_EFFECTS
             stage = Stage(here, [self.with_effect(here, name) for name in here.proposed if room])
-            best = stage.chosen()
-            if best is here:
-                return [*found, stage]
-            again = self.without(best, *(best.names - here.names))
+            again = self._in_another_pattern(stage)
             if again is not here:
                 here = again
                 continue
+            best = stage.chosen()
+            if best is here:
+                return [*found, stage]
             found.append(stage)
             here = best
+
+    def _in_another_pattern(self, stage: Stage) -> Trial:
+        """The set of a stage, where a larger one has led to a pattern that suits it better."""
+        here = stage.here
+        for trial in sorted(stage.tried, key=lambda one: -one.log_weight_alone):
+            gain = (
+                trial.log_weight_alone - trial.log_prior - here.log_weight_alone + here.log_prior
+            )
+            again = self.without(trial, *(trial.names - here.names)) if gain > SAME else here
+            if again is not here:
+                self._tried = {names for names in self._tried if not names > here.names}
+                return again
+        return here
 
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
         """The set without effects that do not stand, and what could stand in place of each.
