@@ -117,7 +117,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
-            *_footprints(study, model),
+            *_footprints(study, fit),
             _shapes(study, fit, setting_of),
             tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
@@ -174,8 +174,10 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
 
 
 def _footprints(
-    study: Study, model: DepositionModel
+    study: Study, fit: Fit
 ) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    model=fit.model
+    q = np.linalg.qr(fit.jacobian[:, :len(fit.parameters.pattern)])[0]
     basis = footprint_basis(study, model, RADII)
     flux, tails = _flux_and_tails(model.patterns, basis)
     fields = np.hstack(
@@ -188,7 +190,8 @@ def _footprints(
     for size in FOOTPRINTS:
         share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
         at_knots = np.hstack([TAILS * tails, share * fields])
-        columns.append(basis.film_um @ at_knots / study.sigma_um[:, np.newaxis])
+        of_readings = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
+        of_readings[:,2:] -= q @ (q.T @ of_readings[:,2:]); columns.append(of_readings)
         of_peak.append(flux[:, np.newaxis] * at_knots)
     return tuple(columns), tuple(of_peak)
 
