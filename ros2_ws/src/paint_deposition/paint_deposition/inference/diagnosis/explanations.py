@@ -32,6 +32,8 @@ LAW_ERROR, LAW_LENGTH = 0.3, 1.0
 LARGEST = 0.95
 # Laws of any form: typical size of a factor, and of an addition [um].
 FACTOR, ADDITION_UM = 0.05, 0.7
+# Typical deviation of a footprint, as a share of the flux at the place.
+OF_FLUX = 0.15
 # Their lengths of correlation: over a covariate in its standard deviations, over the part [m], and
 # over the radius of the pattern in steps.
 LENGTHS = {'covariate': (0.35, 1.0), 'place': (0.1, 0.25), 'footprint': (2.0, 6.0)}
@@ -113,7 +115,7 @@ def of_footprint(study: Study, model: DepositionModel) -> list[Explanation]:
     if model.effect(basis.law.id) is not None:
         return []
     lengths = LENGTHS['footprint']
-    return [of_random(study, basis.random(FACTOR, n, centred=True), 1.0 / len(lengths))
+    return [of_random(study, basis.random(OF_FLUX, n, centred=True), 1.0 / len(lengths))
             for n in lengths]  # fmt: skip
 
 

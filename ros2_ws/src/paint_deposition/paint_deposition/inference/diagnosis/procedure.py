@@ -18,6 +18,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
 from paint_deposition.inference.diagnosis.explanations import (
+    FOOTPRINT,
     UNKNOWN,
     Explanation,
     of_any_form,
@@ -39,7 +40,7 @@ ALPHA = 0.05
 WORTH_LISTING, NAMED = 0.05, 3
 # Errors this many times as large as the noise of gauge and texture need a word.
 BEYOND_NOISE = 1.3
-# Share by which learned laws must lower the error on readings left out.
+# Share by which a learned curve must lower the error on readings left out.
 LEAST_GAIN = 0.02
 
 
@@ -139,10 +140,9 @@ def _learn(
     beside = best.beside(run.fit)
     footprint = best.remainder.of_footprint(best.best.sizes)
     while True:
-        enough = np.flatnonzero(errors_um <= (1.0 + LEAST_GAIN) * errors_um.min())[0]
         left = [option for option in options if option.learns not in without]
-        laws = choose_laws(beside, footprint, left, run.freedom)[:enough]
-        chosen = [(left[k], size) for k, size in laws]
+        laws = choose_laws(beside, footprint, left, run.freedom)
+        chosen = _predicting([(left[k], size) for k, size in laws], errors_um)
         if not chosen:
             return
         fit = run.learned(chosen)
@@ -160,6 +160,22 @@ def _learn(
     before = run.history[-1]
     run.record(' and '.join(learned), fit, float(errors_um[len(chosen)]))
     run.accepted += [run.described((law,), 1.0, before) for law in learned]
+
+
+def _predicting(
+    laws: list[tuple[Explanation, float]], errors_um: np.ndarray
+) -> list[tuple[Explanation, float]]:
+    """The first of some laws, as far as readings left out bear them out.
+
+    A curve must predict them better. A footprint, which a bell has on any part, must not predict
+    them worse: of two parts each says little of the other.
+    """
+    kept = 0
+    for count, (law, _) in enumerate(laws, start=1):
+        most = 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN)
+        if errors_um[count] <= most * errors_um[kept]:
+            kept = count
+    return laws[:kept]
 
 
 def _conclude(run: Run, best: Trial, p_value: float) -> Diagnosis:
