@@ -173,26 +173,29 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
     return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
 
 
-def _footprints(
-    study: Study, fit: Fit
-) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-    model=fit.model
-    q = np.linalg.qr(fit.jacobian[:, :len(fit.parameters.pattern)])[0]
-    basis = footprint_basis(study, model, RADII)
-    flux, tails = _flux_and_tails(model.patterns, basis)
+def _footprints(study: Study, fit: Fit) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
+    """What is left of a footprint's deviations when the pattern has followed them, of each size.
+
+    Its tails are kept as they are: the pattern follows them far from where it was fitted.
+    """
+    basis = footprint_basis(study, fit.model, RADII)
+    flux, tails = _flux_and_tails(fit.model.patterns, basis)
     fields = np.hstack(
         [
             basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
             for length in FOOTPRINT_LENGTHS
         ]
     )
+    pattern = np.linalg.qr(fit.jacobian[:, : len(fit.parameters.pattern)])[0]
+    of_film = basis.film_um / study.sigma_um[:, np.newaxis]
     columns, of_peak = [], []
     for size in FOOTPRINTS:
         share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
-        at_knots = np.hstack([TAILS * tails, share * fields])
-        of_readings = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-        of_readings[:,2:] -= q @ (q.T @ of_readings[:,2:]); columns.append(of_readings)
-        of_peak.append(flux[:, np.newaxis] * at_knots)
+        beside = of_film @ (share * fields)
+        columns.append(
+            np.hstack([of_film @ (TAILS * tails), beside - pattern @ (pattern.T @ beside)])
+        )
+        of_peak.append(flux[:, np.newaxis] * np.hstack([TAILS * tails, share * fields]))
     return tuple(columns), tuple(of_peak)
 
 

@@ -17,6 +17,7 @@ from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_error
 from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
     PRIOR_EFFECT,
+    SIZES,
     SURE,
     ModelSpace,
     Weighed,
@@ -110,8 +111,19 @@ class Trial:
 
     @property
     def log_prior(self) -> float:
-        """Logarithm of the prior odds of this set."""
-        return log_odds(PRIOR_EFFECT) * len(self.names)
+        """Logarithm of the prior odds of this set, its amplitudes being of any of the sizes.
+
+        The fit takes each as normal with its typical size as the standard deviation.
+        """
+        entries = self.fit.parameters.of_effects
+        amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
+        found = log_odds(PRIOR_EFFECT) * len(self.names)
+        for name in self.names:
+            own = [amount for amount, entry in zip(amounts, entries, strict=True)
+                   if entry.effect == name and not entry.is_shape]  # fmt: skip
+            by_size = 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
+            found += float(np.logaddexp.reduce(by_size)) - np.log(len(SIZES))
+        return found
 
     @cached_property
     def space(self) -> ModelSpace:
@@ -233,6 +245,11 @@ class Search:
         """
         while True:
             found = {name: self.group(trial, name) for name in trial.names}
+            better = [name for name, (members, _) in found.items() if members[0] != name]
+            if better:
+                others = self.without(trial, better[0])
+                trial = self.with_effect(others, found[better[0]][0][0])
+                continue
             if not found or min(p for _, p in found.values()) > SURE:
                 return trial, found
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
