@@ -19,7 +19,7 @@ from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out, left_out
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS
-from paint_deposition.inference.diagnosis.model_space import Weighed
+from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, Weighed, log_odds
 from paint_deposition.inference.diagnosis.remainder import Sizes
 from paint_deposition.inference.diagnosis.search import Stage, Trial
 from paint_deposition.inference.diagnosis.smooth_laws import RandomLaw
@@ -99,6 +99,10 @@ class LinearTrial(Trial):
     @property
     def remainder(self):
         return self.usual
+
+    @property
+    def log_prior(self):
+        return log_odds(PRIOR_EFFECT) * len(self.names)
 
     @property
     def weighed(self):

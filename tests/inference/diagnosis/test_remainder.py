@@ -160,15 +160,18 @@ def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
         assert tails[:, 0, k] == pytest.approx(np.clip(TAILS * change, -most, most), abs=2e-3)
 
 
-def test_the_footprint_changes_the_readings_as_its_knots_say(alone):
+def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     study, remainder = alone
     columns, of_peak = remainder.footprint[-1], remainder.of_peak[-1]
     amounts = np.random.default_rng(1).normal(size=columns.shape[1])
     basis = footprint_basis(study, MODEL, RADII)
     flux = np.repeat(mean_flux(np.linspace(0.0, basis.settings['reach_m'], RADII)), WAVES)
-    relative = of_peak @ amounts / flux
-    expected = basis.film_um @ relative / study.sigma_um
-    assert columns @ amounts == pytest.approx(expected, abs=1e-3)
+    expected = basis.film_um @ (of_peak @ amounts / flux) / study.sigma_um
+    fit = at_model(study)
+    pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
+    followed = np.linalg.lstsq(pattern, expected - columns @ amounts, rcond=None)[0]
+    assert pattern @ followed == pytest.approx(expected - columns @ amounts, abs=1e-2)
+    assert np.abs(pattern.T @ columns[:, 2:]).max() < 1e-6 * np.linalg.norm(pattern)
 
 
 def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
