@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from scipy.special import softmax
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.evidence import NullModel
@@ -35,6 +36,9 @@ MOST_EFFECTS, TRIALS = 4, 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each.
 LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
+# Differences of log evidence between rivals count as so many times smaller: laws are true to their
+# form no better than that, and each fit is linear around one of several patterns.
+COARSENED = 2.0
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Effects that could stand in one place, most probable first, and the probability of one of them.
@@ -255,15 +259,15 @@ class Search:
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
 
     def group(self, trial: Trial, name: str) -> Group:
-        """The effects that could stand in place of one, and how probable one of them is."""
+        """The effects that could stand in place of one, and how probable one of them is.
+
+        None could whose model is less probable than the one without any.
+        """
         others = self.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
         weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
-        total = float(np.logaddexp.reduce([*weights.values()]))
-        members, share = [], 0.0
-        for cause, weight in sorted(weights.items(), key=lambda item: -item[1]):
-            if share >= CREDIBLE:
-                break
-            members.append(cause)
-            share += float(np.exp(weight - total))
-        return tuple(members), inclusion_of([total], others.log_weight)
+        found = sorted(weights, key=lambda cause: -weights[cause])
+        found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
+        shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
+        members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
+        return tuple(members), inclusion_of([*weights.values()], others.log_weight)
