@@ -15,10 +15,10 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.footprint import WAVES
+from paint_deposition.effects.learned.footprint import WAVES, waves
 from paint_deposition.effects.library.tcp_offset import TcpOffset
-from paint_deposition.inference.diagnosis.smooth_laws import Basis, footprint_basis
-from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
+from paint_deposition.inference.fitting.least_squares import STEP, Fit
 from paint_deposition.inference.fitting.smooth_fields import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -38,6 +38,9 @@ BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
 # footprint in steps of its radius, of which there are so many.
 LENGTHS, FOOTPRINT_LENGTHS, RADII = (0.1, 0.2, 0.6), (2.0, 6.0), 20
+# Angles at which a pattern is averaged, and a flux that is none [um/s].
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
+TINY = 1e-12
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
@@ -179,40 +182,60 @@ def _footprints(study: Study, fit: Fit) -> tuple[tuple[np.ndarray, ...], tuple[n
     Its tails are kept as they are: the pattern follows them far from where it was fitted.
     """
     basis = footprint_basis(study, fit.model, RADII)
-    flux, tails = _flux_and_tails(fit.model.patterns, basis)
+    reach_m = basis.settings['reach_m']
+    flux, tails = _flux_and_tails(fit.model.patterns, reach_m)
     fields = np.hstack(
         [
             basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
             for length in FOOTPRINT_LENGTHS
         ]
     )
-    pattern = np.linalg.qr(fit.jacobian[:, : len(fit.parameters.pattern)])[0]
+    pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
+    of_pattern = _relative_change(fit, reach_m)
     of_film = basis.film_um / study.sigma_um[:, np.newaxis]
     columns, of_peak = [], []
     for size in FOOTPRINTS:
-        share = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis]
-        beside = of_film @ (share * fields)
-        columns.append(
-            np.hstack([of_film @ (TAILS * tails), beside - pattern @ (pattern.T @ beside)])
-        )
-        of_peak.append(flux[:, np.newaxis] * np.hstack([TAILS * tails, share * fields]))
+        free = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis] * fields
+        followed = np.linalg.lstsq(pattern, of_film @ free, rcond=None)[0]
+        columns.append(np.hstack([of_film @ (TAILS * tails), of_film @ free - pattern @ followed]))
+        at_knots = np.hstack([TAILS * tails, free - of_pattern @ followed])
+        of_peak.append(flux[:, np.newaxis] * at_knots)
     return tuple(columns), tuple(of_peak)
 
 
+def _relative_change(fit: Fit, reach_m: float) -> np.ndarray:
+    """(K, k) relative change of the flux at the knots of a footprint with the pattern."""
+    harmonics = waves(np.cos(ANGLES), np.sin(ANGLES)) / len(ANGLES)
+    harmonics[1:] *= 2.0
+
+    def logarithm(vector: np.ndarray) -> np.ndarray:
+        patterns = fit.parameters.decode(vector).patterns
+        found = np.mean([np.log(_around(p, reach_m) + TINY) for p in patterns], axis=0)
+        return (harmonics @ found).T.ravel()
+
+    here = logarithm(fit.vector)
+    steps = STEP * np.eye(len(fit.vector))[: len(fit.parameters.pattern)]
+    return np.stack([(logarithm(fit.vector + step) - here) / STEP for step in steps], axis=1)
+
+
+def _around(pattern: PlanarPattern, reach_m: float) -> np.ndarray:
+    """(angles, RADII) flux of a pattern [um/s]."""
+    radius, angle = np.linspace(0.0, reach_m, RADII), ANGLES[:, np.newaxis]
+    return pattern.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle))
+
+
 def _flux_and_tails(
-    patterns: Sequence[PlanarPattern], basis: Basis
+    patterns: Sequence[PlanarPattern], reach_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """At the K knots of a footprint: (K,) mean flux over the peak's, (K, 2) its changes.
 
     The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
     exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.
     """
-    radius = np.linspace(0.0, basis.settings['reach_m'], RADII)
-    angle = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)[:, np.newaxis]
+    radius = np.linspace(0.0, reach_m, RADII)
     flux, tails = np.zeros(RADII), np.zeros((RADII, 2))
     for p in patterns:
-        around = p.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle)).mean(axis=0)
-        flux += around / p.peak_flux_um_per_s / len(patterns)
+        flux += _around(p, reach_m).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
         ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
         u = np.stack([
             (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2), radius**2 / (2.0 * p.sigma2_m**2)
