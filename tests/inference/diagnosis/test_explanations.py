@@ -23,6 +23,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     of_footprint,
 )
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
+from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
 EDGE = EdgeBuild(gain=0.3, length_m=0.05)
@@ -134,7 +135,8 @@ def test_a_reading_where_no_paint_lands_has_no_error_of_a_free_law():
 
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
-    for found in (of_any_form(study, MODEL), of_footprint(study, MODEL)):
+    fit = study.fit(FreeParameters.of(MODEL))
+    for found in (of_any_form(study, MODEL), of_footprint(study, fit)):
         assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
         for explanation in found:
             assert explanation.cause == UNKNOWN

@@ -17,6 +17,7 @@ from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, sens
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
     RandomLaw,
+    beside_pattern,
     curve_basis,
     footprint_basis,
 )
@@ -109,14 +110,19 @@ def of_any_form(study: Study, model: DepositionModel) -> list[Explanation]:
     return [of_random(study, law, 1.0 / len(laws)) for law in laws]
 
 
-def of_footprint(study: Study, model: DepositionModel) -> list[Explanation]:
-    """Deviations of the footprint from the two Gaussians of eq. (1)."""
-    basis = footprint_basis(study, model)
-    if model.effect(basis.law.id) is not None:
+def of_footprint(study: Study, fit: Fit) -> list[Explanation]:
+    """Deviations of the footprint from the two Gaussians of eq. (1) that fit best."""
+    basis = footprint_basis(study, fit.model)
+    if fit.model.effect(basis.law.id) is not None:
         return []
     lengths = LENGTHS['footprint']
-    return [of_random(study, basis.random(OF_FLUX, n, centred=True), 1.0 / len(lengths))
-            for n in lengths]  # fmt: skip
+    found = []
+    for length in lengths:
+        free = basis.random(OF_FLUX, length).at_knots
+        beside, _ = beside_pattern(basis, free, study, fit)
+        random = RandomLaw(basis, basis.centred(beside))
+        found.append(of_random(study, random, 1.0 / len(lengths)))
+    return found
 
 
 def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:

@@ -79,7 +79,7 @@ def diagnose(
     run.fit, run.left_over = run.fitted_with([*best.effects.values()]), best.space.figures
     stages = [*(s for s in stages if s.here.names < best.names), Stage(best, [])]
     model = run.fit.model
-    options = [*of_any_form(run.study, model), *of_footprint(run.study, model)]
+    options = [*of_any_form(run.study, model), *of_footprint(run.study, run.fit)]
     errors_um = nested_rmse_um(stages, options)
     _accept(run, groups, float(errors_um[0]))
     progress('learning what the laws leave unexplained')
@@ -90,7 +90,7 @@ def diagnose(
 def _nothing_missing(run: Run, nothing: Trial, p_value: float) -> Diagnosis:
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
     rmse_um, noise_um = run.history[0].rmse_um, run.study.noise_floor_um
-    stages, options = [Stage(nothing, [])], of_footprint(run.study, run.fit.model)
+    stages, options = [Stage(nothing, [])], of_footprint(run.study, run.fit)
     _learn(run, nothing, stages, options, nested_rmse_um(stages, options))
     if run.accepted:
         unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)

@@ -15,10 +15,14 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.footprint import WAVES, waves
+from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
-from paint_deposition.inference.fitting.least_squares import STEP, Fit
+from paint_deposition.inference.diagnosis.smooth_laws import (
+    beside_pattern,
+    flux_around,
+    footprint_basis,
+)
+from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.smooth_fields import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -38,9 +42,6 @@ BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
 # footprint in steps of its radius, of which there are so many.
 LENGTHS, FOOTPRINT_LENGTHS, RADII = (0.1, 0.2, 0.6), (2.0, 6.0), 20
-# Angles at which a pattern is averaged, and a flux that is none [um/s].
-ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-TINY = 1e-12
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
@@ -191,37 +192,15 @@ def _footprints(study: Study, fit: Fit) -> tuple[tuple[np.ndarray, ...], tuple[n
         ]
     )
     pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
-    of_pattern = _relative_change(fit, reach_m)
     of_film = basis.film_um / study.sigma_um[:, np.newaxis]
     columns, of_peak = [], []
     for size in FOOTPRINTS:
         free = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis] * fields
-        followed = np.linalg.lstsq(pattern, of_film @ free, rcond=None)[0]
+        beside, followed = beside_pattern(basis, free, study, fit)
         columns.append(np.hstack([of_film @ (TAILS * tails), of_film @ free - pattern @ followed]))
-        at_knots = np.hstack([TAILS * tails, free - of_pattern @ followed])
+        at_knots = np.hstack([TAILS * tails, beside])
         of_peak.append(flux[:, np.newaxis] * at_knots)
     return tuple(columns), tuple(of_peak)
-
-
-def _relative_change(fit: Fit, reach_m: float) -> np.ndarray:
-    """(K, k) relative change of the flux at the knots of a footprint with the pattern."""
-    harmonics = waves(np.cos(ANGLES), np.sin(ANGLES)) / len(ANGLES)
-    harmonics[1:] *= 2.0
-
-    def logarithm(vector: np.ndarray) -> np.ndarray:
-        patterns = fit.parameters.decode(vector).patterns
-        found = np.mean([np.log(_around(p, reach_m) + TINY) for p in patterns], axis=0)
-        return (harmonics @ found).T.ravel()
-
-    here = logarithm(fit.vector)
-    steps = STEP * np.eye(len(fit.vector))[: len(fit.parameters.pattern)]
-    return np.stack([(logarithm(fit.vector + step) - here) / STEP for step in steps], axis=1)
-
-
-def _around(pattern: PlanarPattern, reach_m: float) -> np.ndarray:
-    """(angles, RADII) flux of a pattern [um/s]."""
-    radius, angle = np.linspace(0.0, reach_m, RADII), ANGLES[:, np.newaxis]
-    return pattern.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle))
 
 
 def _flux_and_tails(
@@ -235,7 +214,7 @@ def _flux_and_tails(
     radius = np.linspace(0.0, reach_m, RADII)
     flux, tails = np.zeros(RADII), np.zeros((RADII, 2))
     for p in patterns:
-        flux += _around(p, reach_m).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
+        flux += flux_around(p, reach_m, RADII).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
         ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
         u = np.stack([
             (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2), radius**2 / (2.0 * p.sigma2_m**2)

@@ -15,6 +15,7 @@ from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_p
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
 from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
+from paint_deposition.inference.fitting.least_squares import STEP, Fit
 from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.covariates import Rays
@@ -31,6 +32,8 @@ NEGLIGIBLE = 1e-2
 MAP_STEP_M, RADII = 0.06, 10
 # The pattern ends at this many of its widths beyond the ring.
 WIDTHS = 3.0
+# Angles at which a pattern is averaged, and a flux that is none [um/s].
+ANGLES, NO_FLUX = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False), 1e-12
 # Distance of knots that have nothing in common.
 FAR = 1e6
 
@@ -67,10 +70,12 @@ class Basis:
         root = size * root_of_field(
             self.knots, max(length, self.shortest), NEGLIGIBLE, correlation
         )
-        if centred:
-            film_um = self.film_um.sum(axis=0)
-            root = root - film_um @ root / film_um.sum()
-        return RandomLaw(self, root)
+        return RandomLaw(self, self.centred(root) if centred else root)
+
+    def centred(self, values: np.ndarray) -> np.ndarray:
+        """(K, n) values less their mean over all film, so that its whole stays as it is."""
+        film_um = self.film_um.sum(axis=0)
+        return values - film_um @ values / film_um.sum()
 
 
 @dataclass(frozen=True)
@@ -117,8 +122,7 @@ class RandomLaw:
         """
         root = self.at_knots
         if self.basis.settings.get('kind') == 'factor':
-            film_um = self.basis.film_um.sum(axis=0)
-            root = root - film_um @ root / film_um.sum()
+            root = self.basis.centred(root)
         return np.sqrt(np.einsum('kn,nm,km->k', root, covariance, root))
 
 
@@ -242,6 +246,43 @@ def footprint_along(
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
     change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
+
+
+def flux_around(pattern: PlanarPattern, reach_m: float, radii: int) -> np.ndarray:
+    """(angles, radii) flux of a pattern [um/s], from its middle to this distance."""
+    radius, angle = np.linspace(0.0, reach_m, radii), ANGLES[:, np.newaxis]
+    return pattern.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle))
+
+
+def beside_pattern(
+    basis: Basis, at_knots: np.ndarray, study: Study, fit: Fit
+) -> tuple[np.ndarray, np.ndarray]:
+    """What is left of deviations of a footprint when the pattern has followed them.
+
+    A pattern that stays where it fits best is needed for this (Plumlee 2017): otherwise footprint
+    and pattern are free to go far away together.
+
+    Args:
+        basis: of footprints. at_knots: (K, n) deviations. fit: of the pattern.
+
+    Returns:
+        (K, n) the deviations, and (k, n) by how much the pattern's entries follow each.
+    """
+    radii, reach_m = len(basis.knots) // WAVES, basis.settings['reach_m']
+    harmonics = waves(np.cos(ANGLES), np.sin(ANGLES)) / len(ANGLES)
+    harmonics[1:] *= 2.0
+
+    def log_flux(vector: np.ndarray) -> np.ndarray:
+        patterns = fit.parameters.decode(vector).patterns
+        around = [np.log(flux_around(p, reach_m, radii) + NO_FLUX) for p in patterns]
+        return (harmonics @ np.mean(around, axis=0)).T.ravel()
+
+    here, count = log_flux(fit.vector), len(fit.parameters.pattern)
+    steps = STEP * np.eye(len(fit.vector))[:count]
+    relative = np.stack([(log_flux(fit.vector + step) - here) / STEP for step in steps], axis=1)
+    change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
+    followed = np.linalg.lstsq(fit.jacobian[:, :count], change, rcond=None)[0]
+    return at_knots - relative @ followed, followed
 
 
 def _range(rays: list[Rays], values: list[np.ndarray]) -> tuple[float, float]:
