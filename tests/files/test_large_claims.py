@@ -66,7 +66,7 @@ def _far_cell() -> bytes:
     cell = b'<c r="XFD1048576">'
     sheet = targets()['worksheet']
     far = b'<row r="1048576">' + cell + b'<v>1</v></c></row></sheetData>'
-    return sheet.around(sheet.seeds()[0].replace(b'</sheetData>', far))
+    return sheet.around(sheet.seeds[0].replace(b'</sheetData>', far))
 
 
 CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {

@@ -26,7 +26,7 @@ def part(tmp_path):
 
 
 def written(path, fold):
-    sheet = triangulated(lambda x, z: 0.3 * x**2 + fold * np.abs(z), 0.04, jitter=0.3)
+    sheet = triangulated(lambda x, z: 0.3 * x**2 + fold * np.abs(z), 0.1, jitter=0.3)
     faces = sheet[1].copy()
     faces[0] = faces[0, ::-1]  # gives a note
     Trimesh(sheet[0], faces, process=False).export(path)
@@ -63,15 +63,11 @@ def test_another_file_name_or_wish_is_another_part(folder, part, tmp_path):
     renamed.write_bytes(part.read_bytes())
     for count, (path, options) in enumerate(
         [
-            (other, {}),
-            (renamed, {}),
-            (part, {'max_edge_length_m': 0.03}),
-            (part, {'scale': 0.5}),
-            (part, {'down': [0, -1, 0]}),
-            (part, {'body': 'part'}),
+            (other, {}), (renamed, {}), (part, {'max_edge_length_m': 0.03}),
+            (part, {'scale': 0.5}), (part, {'down': [0, -1, 0]}), (part, {'body': 'part'}),
         ],
         start=2,
-    ):
+    ):  # fmt: skip
         read_mesh(path, **options)
         assert len(list(folder.iterdir())) == count
 

@@ -13,14 +13,6 @@ def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:
     return rng.normal(size=(count, 3)), Rotation.random(count, random_state=4).as_quat()
 
 
-def test_a_transform_turns_and_then_shifts():
-    """A quarter turn about z takes x to y; the tool turns along."""
-    place = Rigid.of([1.0, 2.0, 3.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
-    position, quaternion = place.applied(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
-    assert np.allclose(position, [1.0, 3.0, 3.0], atol=1e-15)
-    assert np.allclose(quaternion, [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-15)
-
-
 def test_transforms_agree_with_scipy_and_keep_the_norm_of_quaternions():
     positions, quaternions = random_poses(20)
     quaternions *= 1.003  # screening is to see what was recorded

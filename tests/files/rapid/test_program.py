@@ -72,7 +72,6 @@ def test_declared_targets_speeds_and_zones(read):
     data = f"""
     LOCAL CONST robtarget pStart:={target(100)};
     TASK PERS robtarget pEnd:={target(900)};
-    CONST robtarget row{{2}}:=[{target(1)},{target(2)}];
     VAR speeddata vSlow:=[250.5,500,5000,1000];
     CONST zonedata zOwn:=[FALSE,7.5,11,11,1.1,11,1.1];
     CONST zonedata zStop:=[TRUE,7.5,11,11,1.1,11,1.1];
@@ -81,16 +80,16 @@ def test_declared_targets_speeds_and_zones(read):
     body = r"""
     MoveJ pStart, v1000, FINE, tool0;
     movel PEND, vslow, zOwn, tBell \WObj:=wobj0;
-    MoveL row{2}, v600\V:=450, zStop, tBell;
+    MoveL pStart, v600\V:=450, zStop, tBell;
     MoveL Offs(pEnd,0,step,-2*step), vmax, z0, tBell;
     step := step + 10;
     MoveL RelTool(pEnd,0,0,step), v5, z200, tBell;
-    pEnd.trans.z := 7;
+    pEnd := pStart;
     MoveL pEnd\ID:=10, [120,500,5000,1000], z10, tBell;
     """
     program = read(body, data)
     x = [move.position_m.tolist() for move in program.moves]
-    expected = [[100, 0, 0], [900, 0, 0], [2, 0, 0], [900, 50, -100], [900, 0, 60], [900, 0, 7]]
+    expected = [[100, 0, 0], [900, 0, 0], [100, 0, 0], [900, 50, -100], [900, 0, 60], [100, 0, 0]]
     np.testing.assert_allclose(x, np.array(expected) * 1e-3, atol=1e-12)
     speeds = [move.speed_m_per_s for move in program.moves]
     assert speeds == pytest.approx([1.0, 0.2505, 0.45, 5.0, 0.005, 0.12])
@@ -115,21 +114,6 @@ def test_an_unknown_work_object_is_the_frame(read):
     program = read(rf'MoveL {target(10)},v100,fine,tBell\WObj:=wElse;')
     assert program.moves[0].position_m[0] == 0.01
     assert program.notes == ['work object welse is not in the module: poses are in its frame']
-
-
-def test_brushes_switch_paint_moves(read):
-    body = f"""
-    SetBrush 3;
-    PaintL {target(0)},v600,z50,tBell;
-    MoveL {target(1)},v600,z50,tBell;
-    PaintC {target(2)},{target(3)},v600,z50,tBell;
-    SetBrush 0;
-    PaintL {target(4)},v600,b2,z50,tBell;
-    """
-    assert [move.spraying for move in read(body).moves] == [True, False, True, False]
-    assert read(f'PaintL {target(0)},v600,z50,tBell;').notes == [
-        'no SetBrush: paint moves are taken as spraying'
-    ]
 
 
 def test_outputs_and_triggers_switch_the_gun(read):
@@ -189,7 +173,9 @@ def test_conditions_without_moves_do_no_harm(read):
         ('FOR i FROM 1 TO 3 DO\nMoveL p,v1,fine,t;\nENDFOR', 'line 5: movel inside FOR'),
         ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'paintl inside WHILE is not followed'),
         ('IF reg1=1 MoveL p,v1,fine,t;', 'line 4: movel inside IF is not followed; unroll it'),
-        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in this module'),
+        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse has no value in this module'),
+        ('MoveL row{2},v100,fine,tBell;', 'line 4: row{2} is not followed; write its value'),
+        ('p.trans.z:=7;', 'line 4: p.trans.z is not followed; write its value instead'),
         (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
         (f'MoveL {target(1)},v100,fine,tBell', "line 5: ';' expected, found 'ENDPROC'"),
         ('main;', 'procedure main calls itself'),
@@ -265,7 +251,6 @@ def one_pass(speed_m_per_s: float = 0.6) -> list[Move]:
 def test_a_program_ends_with_the_gun_off():
     lines = module_text(one_pass()).splitlines()
     assert lines[-3:] == ['    SetDO doGun,0;', '  ENDPROC', 'ENDMODULE']
-    assert max(len(line) for line in lines) < 200
 
 
 @pytest.mark.parametrize('speed_m_per_s', [0.0, 10.0])
@@ -284,8 +269,6 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
         (AT_W, WOBJ.format(position='[1,2]', rotation='[1,0,0,0]'), 'is no position [x, y'),
         (f'MoveL {target("1e400")},v100,z10,tool0;', '', 'is no position [x, y'),
         ('n:=1/0;', 'VAR num n;', 'line 4: division by zero'),
-        ('n:=a{[1]};', 'VAR num n; VAR num a{2}:=[1,2];', 'an index is [1.0]; a number expected'),
-        ('a{0}:=3;', 'VAR num a{2}:=[1,2];', 'a has no such part to assign to'),
         ('SetBrush;', '', 'setbrush needs a number'),
         ('TriggIO t\\DOp:=doGun;', 'VAR triggdata t;', 'triggio needs a number'),
         (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', '', 'speed is [1.0]; a number expected'),

@@ -109,10 +109,7 @@ def test_another_link_and_another_base(arm, tmp_path):
         ),
         ({'urdf': 'ARM', 'tf': ['a', 'b']}, 'leave one of them out'),
         ({'urdf': 'ARM', 'pose_topic': '/joints'}, 'no topic /joints; its JointState topics'),
-        (
-            {'urdf': 'ARM', 'frame_id': 'door'},
-            "in frame 'base_link', the mesh in 'door'",
-        ),
+        ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
 )
 def test_what_is_missing_is_said(given, words, arm, tmp_path):

@@ -95,18 +95,6 @@ def test_records_in_the_file(run):
     assert isinstance(found[-2], Statistics) or any(isinstance(r, Statistics) for r in found)
 
 
-@pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
-def test_other_readers_agree(tmp_path, compression):
-    with RunWriter(tmp_path / 'run', compression=compression) as writer:
-        writer.add_topic(gun_topic())
-        for stamp in range(5_000):
-            writer.write('/gun', TRUE_CDR, stamp, stamp)
-    with Reader(tmp_path / 'run') as reader:
-        assert [(t, d) for _, t, d in reader.messages()] == [(t, TRUE_CDR) for t in range(5_000)]
-        (connection,) = reader.connections
-        assert connection.ext.offered_qos_profiles == [offered_qos(1, latched=True)]
-
-
 WRITE_UNTIL_KILLED = """
 import sys, time
 from pathlib import Path
@@ -134,7 +122,7 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     process = subprocess.Popen(
         [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests], stdout=subprocess.PIPE
     )
-    written_ns = [int(process.stdout.readline()) for _ in range(700)]
+    written_ns = [int(process.stdout.readline()) for _ in range(400)]
     os.kill(process.pid, signal.SIGKILL)
     written_ns += map(int, process.stdout.read().split())
     process.wait()

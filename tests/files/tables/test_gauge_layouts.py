@@ -6,12 +6,8 @@ units in its headings or in a column of its own, and the statistics of the batch
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings, write_predictions
@@ -281,24 +277,6 @@ def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
         ReadingsError, match=r'are places on a face; .*name the file in a campaign'
     ):
         read_readings(path)
-
-
-def refused_or_read(path):
-    with suppress(ReadingsError):
-        assert len(read_readings(path)) > 0
-
-
-@pytest.mark.slow
-@settings(max_examples=150, deadline=None)
-@given(data=st.data())
-def test_no_damaged_file_is_worse_than_refused(tmp_path_factory, data):
-    text = data.draw(st.sampled_from([ELCOMETER, FISCHER, POSITECTOR, ROBOT]))
-    start = data.draw(st.integers(0, len(text)))
-    stop = data.draw(st.integers(start, min(len(text), start + 30)))
-    put = data.draw(st.text('x,;\t"\r\n0123.-#µ[]=', max_size=12))
-    path = tmp_path_factory.mktemp('fuzz') / 'any.txt'
-    path.write_bytes((text[:start] + put + text[stop:]).encode())
-    refused_or_read(path)
 
 
 def test_rows_with_coordinates_are_points_whatever_their_labels(file):

@@ -99,10 +99,9 @@ LAYOUTS = {
 
 
 @pytest.mark.parametrize('name', LAYOUTS)
-@pytest.mark.parametrize('encoding', ['utf-8-sig', 'utf-16'])
-def test_every_layout_is_the_same_motion(name, encoding, tmp_path):
+def test_every_layout_is_the_same_motion(name, tmp_path):
     text, options = LAYOUTS[name]
-    (tmp_path / 'poses.csv').write_text(text, encoding=encoding)
+    (tmp_path / 'poses.csv').write_text(text, encoding='utf-8-sig')
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.stamps_ns, [0, 20_000_000, 41_000_000, 60_000_000, 80_500_000])
     assert np.allclose(read.positions_m, POSITIONS_M, atol=1e-9)

@@ -36,6 +36,7 @@ Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
 
 
+# A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
@@ -48,12 +49,12 @@ class _File(BaseModel, extra='forbid'):
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
     model: Text | None = Field(None, description='the name of a model file')
-    part: Name = Field('', description='a name or number, for the head of the report')
-    batch: Name = Field('', description='a name or number, for the head of the report')
-    paint: Name = Field('', description='the name of the paint, for the head of the report')
-    cell: Name = Field('', description='the name of the cell, for the head of the report')
-    date: Name = Field('', description='when it was painted, for the head of the report')
-    operator: Name = Field('', description='a name, for the head of the report')
+    part: Name = ''
+    batch: Name = ''
+    paint: Name = ''
+    cell: Name = ''
+    date: Name = ''
+    operator: Name = ''
     target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
     tolerance_um: Number | None = Field(
         None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
@@ -64,11 +65,6 @@ class _File(BaseModel, extra='forbid'):
         if (self.target_um is None) != (self.tolerance_um is None):
             raise ValueError('target_um and tolerance_um belong together; give both or none')
         return self
-
-    @property
-    def head(self) -> dict[str, str]:
-        """What is said of part and batch, by key."""
-        return {key: text for key in HEAD if (text := getattr(self, key))}
 
 
 class _Brushed(MotionSource):
@@ -106,8 +102,7 @@ class _Entry(_Brushed):
         None, description='[x, y, z], the direction of gravity in the mesh frame'
     )
     points: Text | None = Field(
-        None,
-        description='the name of a file of measuring points, for readings that name theirs',
+        None, description='the name of a file of measuring points, for readings that name theirs'
     )
     columns: dict[Quantity, Text | int] = Field(
         {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
@@ -130,10 +125,9 @@ def read_campaign(
     part_pose: Sequence[float] | None = None,
     remark: Remark = lambda kind, experiment, line: None,
 ) -> Campaign:
-    """Read a campaign with all that it names.
+    """Read a campaign with all that it names; paths in it are relative to it.
 
     Args:
-        path: YAML; paths in it are relative to it.
         progress: called with a line for each experiment.
         part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
             that has none of its own.
@@ -143,7 +137,8 @@ def read_campaign(
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
     """
     path = Path(path)
-    file = _read_file(path)
+    content = read_yaml(path, 'campaign', ReadingsError)
+    file = checked(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
     for number, written in enumerate(file.experiments, start=1):
         entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
@@ -157,36 +152,17 @@ def read_campaign(
             experiments.append(_read_experiment(path.parent, name, entry, remark))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
-    return Campaign(
-        tuple(experiments), _start(path, file), str(path), file.head, file.target_um,
-        file.tolerance_um,
-    )  # fmt: skip
-
-
-def model_of_campaign(path: str | Path) -> str | None:
-    """The start model's file that a campaign names, or None; nothing else is read.
-
-    Raises:
-        ReadingsError: the campaign's own file is at fault.
-    """
-    return _start(Path(path), _read_file(Path(path)))
-
-
-def _read_file(path: Path) -> _File:
-    content = read_yaml(path, 'campaign', ReadingsError)
-    if not isinstance(content, dict):
-        raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
-    return checked(_File, f'{path}: campaign', content, ReadingsError)
-
-
-def _start(path: Path, file: _File) -> str | None:
-    return None if file.model is None else str(path.parent / file.model)
+    start = None if file.model is None else str(path.parent / file.model)
+    head = {key: text for key in HEAD if (text := getattr(file, key))}
+    return Campaign(tuple(experiments), start, str(path), head, file.target_um, file.tolerance_um)
 
 
 def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> Experiment:
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     motions = _motions(folder, entry)
-    files |= _named([file for file, *_ in motions])
+    different = dict.fromkeys(file for file, *_ in motions)
+    for number, file in enumerate(different, start=1):
+        files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
     trajectories = [read_motion(file, source) for file, source, _ in motions]
@@ -203,7 +179,11 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     for warning in (warning for t in trajectories for warning in t.warnings):
         remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
-    readings = read_readings(files['measurements'], points, _layout(entry), surface)
+    layout = Layout(
+        entry.columns, {kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
+        {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '',
+    )  # fmt: skip
+    readings = read_readings(files['measurements'], points, layout, surface)
     off = frozenset(entry.switched_off)
     settings: dict[str, float] = {}
     for trajectory in reversed(trajectories):
@@ -235,15 +215,6 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int |
     return motions
 
 
-def _named(files: list[str]) -> dict[str, str]:
-    """The motions' files for reports: `trajectory`, and `trajectory 2` and so on for more."""
-    different = list(dict.fromkeys(files))
-    return {
-        'trajectory' if number == 1 else f'trajectory {number}': file
-        for number, file in enumerate(different, start=1)
-    }
-
-
 def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
     """The path with the brush that the campaign names for it."""
     if number is None:
@@ -254,12 +225,3 @@ def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
             f'brush is {number}, and the recording names {listed(named)}; leave it out'
         )
     return path.with_(brush=np.full(len(path), number))
-
-
-def _layout(entry: _Entry) -> Layout:
-    return Layout(
-        columns=entry.columns,
-        unit={kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
-        decimal={None: '', 'comma': ',', 'point': '.'}[entry.decimal],
-        sheet=entry.sheet or '',
-    )

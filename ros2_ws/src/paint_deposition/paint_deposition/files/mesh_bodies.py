@@ -48,14 +48,9 @@ class Bodies:
 
 
 def read_bodies(path: Path, body: str | None = None) -> Bodies:
-    """Read all bodies of a file as one mesh, or the one that is named.
+    """Read all bodies of a file as one mesh, or the one of a name (object, solid, node or part).
 
-    Args:
-        path: a file with one of SUFFIXES.
-        body: name of an object, solid, node or part in it; default: all.
-
-    Raises:
-        MeshError: not a mesh, or no body of that name; says what to do.
+    Raises MeshError, saying what to do, for what is no mesh or has no such body.
     """
     kind = path.suffix.lower()
     if kind == '.stl' and body in (None, path.stem) and (triangles := _binary_stl(path)):

@@ -39,8 +39,9 @@ def read_mesh(
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
-        scale: metres per unit of the file, 0.001 for millimetres. glTF is in metres, and 3MF and
-            STEP have their unit: there it comes on top, for files whose unit is wrong.
+        scale: metres per unit of the file, 0.001 for millimetres; with glTF, 3MF and STEP on top
+        of
+            the unit that they have.
         max_edge_length_m: longest edge after refinement [m].
         down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.
@@ -70,10 +71,7 @@ def write_mesh_ply(
 ) -> None:
     """Write a surface with its normals as PLY, replacing the file at once.
 
-    Args:
-        path: where to.
-        colours: (V, 3) or (V, 4) uint8, shown by viewers.
-        properties: (V,) values of the vertices by name, such as ``thickness_um``.
+    ``colours`` are (V, 3) or (V, 4) uint8; ``properties`` (V,) values of the vertices by name.
     """
     columns = [
         *zip(('x', 'y', 'z'), repeat('float'), surface.vertices_m.T, strict=False),
@@ -98,11 +96,7 @@ def write_mesh_ply(
 
 
 def _prepared(
-    path: Path,
-    scale: float,
-    max_edge_length_m: float,
-    down: np.ndarray | None,
-    body: str | None,
+    path: Path, scale: float, max_edge_length_m: float, down: np.ndarray | None, body: str | None
 ) -> Surface:
     read = _load(path, body)
     notes, unit_m = [*read.notes], read.unit_m

@@ -28,10 +28,8 @@ IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 class PlannedModel:
     """What a motion says of the model that it was planned with.
 
-    Attributes:
-        path: where the model should be.
-        digest: of the model.
-        file: the model, None where it is not there or is another one.
+    ``path`` is where the model should be; ``file`` is None where it is not there or is another
+    one.
     """
 
     path: Path

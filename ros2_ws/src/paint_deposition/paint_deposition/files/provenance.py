@@ -36,10 +36,7 @@ def origin(
 ) -> dict[str, Any]:
     """What figures were computed from, for the key ``provenance`` of every JSON.
 
-    Args:
-        model: or several by name; in full.
-        files: by what they are; each with its digest. Empty names are left out.
-        campaign: its file, '' for none.
+    The model, or several by name, in full; ``files`` by what they are, each with its digest.
     """
     models = model if isinstance(model, Mapping) else {'model': model} if model else {}
     named = {'campaign': campaign, **(files or {})}
@@ -75,11 +72,7 @@ def _values(model: DepositionModel) -> dict[str, Any]:
 
 
 def sha256(path: str | Path) -> str:
-    """Digest of a file, or of all files of a folder with their names, such as a bag's.
-
-    Raises:
-        PaintError: it cannot be read.
-    """
+    """Digest of a file, or of all files of a folder with their names, such as a bag's."""
     path, digest = Path(path), hashlib.sha256()
     try:
         for file in sorted(path.rglob('*')) if path.is_dir() else [path]:

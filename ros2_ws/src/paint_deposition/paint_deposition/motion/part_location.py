@@ -21,13 +21,10 @@ NOTABLE_M = 0.002
 
 @dataclass(frozen=True)
 class PartPlace:
-    """The pose of a part, and how well it is known.
+    """The pose of a part in the frame of the robot, and how well it is known.
 
-    Attributes:
-        pose: of the part in the frame of the robot.
-        rms_m: root mean square of the residuals [m].
-        residuals_m: by point, how far it is from where the pose puts it [m].
-        warnings: what is odd, a line each.
+    ``residuals_m`` are, by point, how far it is from where the pose puts it, ``rms_m`` their root
+    mean square [m].
     """
 
     pose: Rigid
@@ -48,12 +45,8 @@ class PartPlace:
 def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarray]) -> PartPlace:
     """The pose that brings points of the part to where they were touched, by least squares.
 
-    Args:
-        touched_m: (3,) by name, in the robot's frame [m].
-        points_m: (3,) by name, the same points in the part's frame; others are left out.
-
-    Raises:
-        RecordingError: fewer than three points in common, or points on a line.
+    Both are (3,) [m] by name, in the robot's and in the part's frame; points without a partner are
+    left out. Raises RecordingError for fewer than three in common, or points on a line.
     """
     names = [name for name in touched_m if name in points_m]
     if len(names) < FEWEST_POINTS:

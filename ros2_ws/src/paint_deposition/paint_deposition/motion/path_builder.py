@@ -21,11 +21,7 @@ LONGEST_GAP_NS = 3_155_760_000_000_000_000
 
 
 def gap_ns(max_pose_gap_s: float) -> int:
-    """The longest interval between poses that is no gap [ns].
-
-    Raises:
-        RecordingError: it is no number above 0.
-    """
+    """The longest interval between poses that is no gap [ns], from seconds above 0."""
     if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
         raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
     return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
@@ -105,12 +101,10 @@ class PathBuilder:
             self._waiting = [stream]
 
     def take(self, until_ns: int | None = None, finish: bool = False) -> SprayPath:
-        """Hand out the sub-steps that are complete.
+        """Hand out the sub-steps that are complete, without poses later than ``until_ns``.
 
-        Args:
-            until_ns: leave poses that come later for the next call; None: take all.
-            finish: the stream has ended; the poses behind the last that was followed, and
-                incomplete strokes, are handed out too.
+        ``finish``: the stream has ended; the poses behind the last that was followed, and
+        incomplete strokes, are handed out too.
         """
         if finish:
             self._screen.finish()
@@ -209,11 +203,7 @@ def spray_path(
 
 
 def require_spraying(trajectory: Trajectory, path: SprayPath) -> None:
-    """Refuse a motion, with at least one sub-step, along which the gun never sprays.
-
-    Raises:
-        RecordingError: the trigger never opens, or only while there are no poses.
-    """
+    """Refuse a motion, with at least one sub-step, along which the gun never sprays."""
     if np.any(path.flow > 0.0):
         return
     stamps_ns, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow

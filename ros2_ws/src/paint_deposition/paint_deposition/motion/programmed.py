@@ -42,7 +42,6 @@ class Move:
     Attributes:
         position_m: (3,) TCP at the end of the move [m].
         quaternion_xyzw: (4,) orientation of the tool there, scalar last.
-        speed_m_per_s: speed of the TCP on the way [m/s].
         spraying: whether the gun is on as the move begins.
         via_m: (3,) point that a circular move passes through, None for straight ones.
         switches: of the gun during the move, in the order written.
@@ -65,12 +64,8 @@ class Move:
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     """Poses along moves, from the end of the first on, at the programmed speeds.
 
-    Args:
-        moves: in the order in which they run.
-        gun_known: whether the moves say when the gun is on; else it sprays throughout.
-
-    Raises:
-        RecordingError: there is no second move, or one without a speed.
+    Where the gun is not known from the moves it sprays throughout. Raises RecordingError without a
+    second move or a speed.
     """
     if len(moves) < 2:
         raise RecordingError('there is a single move; give a program that travels')

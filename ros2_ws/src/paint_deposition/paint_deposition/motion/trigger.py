@@ -23,14 +23,9 @@ SPRAYS_NOTHING = (
 
 
 def relative_flow(spraying: bool, flow: float = math.nan) -> float:
-    """Flow relative to the calibrated one, 0 while the gun is off.
+    """Flow relative to the calibrated one, 0 while the gun is off; NaN is unknown and taken as 1.
 
-    Args:
-        spraying: whether paint leaves the atomizer.
-        flow: measured flow relative to the calibrated one; NaN is unknown and taken as 1.
-
-    Raises:
-        RecordingError: the flow is negative or infinite.
+    Raises RecordingError for a flow that is negative or infinite.
     """
     if not spraying:
         return 0.0

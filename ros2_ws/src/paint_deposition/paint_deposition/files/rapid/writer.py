@@ -40,16 +40,10 @@ def module_text(
 ) -> str:
     """A module whose `main` runs the moves: poses in the work object, the gun by TriggL.
 
-    The tool and the work object are taught on the robot and not defined here: the module's poses
-    are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
-    ends with the gun off. Where passes have flows of their own, the analogue output aoFlow is set
-    to them, relative to the calibrated flow, as the gun opens; where a brush has a number, so is
-    the group output goBrush. `read_program` reads it back within 0.001 mm.
-
-    Args:
-        moves: in the part's frame.
-        comments: more lines for the head of the module.
-        part: pose of the part in the robot's world; the work object is defined by it then.
+    Tool and work object are taught on the robot; ``part``, its pose in the robot's world, defines
+    the work object too. The approach is a joint move, gun off. Flows of their own set the analogue
+    output aoFlow as the gun opens, brushes with a number the group output goBrush. `read_program`
+    reads it back within 0.001 mm.
 
     Raises PlanError for speeds that no robot could run.
     """

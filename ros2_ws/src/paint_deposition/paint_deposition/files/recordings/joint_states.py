@@ -21,12 +21,7 @@ USUAL_TIP = 'tool0'
 
 @dataclass(frozen=True)
 class Robot:
-    """The chain of joints from a robot's base to its tip.
-
-    Attributes:
-        path: of the URDF. base, tip: links.
-        chain: joints in order, as pytransform3d describes them.
-    """
+    """The chain of joints from a robot's base link to its tip link, as of pytransform3d."""
 
     path: Path
     base: str
@@ -37,13 +32,8 @@ class Robot:
     def read(path: Path, tip: str | None = None, base: str | None = None) -> Robot:
         """Read a URDF.
 
-        Args:
-            path: of the file.
-            tip: link whose origin is the TCP; default: tool0, else the only last link.
-            base: link in which the poses are; default: the root.
-
-        Raises:
-            RecordingError: it is no URDF, or has no such links.
+        ``tip`` is the TCP, by default tool0 or the only last link; ``base`` the link in which the
+        poses are, by default the root. Raises RecordingError without such links.
         """
         from pytransform3d.urdf import parse_urdf
 
@@ -78,10 +68,8 @@ class Robot:
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) and quaternions (N, 4) of the tip in the base.
-
-        Args:
-            values: (N, J) of the moving joints [rad or m].
+        """Positions (N, 3) and quaternions (N, 4) of the tip, from (N, J) moving joints [rad or
+        m].
         """
         tip = np.tile(np.eye(4), (len(values), 1, 1))
         columns = iter(values.T)
@@ -111,16 +99,10 @@ def _last_link(path: Path, parents: nx.DiGraph) -> str:
 def read_joint_poses(
     bag: Bag, robot: Robot, topic_name: str | None
 ) -> tuple[Trajectory, np.ndarray]:
-    """The motion of a robot's tip from the joint states of a bag.
+    """The motion of a robot's tip from joint states, and when they were logged (N,) [ns].
 
-    Joints that come in messages of their own are interpolated at the times of the one that comes
-    most often.
-
-    Returns:
-        The motion, and the times (N,) int64 at which its joints were logged [ns].
-
-    Raises:
-        RecordingError: there are no joint states, or not of all joints.
+    Joints in messages of their own are interpolated at the times of the one that comes most often.
+    Raises RecordingError without joint states of all joints.
     """
     if not topic_name:
         topics = [topic for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]

@@ -40,11 +40,7 @@ class PoseTable:
 
     @staticmethod
     def read(path: Path) -> PoseTable:
-        """Find the headings and the rows below them.
-
-        Raises:
-            RecordingError: the file cannot be read, or holds no rows.
-        """
+        """Find the headings and the rows below them; without them the file is refused."""
         sheet, header = find_table(path, RecordingError, _known)
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
@@ -65,11 +61,7 @@ class PoseTable:
         return len(self.table)
 
     def find(self, *names: str) -> int | None:
-        """The column that is called by the first of these names that occurs.
-
-        Raises:
-            RecordingError: two columns are called so.
-        """
+        """The column called by the first of these names that occurs; two of a name are refused."""
         for name in names:
             found = [column for column, its in enumerate(self.names) if its == name]
             if len(found) > 1:
@@ -92,11 +84,7 @@ class PoseTable:
         return self.table.written(columns or range(len(self.names)))
 
     def numbers(self, columns: Sequence[int]) -> np.ndarray:
-        """The values (N, C) of columns.
-
-        Raises:
-            RecordingError: every cell that is no number, with its line, up to a few.
-        """
+        """The values (N, C) of columns; cells that are no number are refused with their lines."""
         read = [self.table.numbers(column, finite=False, switch=True) for column in columns]
         self.table.refuse_complaints()
         return np.stack(read, axis=1)

@@ -32,10 +32,8 @@ FRAME = ('frame', 'frameid')
 class PoseLayout:
     """What the user says of a table of poses; None is found or has its usual value.
 
-    Attributes:
-        trigger: heading of the column that opens the gun.
-        pose_unit, angle_unit: for headings without a unit.
-        rotation: see ``ROTATION_WORDS``.
+    ``trigger`` is the heading of the column that opens the gun, ``rotation`` one of
+    ROTATION_WORDS; the units are for headings without.
     """
 
     trigger: str | None = None
@@ -53,10 +51,7 @@ def read_pose_table(path: Path, layout: PoseLayout) -> Trajectory:
     """The motion in a table, with what was understood as a note.
 
     A table with times holds poses as recorded; one with speeds, passes as programmed, such as
-    ``passes.csv``.
-
-    Raises:
-        RecordingError: naming the file, the column and the remedy.
+    ``passes.csv``. Raises RecordingError naming the file, the column and the remedy.
     """
     table = PoseTable.read(path)
     try:

@@ -46,9 +46,7 @@ class ReadingTable:
     """Rows of readings or points, apart from all that stands around them.
 
     Attributes:
-        table: their cells.
         at: columns of each quantity; several of the thickness where each row holds repeats.
-        layout: what the user said of it.
         order: number of each row from 1, those without a reading counted.
         film_unit_m: metres in the unit of the thickness where a line above or a column has it.
         left_out: what was not taken for a row, for the user.
@@ -65,16 +63,10 @@ class ReadingTable:
     def read(
         path: Path, films: bool, layout: Layout, labels: Collection[str] = ()
     ) -> ReadingTable:
-        """Find the table in a file.
+        """Find the table of readings (``films``) or places in a file.
 
-        Args:
-            path: of a text file or workbook.
-            films: whether it holds readings, not only places.
-            layout: what the user says of it.
-            labels: of the listed points: a row with one of them is no statistic.
-
-        Raises:
-            ReadingsError: no such table; its lines are complained of later, all at once.
+        A row with one of ``labels``, those of the listed points, is no statistic. Raises
+        ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
         numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
 
@@ -128,11 +120,7 @@ class ReadingTable:
         return self.table.numbers(self.at[quantity][0], may_be_empty=may_be_empty)
 
     def lengths_m(self, quantities: Sequence[str]) -> tuple[np.ndarray, str]:
-        """Columns of lengths (N, len(quantities)) [m], and their unit in words.
-
-        Raises:
-            ReadingsError: their units differ, or are none of a position.
-        """
+        """Columns of lengths (N, len(quantities)) [m], and their one unit in words."""
         values = np.column_stack([self.numbers(quantity) for quantity in quantities])
         given = self.layout.unit.get('position')
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]

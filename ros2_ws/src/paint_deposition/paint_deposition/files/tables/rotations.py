@@ -48,13 +48,9 @@ def read_rotations(
 ) -> tuple[np.ndarray, str]:
     """Quaternions (N, 4), scalar last, and how they were read.
 
-    Args:
-        table: of poses.
-        rotation: what three numbers of an orientation are, or None; see ``ROTATION_WORDS``.
-        angle_unit: 'deg' or 'rad' for headings without a unit, or None.
-
-    Raises:
-        RecordingError: there is no orientation, or it can be read in two ways.
+    ``rotation`` says what three numbers of an orientation are, see ROTATION_WORDS; ``angle_unit``
+    is 'deg' or 'rad' for headings without. Raises RecordingError without an orientation, or with
+    one that can be read in two ways.
     """
     if rotation is None:
         for names in (QUATERNION, ABB_QUATERNION):

@@ -27,14 +27,10 @@ SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 
 
 @dataclass
 class Table:
-    """Headings and the rows under them; comments and blank rows are left out.
+    """Headings and the rows of cells under them, without comments and blank rows.
 
-    Attributes:
-        path: of the file. form: how it was understood, for the user.
-        headings: of all columns.
-        rows: of cells. lines: of the file that each row stands in.
-        refusal: the class of the errors.
-        decimal: the decimal mark of its numbers, '.' or ','.
+    ``form`` says how it was understood, for the user; ``lines`` are those of the file that the
+    rows stand in; ``refusal`` is the class of its errors; ``decimal`` the mark of its numbers.
     """
 
     path: Path
@@ -58,11 +54,8 @@ class Table:
     ) -> np.ndarray:
         """A column (N,) as written; what is no number is complained of.
 
-        Args:
-            column: its index.
-            may_be_empty: whether blank cells give nan without a complaint.
-            finite: whether nan and inf are complained of.
-            switch: whether on, off, yes, no, true and false are numbers too.
+        Blank cells may give nan without a complaint, nan and inf may be taken (not ``finite``),
+        and with ``switch`` on, off, yes, no, true and false are numbers too.
         """
         values = np.full(len(self), np.nan)
         name = self.headings[column].text or f'column {column + 1}'
@@ -104,11 +97,7 @@ class Table:
         return self.refusal(f'{self.path}: {text}')
 
     def refuse_complaints(self) -> None:
-        """Refuse the file if anything is wrong in its lines.
-
-        Raises:
-            PaintError: with every complaint and its line, up to a number.
-        """
+        """Refuse the file with all that is wrong in its lines, up to a number."""
         if not self._complaints:
             return
         lines = [f'line {line}: {text}' for line, text in sorted(self._complaints.items())]
@@ -126,9 +115,7 @@ class Table:
     def with_decimal(self, columns: Iterable[int], given: str = '') -> tuple[Table, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
 
-        Args:
-            columns: of numbers.
-            given: the mark, if the user gives it.
+        ``given`` is the mark where the user says it.
         """
         seen: dict[str, str] = {}
         only_in_doubt = True
@@ -154,21 +141,13 @@ class Table:
 
 
 def find_table(
-    path: Path,
-    refusal: type[PaintError],
-    known: Callable[[list[Heading]], int],
-    sheet: str = '',
+    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = ''
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
-    Args:
-        path: of a text file or workbook.
-        refusal: the class of the errors.
-        known: how many quantities a row of headings names, 0 where a needed one is missing.
-        sheet: name of a workbook's sheet, or ''.
-
-    Raises:
-        PaintError: the file cannot be read, or several sheets of a workbook hold a table.
+    ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
+    ``sheet`` names a workbook's sheet. Raises ``refusal`` for a file that cannot be read, or with
+    tables in several sheets.
     """
     sheets = read_sheets(path, refusal)
     if sheet:
