@@ -27,15 +27,12 @@ from paint_deposition.motion.path_builder import (
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
 
-# Readings are matched to the surface; a finer mesh only helps where the surface is strongly
-# curved.
+# Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
 MAX_EDGE_LENGTH_M = 0.02
 
 Quantity = Literal['x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session']
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
-
-
 # A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
@@ -67,32 +64,24 @@ class _File(BaseModel, extra='forbid'):
         return self
 
 
-class _Brushed(MotionSource):
-    """A motion, and its brush where the recording has none."""
+class _Gun(MotionSource):
+    """One of several guns; what it does not say holds for it as for the experiment."""
 
+    trajectory: Text | None = Field(None, description='the name of a recording, module or table')
     brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
         None, description='the number of the brush, where the recording names none'
     )
 
 
-class _Gun(_Brushed):
-    """One of several guns; what it does not say holds for it as for the experiment."""
-
-    trajectory: Text | None = Field(None, description='the name of a recording or module')
-
-
-class _Entry(_Brushed):
+class _Entry(_Gun):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
-    trajectory: Text | None = Field(
-        None, description='the name of a recording, RAPID module or table'
-    )
     measurements: Text = Field(description='the name of a file of gauge readings')
     guns: list[Any] = Field(
-        [], description='a list of guns that painted the part together, each with its motion'
+        [], description='a list of guns that painted together, each with its motion'
     )
-    name: Name = Field('', description='a name')
+    name: Name = ''
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
@@ -101,9 +90,7 @@ class _Entry(_Brushed):
     down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
         None, description='[x, y, z], the direction of gravity in the mesh frame'
     )
-    points: Text | None = Field(
-        None, description='the name of a file of measuring points, for readings that name theirs'
-    )
+    points: Text | None = Field(None, description='the name of a file of measuring points')
     columns: dict[Quantity, Text | int] = Field(
         {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
     )

@@ -62,28 +62,21 @@ def read_readings(
     if read.has('sigma'):
         sigma_um = read.numbers('sigma', may_be_empty=True)
         for k in np.flatnonzero(sigma_um <= 0.0):
-            text = f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0'
-            table.complain(k, text)
+            table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
     table.refuse_complaints()
     said = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
+    groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
     readings = Readings(
-        positions[row],
-        thickness,
-        labels[row],
-        np.array(read.texts('group'))[row],
-        sigma_um[row],
-        None if normals is None else normals[row],
-        str(path),
-        np.array(read.texts('session'))[row],
+        positions[row], thickness, labels[row], groups, sigma_um[row],
+        None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, said))}',
-    )
+    )  # fmt: skip
     require_repeats_close(readings)
     return readings
 
 
 def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarray]:
-    """Positions (3,) [m] by the names of the points in a table with ``point`` and x, y, z, in
-    order.
+    """Positions (3,) [m] by the names of points in a table with ``point`` and x, y, z, in order.
 
     ``unit`` is 'm', 'mm' or 'cm' where the headings have none.
     """

@@ -53,7 +53,9 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
     Raises MeshError, saying what to do, for what is no mesh or has no such body.
     """
     kind = path.suffix.lower()
-    if kind == '.stl' and body in (None, path.stem) and (triangles := _binary_stl(path)):
+    if kind == '.stl' and (triangles := _binary_stl(path)):
+        if body not in (None, path.stem):
+            raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
         return Bodies(*triangles, 1.0, ())
     scene = _scene(path, kind)
     found = _by_name(path, scene)
@@ -173,13 +175,9 @@ def _as_utf8(path: Path, kind: str) -> bytes:
     content = path.read_bytes()
     if kind == '.ply':
         return content
-    if kind == '.stl':
-        triangles = int.from_bytes(content[80:84], 'little')
-        if len(content) == 84 + 50 * triangles:
-            return content
-        if content and b'facet' not in content:
-            raise MeshError(
-                f'{path}: not readable as a mesh, neither a text STL nor, with its '
-                f'{len(content)} bytes, a complete binary one; export it again'
-            )
+    if kind == '.stl' and content and b'facet' not in content:
+        raise MeshError(
+            f'{path}: not readable as a mesh, neither a text STL nor, with its {len(content)} '
+            'bytes, a complete binary one; export it again'
+        )
     return content.decode('utf-8', errors='replace').encode()

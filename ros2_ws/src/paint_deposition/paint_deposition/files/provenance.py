@@ -20,12 +20,18 @@ BLOCK_BYTES = 1 << 20
 def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
     """Texts by name: versions, the mesh's digest, the model in full. Empty paths are left out."""
     notes = {'package_version': __version__, 'git_version': git_version()}
-    if mesh_file:
-        digest = hashlib.sha256(_content(mesh_file, 'mesh_file')).hexdigest()
-        notes |= {'mesh_file': mesh_file, 'mesh_sha256': digest}
-    if model_file:
-        text = _content(model_file, 'model_file').decode('utf-8', errors='replace')
-        notes |= {'model_file': model_file, 'model_yaml': text}
+    for what, path in (('mesh_file', mesh_file), ('model_file', model_file)):
+        if not path:
+            continue
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise PaintError(f'{what} {path}: {error.strerror}') from None
+        notes[what] = path
+        if what == 'mesh_file':
+            notes['mesh_sha256'] = hashlib.sha256(content).hexdigest()
+        else:
+            notes['model_yaml'] = content.decode('utf-8', errors='replace')
     return {key: value for key, value in notes.items() if value}
 
 
@@ -44,7 +50,9 @@ def origin(
         'package_version': __version__,
         'git_version': git_version(),
         'campaign': campaign,
-        'models': {name: _in_full(one) for name, one in models.items()},
+        'models': {
+            name: _values(one) | {'sha256': model_digest(one)} for name, one in models.items()
+        },
         'files': [
             {'what': what, 'file': str(file), 'sha256': sha256(file)}
             for what, file in named.items() if str(file) not in ('', '.')
@@ -55,10 +63,6 @@ def origin(
 def model_digest(model: DepositionModel) -> str:
     """SHA-256 of a model's values, wherever its file lies and however it is commented."""
     return hashlib.sha256(json_text(_values(model)).encode()).hexdigest()
-
-
-def _in_full(model: DepositionModel) -> dict[str, Any]:
-    return _values(model) | {'sha256': model_digest(model)}
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
@@ -85,10 +89,3 @@ def sha256(path: str | Path) -> str:
     except OSError as error:
         raise PaintError(f'{path}: {error.strerror}') from None
     return digest.hexdigest()
-
-
-def _content(path: str, parameter: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise PaintError(f'{parameter} {path}: {error.strerror}') from None

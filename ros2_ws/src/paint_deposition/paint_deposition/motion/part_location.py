@@ -64,7 +64,10 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
                 f'the {what} points {" ".join(names)} lie on a line, so that the part may be '
                 'turned about it; add a point beside it'
             )
-    pose, apart = _fitted(touched, points)
+    middle, about = touched.mean(axis=0), points.mean(axis=0)
+    turn, _ = Rotation.align_vectors(touched - middle, points - about)
+    pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
+    apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
     rms = float(np.sqrt(np.mean(apart**2)))
     warnings: tuple[str, ...] = ()
     if rms > NOTABLE_M:
@@ -75,12 +78,3 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
             'right-handed',
         )
     return PartPlace(pose, rms, dict(zip(names, apart.tolist(), strict=True)), warnings)
-
-
-def _fitted(touched: np.ndarray, points: np.ndarray) -> tuple[Rigid, np.ndarray]:
-    """Pose, and distance (N,) of each point from where it was touched."""
-    middle, about = touched.mean(axis=0), points.mean(axis=0)
-    turn, _ = Rotation.align_vectors(touched - middle, points - about)
-    pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
-    apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
-    return pose, apart

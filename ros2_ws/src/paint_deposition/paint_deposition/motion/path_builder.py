@@ -32,16 +32,9 @@ class PathBuilder:
 
     Feed it in any batches: the sub-steps depend on the poses and trigger changes alone.
     ``PoseScreen`` says which poses are dropped and when a stream counts as restarted; that is
-    followed as after a gap.
-
-    Args:
-        max_pose_gap_s: a longer time between two poses is gun off [s].
-        max_step_m: longest travel of the spray in a sub-step [m].
-        whole_strokes: hand out a stroke when it is complete, with what lies ahead of each
-            sub-step known.
-
-    Raises:
-        RecordingError: ``max_pose_gap_s`` is no number above 0.
+    followed as after a gap. A time between poses longer than ``max_pose_gap_s`` is gun off; the
+    spray travels ``max_step_m`` at most in a sub-step. With ``whole_strokes`` a stroke is handed
+    out when it is complete, with what lies ahead of each sub-step known.
     """
 
     def __init__(

@@ -33,28 +33,10 @@ MAX_CLOCK_OFFSET_S = 1.0
 WRITTEN_DEPTH = 500
 
 
-def read_trajectory(
-    path: Path | str,
-    pose_topic: str | None = None,
-    state_topic: str | None = None,
-    tf: Sequence[str] | None = None,
-    robot: Robot | None = None,
-) -> Trajectory:
-    """The atomizer's motion from a bag: poses as recorded, unscreened, stamps in nanoseconds.
-
-    Args:
-        path: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP, split or not) or lone .mcap.
-        pose_topic: PoseStamped, or the robot's joint states; None takes the only one.
-        state_topic: see ``read_switching``; None: the gun always sprays, and topics that could be
-            its trigger are noted.
-        tf: [target, source] of transforms instead of poses: source, the TCP, in target.
-        robot: whose joint states are read instead of poses.
-
-    Raises:
-        RecordingError: one line that names the bag, what is wrong and what to do.
-    """
+def read_trajectory(path: Path | str, *what: Any, **more: Any) -> Trajectory:
+    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a lone .mcap."""
     with open_bag(path) as bag:
-        return trajectory_of(bag, pose_topic, state_topic, tf, robot)
+        return trajectory_of(bag, *what, **more)
 
 
 def trajectory_of(
@@ -64,7 +46,18 @@ def trajectory_of(
     tf: Sequence[str] | None = None,
     robot: Robot | None = None,
 ) -> Trajectory:
-    """The same of an open bag."""
+    """The atomizer's motion from a bag: poses as recorded, unscreened, stamps in nanoseconds.
+
+    Args:
+        pose_topic: PoseStamped, or the robot's joint states; None takes the only one.
+        state_topic: see ``read_switching``; None: the gun always sprays, and topics that could be
+            its trigger are noted.
+        tf: [target, source] of transforms instead of poses: source, the TCP, in target.
+        robot: whose joint states are read instead of poses.
+
+    Raises:
+        RecordingError: one line that names the bag, what is wrong and what to do.
+    """
     if tf:
         from paint_deposition.files.recordings.transforms import read_tf_poses
 

@@ -43,17 +43,12 @@ class Signal:
             ) from None
         return Signal(said['topic'], said['path'], said['side'] == '<', level)
 
-    @property
-    def steps(self) -> list[tuple[str, str]]:
-        """(name, '') or ('', index) of each step of the path."""
-        return STEP.findall(self.path)
-
     def value(self, message: Any) -> float | None:
         """The number in a message, None where there is none."""
         value = message
         # The messages of std_msgs have one field.
         try:
-            for name, index in self.steps or [('data', '')]:
+            for name, index in STEP.findall(self.path) or [('data', '')]:
                 value = getattr(value, name) if name else value[int(index)]
         except (AttributeError, IndexError, TypeError):
             return None

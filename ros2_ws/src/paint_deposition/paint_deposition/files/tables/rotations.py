@@ -57,11 +57,11 @@ def read_rotations(
             if columns := table.find_all(names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
                 said = f'quaternion {table.written(columns)} ({order})'
-                return table.numbers(columns), said
+                return table.values(columns), said
     columns, by_axis, convention = _angle_columns(table, rotation)
     written = table.written(columns)
     unit = _unit(table, columns, convention, angle_unit)
-    angles = table.numbers(columns) * ANGLES[unit]
+    angles = table.values(columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
     if unit == 'rad' and largest > LARGEST_RAD:
         raise RecordingError(

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,6 +23,7 @@ NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:i
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|none|null', re.IGNORECASE)
+Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
 
 
@@ -85,8 +87,8 @@ class Table:
         return float(text) if NUMBER.fullmatch(text) else None
 
     def written(self, columns: Sequence[int]) -> str:
-        """Headings as the file has them."""
-        return ' '.join(self.headings[column].text for column in columns)
+        """Headings as the file has them; of all columns where none are given."""
+        return ' '.join(self.headings[k].text for k in columns or range(len(self.headings)))
 
     def complain(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
@@ -101,18 +103,18 @@ class Table:
         if not self._complaints:
             return
         lines = [f'line {line}: {text}' for line, text in sorted(self._complaints.items())]
-        more = len(lines) - MOST_COMPLAINTS_SHOWN
-        rest = f'; and {more} more' if more > 0 else ''
         count = f'{len(lines)} complaints: ' if len(lines) > 1 else ''
-        raise self.error(f'{count}{"; ".join(lines[:MOST_COMPLAINTS_SHOWN])}{rest}')
+        if (more := len(lines) - MOST_COMPLAINTS_SHOWN) > 0:
+            lines[MOST_COMPLAINTS_SHOWN:] = [f'and {more} more']
+        raise self.error(count + '; '.join(lines))
 
-    def select(self, rows: Sequence[int]) -> Table:
+    def select(self: Kind, rows: Sequence[int]) -> Kind:
         """The chosen rows (indices); complaints are shared."""
         return replace(
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
 
-    def with_decimal(self, columns: Iterable[int], given: str = '') -> tuple[Table, str]:
+    def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
 
         ``given`` is the mark where the user says it.
@@ -158,11 +160,9 @@ def find_table(
         sheets = named
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
-        ranks = [
-            (known(headings_in(row)), not is_comment(row)) for row in one.rows[:MOST_LINES_ABOVE]
-        ]
-        best = max(ranks, default=(0, False))
-        if best[0]:
+        above = one.rows[:MOST_LINES_ABOVE]
+        ranks = [(known(headings_in(row)), not is_comment(row)) for row in above]
+        if (best := max(ranks, default=(0, False)))[0]:
             found.append((one, ranks.index(best)))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
