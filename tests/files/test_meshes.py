@@ -85,35 +85,20 @@ def test_text_in_any_encoding_is_read(tmp_path):
     assert read_mesh(path).area_m2 == pytest.approx(0.16)
 
 
-def test_an_obj_of_several_objects_with_materials_and_quads(tmp_path):
-    path = tmp_path / 'part.obj'
-    path.write_text(
-        'mtllib gone.mtl\no one\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nusemtl red\nf 1 2 3 4\n'
-        'o two\nv 2 0 0\nv 2 0 1\nusemtl blue\nf 2 5 6 3\n'
-    )
-    surface = read_mesh(path, max_edge_length_m=0.2)
-    assert surface.area_m2 == pytest.approx(2.0)
-    assert surface.at([[1.0, 0.0, 0.5]]).edge_distance_m[0] == pytest.approx(0.5)
-
-
 def broken(path, kind):
     """Write a file that is no part."""
-    if kind == 'garbage':
-        path.write_bytes(bytes(range(256)) * 9)
-    elif kind == 'empty file':
-        path.write_bytes(b'')
+    corners = sheet().vertices.copy()
+    faces = [[0, 1, 1], [2, 2, 3]] if kind == 'no area' else sheet().faces
+    if kind == 'not finite':
+        corners[2, 1] = np.nan
+    if kind in ('garbage', 'empty file'):
+        path.write_bytes(bytes(range(256)) * 9 * (kind == 'garbage'))
     elif kind == 'truncated':
-        whole = saved(icosphere(), path).read_bytes()
-        path.write_bytes(whole[: len(whole) // 2])
-    elif kind == 'not finite':
-        mesh = sheet()
-        vertices = mesh.vertices.copy()
-        vertices[2, 1] = np.nan
-        saved(trimesh.Trimesh(vertices, mesh.faces, process=False), path)
-    elif kind == 'no area':
-        saved(trimesh.Trimesh(sheet().vertices, [[0, 1, 1], [2, 2, 3]], process=False), path)
+        path.write_bytes(saved(icosphere(), path).read_bytes()[:32042])
     elif kind == 'points only':
-        trimesh.PointCloud(sheet().vertices).export(path)
+        trimesh.PointCloud(corners).export(path)
+    else:
+        saved(trimesh.Trimesh(corners, faces, process=False), path)
     return path
 
 

@@ -139,16 +139,6 @@ def test_a_learned_law_reads_back_to_the_bit(law, tmp_path: Path):
     assert law.over in path.read_text()
 
 
-def test_how_well_a_curve_is_known_reads_back_on_one_line(tmp_path: Path):
-    path, law = tmp_path / 'model.yaml', learned(LEARNED['time_s'])
-    write_model(path, DepositionModel(effects=(law,)))
-    assert 'sd:' not in path.read_text()
-    known = law.model_copy(update={'sd': (0.02, 1.0 / 3.0, 0.05)})
-    write_model(path, DepositionModel(effects=(known,)))
-    assert read_model(path).effects == (known,)
-    assert 'sd: [0.02, 0.3333333333333333, 0.05]' in path.read_text()
-
-
 MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
 
 

@@ -106,9 +106,7 @@ def test_the_parts_unused_for_longest_make_room(folder, tmp_path, monkeypatch):
 
 def test_nothing_is_kept_where_that_is_not_wanted_or_not_possible(folder, part, monkeypatch):
     first = read_mesh(part)
-    monkeypatch.setenv(surface_cache.FOLDER_VARIABLE, str(part))  # no folder
-    assert_same(read_mesh(part), first)
-    monkeypatch.setenv(surface_cache.FOLDER_VARIABLE, '')
-    assert surface_cache.place_of(part) is None
-    assert_same(read_mesh(part), first)
+    for nowhere in (str(part), ''):  # no folder
+        monkeypatch.setenv(surface_cache.FOLDER_VARIABLE, nowhere)
+        assert_same(read_mesh(part), first)
     assert len(list(folder.iterdir())) == 1

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, is_pose
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -45,25 +44,13 @@ def test_the_inverse_undoes_and_products_chain():
     assert np.allclose(chained[1], stepwise[1], atol=1e-14)
 
 
-def test_a_motion_is_seen_from_the_part():
-    """The part stands 2 m before the robot and is turned by 180 degrees about z."""
-    trajectory = Trajectory(
-        np.array([0, 1]), np.array([[1.5, 0.1, 0.0], [2.0, 0.0, 0.5]]), np.eye(4)[[3, 3]], 'base'
-    )
-    seen = at_part(trajectory, [2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], 'part')
-    assert np.allclose(seen.positions_m, [[0.5, -0.1, 0.0], [0.0, 0.0, 0.5]], atol=1e-15)
-    assert seen.frame_id == 'part'
-
-
 @pytest.mark.parametrize(
     ('values', 'good'),
     [
         ([0, 0, 0, 0, 0, 0, 1], True),
-        ([1e3, 0, 0, 0.5, 0.5, 0.5, 0.5], True),
         ([0, 0, 0, 0, 0, 0, 1.009], True),
         ([0, 0, 0, 0, 0, 0, 1.02], False),
         ([0, 0, 0, 0, 0, 1], False),
-        ([], False),
         ([np.nan, 0, 0, 0, 0, 0, 1], False),
     ],
 )

@@ -53,11 +53,6 @@ def test_a_lasting_run_from_an_earlier_time_is_a_restart_of_which_nothing_is_los
     assert (counts.restarts, counts.rejected) == (1, 0)
 
 
-def test_gaps_are_counted_with_the_longest():
-    _, counts = followed([0, 250, 501, 1000, 1010])
-    assert (counts.gaps, counts.longest_gap_ns) == (2, 499)
-
-
 def test_what_is_no_pose_is_dropped_and_quaternions_are_brought_to_unit_length():
     good = [UNIT, (0, 0, 0, 1.009), (0, 0, 0, 0.991)]
     quaternions = [*good, (0, 0, 0, 1.02), (0, 0, 0, 0), (0, 0, np.inf, 1), UNIT, UNIT]
