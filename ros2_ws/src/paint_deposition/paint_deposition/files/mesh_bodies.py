@@ -33,12 +33,10 @@ SHOWN_NAMES = 8
 
 @dataclass(frozen=True)
 class Bodies:
-    """What was read of a mesh file.
+    """Vertices (V, 3) in the file's own unit and precision, faces (F, 3), metres to the unit, and
+    notes.
 
-    Attributes:
-        vertices: (V, 3) in the file's own unit, and precision. faces: (F, 3).
-        unit_m: metres to the unit, 1 where the file has none.
-        notes: what was understood of unit and bodies, for the user.
+    ``unit_m`` is 1 where the file has no unit; the notes say what was understood, for the user.
     """
 
     vertices: np.ndarray

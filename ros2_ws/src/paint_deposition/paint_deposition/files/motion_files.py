@@ -84,28 +84,25 @@ def read_gun_motions(
     /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves. Raises
     RecordingError where names and files do not go together, or a file cannot be read.
     """
-    if not atomizers:
-        names = [file.stem for file in files]
-        if len(files) == 1:
-            names = ['']
-        elif len(set(names)) < len(names):
-            names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
-        pairs = zip(names, files, strict=True)
-        return [GunMotion(name, read_motion(file, source)) for name, file in pairs]
-    if len(files) not in (1, len(atomizers)):
+    guns = [name.strip('/') for name in atomizers]
+    names = guns or [file.stem for file in files]
+    if guns and len(files) not in (1, len(guns)):
         raise RecordingError(
-            f'{len(files)} files for {len(atomizers)} atomizers: give one with all of them, or '
-            'one for each'
+            f'{len(files)} files for {len(guns)} atomizers: give one with all of them, or one for '
+            'each'
         )
-    if source.pose_topic or source.state_topic:
+    if guns and (source.pose_topic or source.state_topic):
         raise RecordingError(
             'an atomizer is given by its name and by topics: leave out --atomizer, or '
             '--pose-topic and --state-topic'
         )
-    names = [name.strip('/') for name in atomizers]
+    if not guns and len(files) == 1:
+        names = ['']
+    elif not guns and len(set(names)) < len(names):
+        names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
     each = list(files) * (len(names) if len(files) == 1 else 1)
-    pairs = zip(names, each, strict=True)
-    return [GunMotion(name, read_motion(file, source, name)) for name, file in pairs]
+    of_each = zip(names, each, guns or [''] * len(each), strict=True)
+    return [GunMotion(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
 def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:

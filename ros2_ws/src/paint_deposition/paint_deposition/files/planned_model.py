@@ -26,11 +26,7 @@ IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 
 @dataclass(frozen=True)
 class PlannedModel:
-    """What a motion says of the model that it was planned with.
-
-    ``path`` is where the model should be; ``file`` is None where it is not there or is another
-    one.
-    """
+    """What a motion says of its plan's model; ``file`` is None where that is not there."""
 
     path: Path
     digest: str

@@ -40,10 +40,7 @@ def origin(
     files: Mapping[str, str | Path] | None = None,
     campaign: str = '',
 ) -> dict[str, Any]:
-    """What figures were computed from, for the key ``provenance`` of every JSON.
-
-    The model, or several by name, in full; ``files`` by what they are, each with its digest.
-    """
+    """What figures were computed from, for ``provenance`` of every JSON."""
     models = model if isinstance(model, Mapping) else {'model': model} if model else {}
     named = {'campaign': campaign, **(files or {})}
     return {

@@ -23,8 +23,7 @@ NOTABLE_M = 0.002
 class PartPlace:
     """The pose of a part in the frame of the robot, and how well it is known.
 
-    ``residuals_m`` are, by point, how far it is from where the pose puts it, ``rms_m`` their root
-    mean square [m].
+    ``residuals_m`` are, by point, how far it is from where the pose puts it; with their RMS [m].
     """
 
     pose: Rigid
@@ -34,12 +33,9 @@ class PartPlace:
 
     def to_dict(self) -> dict[str, Any]:
         """Pose, residuals and warnings."""
-        return {
-            'part_pose': list(self.pose.values),
-            'rms_m': self.rms_m,
-            'residuals_m': dict(self.residuals_m),
-            'warnings': list(self.warnings),
-        }
+        figures = {'part_pose': list(self.pose.values), 'rms_m': self.rms_m}
+        said = {'residuals_m': dict(self.residuals_m), 'warnings': list(self.warnings)}
+        return figures | said
 
 
 def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarray]) -> PartPlace:

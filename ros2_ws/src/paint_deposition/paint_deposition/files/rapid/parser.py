@@ -215,21 +215,16 @@ class ModuleParser:
         if self._takes('('):
             self._skip_past(')')
         while not self._takes('endmodule'):
-            self._member(module)
+            word = self._now.word
+            if self._takes(*STORAGE):
+                self._declaration(module.data)
+            elif self._takes('proc'):
+                self._procedure(module)
+            elif word in SKIPPED_TO:
+                self._skip_past(SKIPPED_TO[word])
+            elif not self._takes('local', 'task'):
+                self._fail(f'{self._now.text or "the end"!r} is no declaration')
         return module
-
-    def _member(self, module: Module) -> None:
-        while self._takes('local', 'task'):
-            pass
-        word = self._now.word
-        if self._takes(*STORAGE):
-            self._declaration(module.data)
-        elif self._takes('proc'):
-            self._procedure(module)
-        elif word in SKIPPED_TO:
-            self._skip_past(SKIPPED_TO[word])
-        else:
-            self._fail(f'{self._now.text or "the end"!r} is no declaration')
 
     def _declaration(self, data: dict[str, Declaration]) -> None:
         line = self._now.line

@@ -81,8 +81,7 @@ def is_rapid(path: Path | str) -> bool:
 def program_trajectory(program: RapidProgram) -> Trajectory:
     """Poses along a program, from the end of its first move on, at the programmed speeds.
 
-    What is assumed is in the trajectory's notes. A program that never switches the gun sprays
-    throughout. Raises RecordingError without a second move or a speed.
+    What is assumed is in the notes; a program that never switches the gun sprays throughout.
     """
     recorded = timed(program.moves, bool(program.gun_signal))
     notes = [PROGRAMMED, 'speeds are taken as programmed; acceleration is left out']

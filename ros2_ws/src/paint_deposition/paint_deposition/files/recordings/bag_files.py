@@ -141,11 +141,7 @@ def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
 
 @contextmanager
 def open_bag(path: Path | str) -> Iterator[Bag]:
-    """Open a bag for reading.
-
-    Raises RecordingError with one line and the remedy when there is none at `path`, and when it is
-    something else, unfinished or damaged; the latter while it is read, too.
-    """
+    """Open a bag; RecordingErrors say what it lacks and the remedy, also while it is read."""
     path = Path(path)
     _refuse_what_is_no_bag(path)
     with _reading(path):

@@ -51,7 +51,10 @@ class Robot:
             raise RecordingError(f'{path} is no URDF ({" ".join(str(error).split())})') from None
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
         parents.add_nodes_from(link.name for link in links)
-        tip = tip or _last_link(path, parents)
+        last = sorted(link for link in parents if not parents.in_degree(link))
+        if tip is None and USUAL_TIP not in parents and len(last) != 1:
+            raise RecordingError(f'{path} ends in {" ".join(last)}; name one with --tip')
+        tip = tip or (USUAL_TIP if USUAL_TIP in parents else last[0])
         base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
             if name not in parents:
@@ -85,15 +88,6 @@ class Robot:
                     moved[:, :3, :3] = Rotation.from_rotvec(along).as_matrix()
                 tip = tip @ moved
         return tip[:, :3, 3], Rotation.from_matrix(tip[:, :3, :3]).as_quat()
-
-
-def _last_link(path: Path, parents: nx.DiGraph) -> str:
-    if USUAL_TIP in parents:
-        return USUAL_TIP
-    last = [link for link in parents if not parents.in_degree(link)]
-    if len(last) != 1:
-        raise RecordingError(f'{path} ends in {" ".join(sorted(last))}; name one with --tip')
-    return last[0]
 
 
 def read_joint_poses(

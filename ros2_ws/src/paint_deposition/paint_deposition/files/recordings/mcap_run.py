@@ -91,7 +91,14 @@ class RunWriter:
         self._last_ns = 0
         self._chunk_opened_s: float | None = None
         self._failure: str | None = None
-        self._raw = self._create()
+        try:
+            self.folder.parent.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir()
+            self._raw = FileIO(self.path, 'xb')
+        except FileExistsError:
+            raise RecordingError(f'{self.folder} already exists; choose another name') from None
+        except OSError as error:
+            raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
         self._stream = BufferedWriter(self._raw)
         self._writer = Writer(
             self._stream, CHUNK_BYTES, COMPRESSIONS[compression], index_types=INDEXES
@@ -174,16 +181,6 @@ class RunWriter:
             self.finish()
         else:
             self.abandon()
-
-    def _create(self) -> FileIO:
-        try:
-            self.folder.parent.mkdir(parents=True, exist_ok=True)
-            self.folder.mkdir()
-            return FileIO(self.path, 'xb')
-        except FileExistsError:
-            raise RecordingError(f'{self.folder} already exists; choose another name') from None
-        except OSError as error:
-            raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:

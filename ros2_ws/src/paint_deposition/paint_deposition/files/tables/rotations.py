@@ -9,13 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.tables import pose_columns
 from paint_deposition.files.tables.headings import ANGLES
-from paint_deposition.files.tables.pose_columns import (
-    QUATERNION,
-    ROLL_PITCH_YAW,
-    ROTATION_VECTOR,
-    PoseTable,
-)
+from paint_deposition.files.tables.pose_columns import QUATERNION, PoseTable
 
 ABB_QUATERNION = ('q2', 'q3', 'q4', 'q1')  # the scalar is the first one, q1
 EULER = ('ex', 'ey', 'ez')
@@ -80,14 +76,14 @@ def read_rotations(
 
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
-    if columns := table.find_all(ROTATION_VECTOR):
+    if columns := table.find_all(pose_columns.ROTATION_VECTOR):
         if rotation is None and table.units(columns) & {'deg', '°'}:
             raise RecordingError(
                 f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
                 f'give --rotation: {ROTATION_WORDS}'
             )
         return columns, True, rotation or ROTVEC
-    if columns := table.find_all(ROLL_PITCH_YAW):
+    if columns := table.find_all(pose_columns.ROLL_PITCH_YAW):
         return columns, True, rotation or 'rpy'
     for names, usual in IN_ORDER.items():
         if columns := table.find_all(names):

@@ -108,13 +108,11 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
     try:
         _refuse_far_cells(content)
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
-        return [
-            Sheet.of(
-                enumerate(([_cell(value) for value in row] for row in sheet.to_python(False)), 1),
-                f"sheet '{sheet.name}'",
-            )
-            for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names)
-        ]
+        sheets = []
+        for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names):
+            rows = ([_cell(value) for value in row] for row in sheet.to_python(False))
+            sheets.append(Sheet.of(enumerate(rows, 1), f"sheet '{sheet.name}'"))
+        return sheets
     except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
         raise ValueError(f'a workbook ({error})') from None
 
