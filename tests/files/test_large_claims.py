@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fuzz.seeds import RAPID
-from fuzz.targets import targets
+from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
 
 CLAIMED = 1_000_000_000

@@ -14,8 +14,9 @@ import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
 
+from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
-from fuzz.seeds import CAMPAIGN, MODEL, POSES, RAPID, READINGS
+from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
 from paint_deposition.files.meshes import read_mesh
@@ -28,6 +29,32 @@ from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.reading_columns import Layout
 from robot_arm import urdf
 from workbook import write_workbook
+
+RAPID = rb"""MODULE Door
+  PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+  CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  VAR robtarget p2;
+  VAR triggdata gunOn;
+  VAR num n{2}:=[1,2];
+  PROC main()
+    TriggIO gunOn,0\Start\DOp:=doGun,1;
+    p2:=Offs(p1,0,0,100*(1+2));
+    MoveJ p1,vmax,z10,tBell\WObj:=wobjDoor;
+    TriggL RelTool(p2,0,10,0),v500,gunOn,fine,tBell\WObj:=wobjDoor;
+    MoveC p1,p2,v100\V:=200,z50,tBell;
+    MoveLDO p1,v50,z1,tBell,doGun,0;
+    SetBrush 3;
+    PaintL p1,v200\T:=2,fine,tBell;
+    IF n{1}=2 THEN
+      WaitTime 1;
+    ENDIF
+  ENDPROC
+ENDMODULE
+"""
+POSES = (
+    b'time_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,spraying\n0,0,0,0,0,0,0,1,1\n0.1,10,0,0,0,0,0,1,0\n',
+    b't;x [m];y [m];z [m];rx [deg];ry [deg];rz [deg]\n0;0;0;0;0;0;0\n0,1;0,01;0;0;0;0;90\n',
+)
 
 
 @dataclass(frozen=True)
@@ -142,13 +169,16 @@ def targets() -> dict[str, Target]:
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
     in_mm = _box('3mf', 1000.0)
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
+    readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
+    model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
+    campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
             '.mod', read_recording, [RAPID],
             r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
             '{1} .trans /0 not 9E9 -',
         ),
-        'readings': Target('.csv', read_readings, [*READINGS], cells),
+        'readings': Target('.csv', read_readings, readings, cells),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),
@@ -174,7 +204,7 @@ def targets() -> dict[str, Target]:
         'ros1': Target('.bag', _bag, [ros1]),
         'mcap': Target('.mcap', _bag, [_mcap()]),
         'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),
-        'model': Target('.yaml', read_model_file, [MODEL], 'posterior: mean: id: &a *a'),
-        'campaign': Target('.yaml', read_campaign, [CAMPAIGN], '&a *a <<: tf: points:'),
+        'model': Target('.yaml', read_model_file, [model], 'posterior: mean: id: &a *a'),
+        'campaign': Target('.yaml', read_campaign, [campaign], '&a *a <<: tf: points:'),
         'urdf': Target('.urdf', Robot.read, [urdf().encode()], '<mimic xyz="1"'),
     }  # fmt: skip

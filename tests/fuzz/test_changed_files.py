@@ -35,7 +35,7 @@ def refusal(read, path) -> str:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(0 if INPUTS > 1000 else 120)
+@pytest.mark.timeout(0 if INPUTS > 1000 else 300)
 @pytest.mark.parametrize('name', targets())
 def test_a_changed_file_is_read_or_refused_in_a_line(name, tmp_path):
     """The file of a finding stays in the folder of the test."""

@@ -115,7 +115,7 @@ def test_a_file_cut_at_any_byte_gives_back_all_its_whole_chunks(tmp_path):
     ends = [
         (c.chunk_start_offset + c.chunk_length, c.message_end_time // 1000 + 1) for c in chunks
     ]
-    assert len(ends) > 8
+    assert len(ends) > 6
     content = (tmp_path / 'run.mcap').read_bytes()
     borders = [end + step for end, _ in ends[::4] for step in (-1, 0, 1)]
     for cut in [*borders, *range(10, len(content), len(content) // 7)]:
@@ -133,14 +133,16 @@ def test_a_flipped_bit_costs_one_chunk(tmp_path):
     written = straight_pass(4_000)
     folder = write_pose_bag(tmp_path / 'pass', written)
     path = folder / 'pass_0.mcap'
+    with path.open('rb') as stream:
+        chunk = make_reader(stream).get_summary().chunk_indexes[0]
     content = bytearray(path.read_bytes())
-    content[len(content) // 3] ^= 0x10
+    content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0x10
     path.write_bytes(content)
     with pytest.raises(RecordingError, match='is damaged'):
         read_trajectory(folder)
     recovery = recover(folder, tmp_path / 'recovered')
     assert recovery.damaged_chunks == 1
-    assert 3_000 < recovery.message_count < 4_002
+    assert 2_000 < recovery.message_count < 4_002
     read = read_trajectory(tmp_path / 'recovered', None, '/atomizer/state')
     assert set(read.stamps_ns.tolist()) < set(written.stamps_ns.tolist())
 
