@@ -24,12 +24,10 @@ def saved(mesh: trimesh.Trimesh, path, **options):
 @pytest.mark.parametrize(
     ('name', 'options'),
     [
-        ('part.stl', {'file_type': 'stl_ascii'}),
-        ('PART.STL', {'file_type': 'stl'}),
-        ('part.ply', {'encoding': 'ascii'}),
-        ('part.obj', {}),
+        ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
+        ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
     ],
-)
+)  # fmt: skip
 def test_formats_give_the_same_part(tmp_path, name, options):
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = read_mesh(saved(ball, tmp_path / name, **options))
