@@ -71,7 +71,7 @@ def fewer(section):
 @pytest.mark.parametrize(
     ('change', 'words'),
     [
-        (lambda s: s['covariance']['K2'].__setitem__(0, 1.0), 'is not symmetric, log_K1 and K2'),
+        (lambda s: s['covariance']['K2'].__setitem__(0, 1.0), 'covariance is not symmetric: '),
         (lambda s: s['covariance']['log_K1'].__setitem__(0, -1.0), 'is not positive definite'),
         (lambda s: s['covariance']['r_m'].pop(), 'covariance.r_m has 8 numbers; expected 9'),
         (fewer, 'mean has no K2'),

@@ -107,7 +107,7 @@ def _copy(
             reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
             if summary := reader.get_summary():
                 schemas, channels = dict(summary.schemas), dict(summary.channels)
-    except DAMAGE:
+    except (*DAMAGE, OSError):  # too short for an end, too
         pass
     for record in _records(file, recovery, on_bytes):
         if isinstance(record, Schema):
