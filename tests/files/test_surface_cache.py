@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from tests.surfaces import triangulated
 from trimesh import Trimesh
 
 from paint_deposition.files import surface_cache
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.part.surface import Surface
+from surfaces import triangulated
 
 
 @pytest.fixture
