@@ -157,7 +157,14 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
         path, counts = spray_path(trajectory, entry.max_pose_gap_s)
         require_spraying(trajectory, path)
-        paths.append(_with_brush(path, brush))
+        if brush is not None:
+            others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
+            if others:
+                raise ReadingsError(
+                    f'brush is {brush}, and the recording names {listed(others)}; leave it out'
+                )
+            path = path.with_(brush=np.full(len(path), brush))
+        paths.append(path)
         if counts.rejected:
             remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
@@ -200,15 +207,3 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int |
         brush = entry.brush if gun.brush is None else gun.brush
         motions.append((str(folder / file), source, brush))
     return motions
-
-
-def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
-    """The path with the brush that the campaign names for it."""
-    if number is None:
-        return path
-    named = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
-    if named:
-        raise ReadingsError(
-            f'brush is {number}, and the recording names {listed(named)}; leave it out'
-        )
-    return path.with_(brush=np.full(len(path), number))
