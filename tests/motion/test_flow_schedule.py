@@ -38,14 +38,6 @@ def test_neither_order_nor_forgetting_matters_later(changes, order, forgotten_un
     assert np.array_equal(flow_at(flow, later), flow_at(expected, later))
 
 
-def test_forgetting_keeps_the_memory_small():
-    flow = FlowSchedule()
-    for stamp in range(10_000):
-        flow.add(stamp, float(stamp % 2))
-        flow.forget(stamp)
-    assert len(flow.steps()[0]) <= 2
-
-
 def test_beginning_again_keeps_what_came_early_for_it():
     flow = schedule([(1000, 1.0), (2000, 0.0)])
     flow.add(0, 0.0, another_stream=True)

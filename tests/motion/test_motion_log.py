@@ -28,13 +28,6 @@ def _in_words(events) -> list:
     return told
 
 
-def test_events_are_kept_in_the_order_in_which_they_came():
-    on, off = TriggerChange(0, 1.0), TriggerChange(7, 0.0)
-    log = _log(on, _poses(0, 5), _poses(5, 2), off, _poses(7, 3))
-    assert _in_words(log.events()) == [on, *range(7), off, 7, 8, 9]
-    assert (log.poses, log.changes, log.complete) == (10, 2, True)
-
-
 @pytest.mark.parametrize('sizes', [(9000,), (13,) * 692 + (4,), (4096, 1, 4095, 808)])
 def test_poses_of_any_batches_come_back_to_the_last_bit(sizes):
     firsts = np.cumsum([0, *sizes])

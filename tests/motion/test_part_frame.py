@@ -4,21 +4,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, is_pose
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(3)
     return rng.normal(size=(count, 3)), Rotation.random(count, random_state=4).as_quat()
-
-
-def test_a_transform_turns_and_then_shifts():
-    """A quarter turn about z takes x to y; the tool turns along."""
-    place = Rigid.of([1.0, 2.0, 3.0, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)])
-    position, quaternion = place.applied(np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]))
-    assert np.allclose(position, [1.0, 3.0, 3.0], atol=1e-15)
-    assert np.allclose(quaternion, [0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)], atol=1e-15)
 
 
 def test_transforms_agree_with_scipy_and_keep_the_norm_of_quaternions():
@@ -53,28 +44,13 @@ def test_the_inverse_undoes_and_products_chain():
     assert np.allclose(chained[1], stepwise[1], atol=1e-14)
 
 
-def test_a_motion_is_seen_from_the_part():
-    """The part stands 2 m before the robot and is turned by 180 degrees about z."""
-    trajectory = Trajectory(
-        np.array([0, 1]), np.array([[1.5, 0.1, 0.0], [2.0, 0.0, 0.5]]), np.eye(4)[[3, 3]], 'base'
-    )
-    seen = at_part(trajectory, [2.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0], 'part')
-    assert np.allclose(seen.positions_m, [[0.5, -0.1, 0.0], [0.0, 0.0, 0.5]], atol=1e-15)
-    assert seen.frame_id == 'part'
-
-
 @pytest.mark.parametrize(
     ('values', 'good'),
     [
-        ([0, 0, 0, 0, 0, 0, 1], True),
-        ([1e3, 0, 0, 0.5, 0.5, 0.5, 0.5], True),
-        ([0, 0, 0, 0, 0, 0, 1.009], True),
-        ([0, 0, 0, 0, 0, 0, 1.02], False),
-        ([0, 0, 0, 0, 0, 1], False),
-        ([], False),
-        ([np.nan, 0, 0, 0, 0, 0, 1], False),
+        ([0, 0, 0, 0, 0, 0, 1.009], True), ([0, 0, 0, 0, 0, 0, 1.02], False),
+        ([0, 0, 0, 0, 0, 1], False), ([np.nan, 0, 0, 0, 0, 0, 1], False),
     ],
-)
+)  # fmt: skip
 def test_seven_numbers_with_a_unit_quaternion_are_a_pose(values, good):
     assert is_pose(values) is good
 

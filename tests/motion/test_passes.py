@@ -11,7 +11,6 @@ from paint_deposition.motion.trajectory import Trajectory
 SPEED_M_PER_S = 0.5
 LENGTH_M = 1.2
 PASSES = 4
-RADII_M = [0.05, 0.1, 0.15, 0.2, 0.25, 0.29]
 
 
 def resampled(corners_m, spacing_m):
@@ -68,23 +67,22 @@ def assert_passes_are_the_rows(path):
     assert np.array_equal(path.spray_pass[middle], rows)
 
 
-@pytest.mark.parametrize('noise_m', [0.0, 2e-4])
 @pytest.mark.parametrize('gun', ['off in turns', 'on', 'no trigger'])
 @pytest.mark.parametrize(
     ('kind', 'size_m'),
-    [('corner', 0.05), ('corner', 0.1), ('corner', 0.3)]
-    + [('semicircle', r) for r in RADII_M]
-    + [('zone', r) for r in (0.01, 0.03, 0.05, 0.1, 0.14)],
-)
-def test_every_row_of_a_raster_is_a_pass(kind, size_m, gun, noise_m):
-    path, _ = spray_path(raster(kind, size_m, gun, noise_m))
+    [
+        ('corner', 0.05), ('corner', 0.3), ('semicircle', 0.05), ('semicircle', 0.15),
+        ('semicircle', 0.29), ('zone', 0.01), ('zone', 0.05), ('zone', 0.14),
+    ],
+)  # fmt: skip
+def test_every_row_of_a_raster_is_a_pass(kind, size_m, gun):
+    path, _ = spray_path(raster(kind, size_m, gun, noise_m=2e-4))
     assert_passes_are_the_rows(path)
 
 
-@pytest.mark.parametrize('period_s', [0.001, 0.01, 0.03])
-def test_the_rate_of_the_poses_does_not_matter(period_s):
+@pytest.mark.parametrize(('period_s', 'noise_m'), [(0.001, 2e-5), (0.03, 2e-4)])
+def test_the_rate_of_the_poses_does_not_matter(period_s, noise_m):
     for kind, size_m in (('corner', 0.3), ('semicircle', 0.05), ('semicircle', 0.29)):
-        noise_m = 2e-4 if period_s > 0.002 else 2e-5
         path, _ = spray_path(raster(kind, size_m, 'on', noise_m, period_s))
         assert_passes_are_the_rows(path)
 
@@ -111,7 +109,7 @@ def arc_pass(radius_m, sweep_rad, followed, noise_m=2e-4):
 
 @pytest.mark.parametrize(
     ('radius_m', 'sweep_rad', 'followed'),
-    [(3.0, 0.5, False), (1.2, 0.9, False), (1.2, 0.9, True), (0.4, 1.6, True), (0.25, 2.0, True)],
+    [(3.0, 0.5, False), (1.2, 0.9, False), (1.2, 0.9, True), (0.25, 2.0, True)],
 )
 def test_a_pass_along_a_crowned_part_is_one(radius_m, sweep_rad, followed):
     path, _ = spray_path(arc_pass(radius_m, sweep_rad, followed))
@@ -151,7 +149,7 @@ def test_a_gun_that_opens_again_on_another_track_begins_a_pass(shift_m, passes):
     assert path.spray_pass.max() == passes - 1
 
 
-@pytest.mark.parametrize('angle_deg', [65.0, 90.0, 120.0, 180.0])
+@pytest.mark.parametrize('angle_deg', [65.0, 90.0, 180.0])
 @pytest.mark.parametrize('noise_m', [0.0, 2e-4])
 def test_a_turn_is_placed_where_the_path_turns(angle_deg, noise_m):
     angle = np.radians(angle_deg)

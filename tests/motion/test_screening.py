@@ -53,30 +53,16 @@ def test_a_lasting_run_from_an_earlier_time_is_a_restart_of_which_nothing_is_los
     assert (counts.restarts, counts.rejected) == (1, 0)
 
 
-def test_gaps_are_counted_with_the_longest():
-    _, counts = followed([0, 250, 501, 1000, 1010])
-    assert (counts.gaps, counts.longest_gap_ns) == (2, 499)
-
-
-def test_numbers_that_are_not_finite_are_dropped():
-    positions = np.zeros((5, 3))
-    quaternions = np.tile(UNIT, (5, 1))
-    positions[1, 2] = np.nan
-    quaternions[2, 0] = np.inf
-    positions[3, 1] = -1e30
+def test_what_is_no_pose_is_dropped_and_quaternions_are_brought_to_unit_length():
+    good = [UNIT, (0, 0, 0, 1.009), (0, 0, 0, 0.991)]
+    quaternions = [*good, (0, 0, 0, 1.02), (0, 0, 0, 0), (0, 0, np.inf, 1), UNIT, UNIT]
+    positions = np.zeros((8, 3))
+    positions[6, 2], positions[7, 1] = np.nan, -1e30
     screen = PoseScreen(GAP_NS)
-    (kept,) = screen.take(batch([0, 10, 20, 30, 40], quaternions, positions))
-    assert kept.stamps_ns.tolist() == [0, 40]
-    assert (screen.counts.not_finite, screen.counts.not_unit_quaternions) == (3, 0)
-
-
-def test_quaternions_are_rounded_to_unit_length_or_dropped():
-    quaternions = [UNIT, (0, 0, 0, 1.009), (0, 0, 0, 0.991), (0, 0, 0, 1.02), (0, 0, 0, 0)]
-    screen = PoseScreen(GAP_NS)
-    (kept,) = screen.take(batch([0, 10, 20, 30, 40], quaternions))
-    assert kept.stamps_ns.tolist() == [0, 10, 20]
+    (kept,) = screen.take(batch(np.arange(8), quaternions, positions))
+    assert kept.stamps_ns.tolist() == [0, 1, 2]
     assert np.array_equal(np.linalg.norm(kept.quaternions_xyzw, axis=1), np.ones(3))
-    assert screen.counts.not_unit_quaternions == 2
+    assert (screen.counts.not_finite, screen.counts.not_unit_quaternions) == (3, 2)
 
 
 @given(

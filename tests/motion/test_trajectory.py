@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import relative_flow
 
 
@@ -14,15 +14,6 @@ def test_shapes_must_match():
         Trajectory(stamps, np.zeros((2, 3)), np.zeros((3, 4)))
     with pytest.raises(RecordingError, match='2 trigger stamps go with 1 flow'):
         Trajectory(stamps, np.zeros((3, 3)), np.zeros((3, 4)), '', np.arange(2), np.array([1.0]))
-
-
-def test_counts_by_name_with_their_sum():
-    counts = PoseCounts(received=9, repeated_stamps=1, backward_stamps=2, not_finite=3)
-    counts.not_unit_quaternions = 1
-    named = counts.to_dict()
-    assert named['rejected'] == counts.rejected == 7
-    assert named['received'] == 9
-    assert named['restarts'] == 0
 
 
 def test_relative_flow():

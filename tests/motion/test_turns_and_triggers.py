@@ -1,5 +1,7 @@
 """Strokes and passes of whole motions, and the distances to turns and trigger changes."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -29,11 +31,9 @@ ON_OFF_S = [1.0, 3.0, 6.0, 8.0, 11.0, 13.0]  # 0.6 m in the middle of each pass
 
 
 def sprayed_serpentine():
-    return route(
-        SERPENTINE,
-        trigger_stamps_ns=scenes.stamps_ns(ON_OFF_S),
-        trigger_flow=np.tile([1.0, 0.0], 3),
-    )
+    on_off = np.tile([1.0, 0.0], 3)
+    stamps = scenes.stamps_ns(ON_OFF_S)
+    return route(SERPENTINE, trigger_stamps_ns=stamps, trigger_flow=on_off)
 
 
 def test_strokes_are_the_straight_legs():
@@ -54,10 +54,10 @@ def test_times_to_the_trigger_are_those_of_the_clock():
     last_on = np.searchsorted(on, time_s) - 1
     last_off = np.searchsorted(off, time_s) - 1
     was_on, was_off = last_on >= 0, last_off >= 0
-    assert np.allclose(path.since_on_s[was_on], (time_s - on[last_on])[was_on], atol=2e-9)
-    assert np.allclose(path.since_off_s[was_off], (time_s - off[last_off])[was_off], atol=2e-9)
-    assert np.all(path.since_on_s[~was_on] == np.inf)
-    assert np.all(path.since_off_s[~was_off] == np.inf)
+    since_on = np.where(was_on, time_s - on[last_on], np.inf)
+    since_off = np.where(was_off, time_s - off[last_off], np.inf)
+    assert np.allclose(path.since_on_s, since_on, atol=2e-9)
+    assert np.allclose(path.since_off_s, since_off, atol=2e-9)
     spraying = path.flow > 0.0
     remaining = off[np.searchsorted(off, time_s[spraying])] - time_s[spraying]
     assert np.allclose(path.until_off_s[spraying], remaining, atol=2e-9)
@@ -99,13 +99,10 @@ def test_strokes_do_not_depend_on_where_the_part_stands():
     path, _ = spray_path(sprayed_serpentine())
     moved = sprayed_serpentine()
     turn = Rotation.from_euler('xyz', [0.4, -1.0, 2.2])
-    moved = Trajectory(
-        moved.stamps_ns,
-        turn.apply(moved.positions_m) + np.array([3.0, -2.0, 1.0]),
-        (turn * Rotation.from_quat(moved.quaternions_xyzw)).as_quat(),
-        trigger_stamps_ns=moved.trigger_stamps_ns,
-        trigger_flow=moved.trigger_flow,
-    )
+    moved = replace(
+        moved, positions_m=turn.apply(moved.positions_m) + np.array([3.0, -2.0, 1.0]),
+        quaternions_xyzw=(turn * Rotation.from_quat(moved.quaternions_xyzw)).as_quat(),
+    )  # fmt: skip
     turned, _ = spray_path(moved)
     assert np.array_equal(turned.stroke, path.stroke)
     assert np.array_equal(turned.spray_pass, path.spray_pass)

@@ -12,11 +12,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.message_definitions import (
-    STATE_TYPE,
-    Definition,
-    standard,
-)
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE, Definition, standard
 from paint_deposition.motion.trajectory import Trajectory
 
 
@@ -49,14 +45,13 @@ def test_a_written_trajectory_comes_back_exactly(tmp_path):
 
 
 @pytest.mark.parametrize('storage', ['ros1', 'sqlite3', 'mcap'])
-@pytest.mark.parametrize('topic', ['atomizer/pose', '/atomizer/pose'])
-def test_every_storage_and_spelling_of_the_topic(tmp_path, storage, topic):
+def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
     written = straight_pass(triggers=False)
     entries = pose_entries(written, 'atomizer/pose', ros1=storage == 'ros1')
     name = 'made.bag' if storage == 'ros1' else 'made'
     path = write_bag(tmp_path / name, entries, storage)
-    assert same(read_trajectory(path, topic), written)
-    assert same(read_trajectory(path), written)
+    for topic in ('atomizer/pose', '/atomizer/pose', None):
+        assert same(read_trajectory(path, topic), written)
 
 
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
@@ -92,11 +87,9 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
 
 
 def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
-    messages = Messages()
     entries = pose_entries(straight_pass(triggers=False))
-    entries += [('/state', START_NS + 1, messages.state(START_NS, True, 0.0, 60.0))]
-    bag = write_bag(tmp_path / 'run', sorted(entries, key=lambda entry: entry[1]))
-    recorded = read_trajectory(bag, None, '/state')
+    entries.insert(1, ('/state', START_NS + 1, Messages().state(START_NS, True, 0.0, 60.0)))
+    recorded = read_trajectory(write_bag(tmp_path / 'run', entries), None, '/state')
     assert recorded.trigger_flow.tolist() == [0.0]
     assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
 
@@ -114,11 +107,9 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
     ('bag', 'arguments', 'says'),
     [
         ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
-        ('evo_ROS_example.bag', (), 'name a pose topic; its PoseStamped topics: ORB-SLAM S-PTAM'),
         ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
         ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
         ('evo_nav2_turtlebot.mcap', ('odom',), '/odom in .* is nav_msgs/msg/Odometry, not geom'),
-        ('rosbag2_split', (), 'it has no PoseStamped topic'),
         ('rosbag2_topics_and_services.mcap', (), 'it has no PoseStamped topic'),
         ('evo_none.mcap', (), 'no bag at .*evo_none.mcap'),
         ('../README.md', (), 'is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap'),
@@ -168,18 +159,13 @@ def test_an_unfinished_file_says_how_to_recover_it(tmp_path):
     assert refusal(folder).endswith(f'run: paint recover {folder}')
 
 
-def test_a_cut_ros1_bag_says_how_to_reindex_it(tmp_path, shared_data):
-    content = (shared_data / 'bags/evo_ROS_example.bag').read_bytes()
-    cut = tmp_path / 'cut.bag'
-    cut.write_bytes(content[:2_000_000])
-    assert refusal(cut).endswith(f'run: rosbag reindex {cut}')
-
-
 def test_other_files_under_a_bags_name(tmp_path):
+    """A cut ROS 1 bag is damaged likewise."""
     for name in ('a.mcap', 'a.db3', 'a.bag'):
         path = tmp_path / name
         path.write_bytes(b'x' * 1000)
         assert f'{path} is damaged' in refusal(path)
+        assert path.suffix != '.bag' or refusal(path).endswith(f'run: rosbag reindex {path}')
         path.write_bytes(b'')
         assert f'{path} is empty' in refusal(path)
 
@@ -200,7 +186,7 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
     damaged = tmp_path / 'damaged.mcap'
     rng = np.random.default_rng(11)
     refused = 0
-    for position in rng.choice(len(content), 60, replace=False):
+    for position in rng.choice(len(content), 25, replace=False):
         flipped = bytearray(content)
         flipped[position] ^= 1 << int(rng.integers(8))
         damaged.write_bytes(flipped)
@@ -208,18 +194,12 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
             assert same(read_trajectory(damaged, None, '/atomizer/state'), written)
         except RecordingError:
             refused += 1
-    assert refused > 20
+    assert refused > 8
 
 
 def test_flows_of_their_own_are_written_as_states_and_read_back(tmp_path):
-    written = straight_pass(5)
-    half = replace(
-        written, stamps_ns=written.stamps_ns + 10**9,
-        trigger_stamps_ns=written.trigger_stamps_ns + 10**9, trigger_flow=np.array([0.5, 0.0]),
-    )  # fmt: skip
+    half = replace(straight_pass(5), trigger_flow=np.array([0.5, 0.0]))
     bag = write_pose_bag(tmp_path / 'half', half)
-    read = read_trajectory(bag, state_topic='/atomizer/state')
-    np.testing.assert_array_equal(read.trigger_flow, half.trigger_flow)
-    np.testing.assert_array_equal(read.trigger_stamps_ns, half.trigger_stamps_ns)
+    assert same(read_trajectory(bag, state_topic='/atomizer/state'), half)
     with open_bag(bag) as opened:
         assert opened.find('/atomizer/state').type == STATE_TYPE

@@ -37,31 +37,18 @@ def run(tmp_path):
     return writer.folder
 
 
-def records(path):
-    with path.open('rb') as stream:
-        yield from StreamReader(stream, validate_crcs=True).records
-
-
 def test_metadata_file(run):
     content = yaml.safe_load((run / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
-    assert content['version'] == 9
-    assert content['storage_identifier'] == 'mcap'
-    assert content['starting_time'] == {'nanoseconds_since_epoch': 2_000}
-    assert content['duration'] == {'nanoseconds': 3_000}
-    assert content['message_count'] == 2
-    assert content['relative_file_paths'] == ['run_0.mcap']
-    assert content['files'] == [
-        {
-            'path': 'run_0.mcap',
-            'starting_time': {'nanoseconds_since_epoch': 2_000},
-            'duration': {'nanoseconds': 3_000},
-            'message_count': 2,
-        }
-    ]
-    assert content['custom_data'] == {'mesh_sha256': 'ab12'}
-    assert content['ros_distro'] == 'kilted'
-    assert (content['compression_format'], content['compression_mode']) == ('', '')
-    gun, never = content['topics_with_message_count']
+    times = {
+        'starting_time': {'nanoseconds_since_epoch': 2_000}, 'duration': {'nanoseconds': 3_000},
+        'message_count': 2,
+    }  # fmt: skip
+    gun, never = content.pop('topics_with_message_count')
+    assert content == times | {
+        'version': 9, 'storage_identifier': 'mcap', 'relative_file_paths': ['run_0.mcap'],
+        'files': [{'path': 'run_0.mcap', **times}], 'custom_data': {'mesh_sha256': 'ab12'},
+        'ros_distro': 'kilted', 'compression_format': '', 'compression_mode': '',
+    }  # fmt: skip
     assert (gun['message_count'], never['message_count']) == (2, 0)
     topic = gun['topic_metadata']
     assert (topic['name'], topic['type'], topic['serialization_format']) == ('/gun', BOOL, 'cdr')
@@ -70,41 +57,30 @@ def test_metadata_file(run):
     assert set(profile) == QOS_KEYS
     assert (profile['durability'], profile['reliability']) == ('transient_local', 'reliable')
     assert profile['lifespan'] == {'sec': 9223372036, 'nsec': 854775807}
-    assert list(run.iterdir())
-    assert not list(run.glob('*.tmp'))
+    assert sorted(path.name for path in run.iterdir()) == ['metadata.yaml', 'run_0.mcap']
 
 
 def test_records_in_the_file(run):
-    found = list(records(run / 'run_0.mcap'))
+    with (run / 'run_0.mcap').open('rb') as stream:
+        found = list(StreamReader(stream, validate_crcs=True).records)
     assert [r.profile for r in found if isinstance(r, Header)] == ['ros2']
     channel = next(r for r in found if isinstance(r, Channel) and r.topic == '/gun')
     assert channel.message_encoding == 'cdr'
-    profiles = yaml.safe_load(channel.metadata['offered_qos_profiles'])
-    assert isinstance(profiles, list)
-    assert set(profiles[0]) == QOS_KEYS
-    assert profiles[0]['durability'] == 'transient_local'
+    (profile,) = yaml.safe_load(channel.metadata['offered_qos_profiles'])
+    assert set(profile) == QOS_KEYS
     assert channel.metadata['topic_type_hash'] == standard(BOOL).type_hash
     at_open, at_close = (
         yaml.safe_load(r.metadata['serialized_metadata'])
-        for r in found
-        if isinstance(r, Metadata) and r.name == 'rosbag2'
-    )
+        for r in found if isinstance(r, Metadata) and r.name == 'rosbag2'
+    )  # fmt: skip
     assert (at_open['message_count'], at_close['message_count']) == (0, 2)
     whole = yaml.safe_load((run / 'metadata.yaml').read_text())
     assert at_close == whole['rosbag2_bagfile_information']
-    assert isinstance(found[-2], Statistics) or any(isinstance(r, Statistics) for r in found)
-
-
-@pytest.mark.parametrize('compression', ['zstd', 'lz4', 'none'])
-def test_other_readers_agree(tmp_path, compression):
-    with RunWriter(tmp_path / 'run', compression=compression) as writer:
-        writer.add_topic(gun_topic())
-        for stamp in range(5_000):
-            writer.write('/gun', TRUE_CDR, stamp, stamp)
-    with Reader(tmp_path / 'run') as reader:
-        assert [(t, d) for _, t, d in reader.messages()] == [(t, TRUE_CDR) for t in range(5_000)]
-        (connection,) = reader.connections
-        assert connection.ext.offered_qos_profiles == [offered_qos(1, latched=True)]
+    assert any(isinstance(r, Statistics) for r in found)
+    with Reader(run) as reader:
+        assert [(time, data) for _, time, data in reader.messages()] == [
+            (2_000, TRUE_CDR), (5_000, FALSE_CDR)
+        ]  # fmt: skip
 
 
 WRITE_UNTIL_KILLED = """
@@ -134,7 +110,7 @@ def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
     process = subprocess.Popen(
         [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests], stdout=subprocess.PIPE
     )
-    written_ns = [int(process.stdout.readline()) for _ in range(700)]
+    written_ns = [int(process.stdout.readline()) for _ in range(400)]
     os.kill(process.pid, signal.SIGKILL)
     written_ns += map(int, process.stdout.read().split())
     process.wait()

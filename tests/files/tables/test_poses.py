@@ -42,9 +42,6 @@ def degrees(sequence: str) -> np.ndarray:
 
 LAYOUTS = {
     'plain': (table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
-    'own': (
-        table('time_s,x_m,y_m,z_m,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}
-    ),
     'German, millimetres': (
         table(
             'Zeit [ms];X [mm];Y [mm];Z [mm];A [deg];B [deg];C [deg]', 1e3 * TIMES_S,
@@ -89,8 +86,7 @@ LAYOUTS = {
             '/gun/pose/orientation/w', TIMES_S, POSITIONS_M, quaternions(),
         ), {},
     ),
-    'NumPy': (table('# t x y z qx qy qz qw'.replace(' ', ',').replace('#,', '# '), TIMES_S,
-                    POSITIONS_M, quaternions()), {}),
+    'NumPy': (table('# t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
     'comments and blank lines': (
         '# robot 3, shift 2\n\n' + table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M,
                                          quaternions()).replace('\n', '\n\n'), {},
@@ -99,10 +95,9 @@ LAYOUTS = {
 
 
 @pytest.mark.parametrize('name', LAYOUTS)
-@pytest.mark.parametrize('encoding', ['utf-8-sig', 'utf-16'])
-def test_every_layout_is_the_same_motion(name, encoding, tmp_path):
+def test_every_layout_is_the_same_motion(name, tmp_path):
     text, options = LAYOUTS[name]
-    (tmp_path / 'poses.csv').write_text(text, encoding=encoding)
+    (tmp_path / 'poses.csv').write_text(text, encoding='utf-8-sig')
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.stamps_ns, [0, 20_000_000, 41_000_000, 60_000_000, 80_500_000])
     assert np.allclose(read.positions_m, POSITIONS_M, atol=1e-9)
@@ -114,19 +109,15 @@ def test_every_layout_is_the_same_motion(name, encoding, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('heading', 'values', 'flows', 'options'),
+    ('heading', 'flows', 'options'),
     [
-        ('spraying', ON, ON, {}),
-        ('Gun on', ON, ON, {}),
-        ('flow', [0, 0.9, 1.1, 0, 0], [0, 0.9, 1.1, 0, 0], {}),
-        ('DO_12', ON, ON, {'state_topic': 'DO_12'}),
+        ('Gun on', ON, {}), ('flow', [0, 0.9, 1.1, 0, 0], {}),
+        ('DO_12', ON, {'state_topic': 'DO_12'}),
     ],
-)
-def test_the_trigger_holds_from_its_row_on(heading, values, flows, options, tmp_path):
-    text = table(
-        f't,x,y,z,qx,qy,qz,qw,{heading}', TIMES_S, POSITIONS_M, quaternions(), values
-    )  # fmt: skip
-    (tmp_path / 'poses.csv').write_text(text)
+)  # fmt: skip
+def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
+    columns = TIMES_S, POSITIONS_M, quaternions(), flows
+    (tmp_path / 'poses.csv').write_text(table(f't,x,y,z,qx,qy,qz,qw,{heading}', *columns))
     read = read_recording(tmp_path / 'poses.csv', **options)
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
     assert np.allclose(read.trigger_flow, flows)
@@ -151,7 +142,7 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
     text = 't,x,y,z,qx,qy,qz,qw,frame_id\n0,0,0,0,0,0,0,1,base\n1,1,0,0,0,0,0,1,base\n'
     (tmp_path / 'poses.csv').write_text(text)
     assert read_recording(tmp_path / 'poses.csv', frame_id='base').frame_id == 'base'
-    (tmp_path / 'poses.csv').write_text(text.replace('1,base\n1', '1,world\n1'))
+    (tmp_path / 'poses.csv').write_text(text.replace('base\n1', 'world\n1'))
     with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
         read_recording(tmp_path / 'poses.csv')
 
@@ -175,7 +166,6 @@ def test_programmed_passes_take_their_speeds(tmp_path):
         ('', 'no columns x, y, z'),
         ('t,x,y,z,qx,qy,qz,qw\n', 'no poses'),
         ('t,x,y,z,qx,qy,qz\n0,0,0,0,0,0,0\n', 'no orientation among the columns'),
-        ('t,x,y,qx,qy,qz,qw\n0,0,0,0,0,0,1\n', 'no columns x, y, z'),
         ('n,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n', 'no time among the columns'),
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n0,0,?,0,0,0,0,1\n1,0\n', "line 3: y is '?'"),
         ('t,x,y,z,qx,qy,qz,qw\n0,2350,0,0,0,0,0,1\n', 'reach 2350 and have no unit'),
@@ -185,7 +175,6 @@ def test_programmed_passes_take_their_speeds(tmp_path):
         ('t,x,y,z,roll,pitch,yaw\n0,0,0,0,90,0,0\n', 'reach 90 and are read in rad'),
         ('t,x,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0,1\n', 'x x could all be x; keep one'),
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
-        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n1e300,0,0,0,0,0,0,1\n', 'spans 1e+300 s'),
         ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
         ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],

@@ -27,15 +27,13 @@ from paint_deposition.motion.path_builder import (
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
 
-# Readings are matched to the surface; a finer mesh only helps where the surface is strongly
-# curved.
+# Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
 MAX_EDGE_LENGTH_M = 0.02
 
 Quantity = Literal['x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session']
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
-
-
+# A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
@@ -48,12 +46,12 @@ class _File(BaseModel, extra='forbid'):
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
     model: Text | None = Field(None, description='the name of a model file')
-    part: Name = Field('', description='a name or number, for the head of the report')
-    batch: Name = Field('', description='a name or number, for the head of the report')
-    paint: Name = Field('', description='the name of the paint, for the head of the report')
-    cell: Name = Field('', description='the name of the cell, for the head of the report')
-    date: Name = Field('', description='when it was painted, for the head of the report')
-    operator: Name = Field('', description='a name, for the head of the report')
+    part: Name = ''
+    batch: Name = ''
+    paint: Name = ''
+    cell: Name = ''
+    date: Name = ''
+    operator: Name = ''
     target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
     tolerance_um: Number | None = Field(
         None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
@@ -65,38 +63,25 @@ class _File(BaseModel, extra='forbid'):
             raise ValueError('target_um and tolerance_um belong together; give both or none')
         return self
 
-    @property
-    def head(self) -> dict[str, str]:
-        """What is said of part and batch, by key."""
-        return {key: text for key in HEAD if (text := getattr(self, key))}
 
+class _Gun(MotionSource):
+    """One of several guns; what it does not say holds for it as for the experiment."""
 
-class _Brushed(MotionSource):
-    """A motion, and its brush where the recording has none."""
-
+    trajectory: Text | None = Field(None, description='the name of a recording, module or table')
     brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
         None, description='the number of the brush, where the recording names none'
     )
 
 
-class _Gun(_Brushed):
-    """One of several guns; what it does not say holds for it as for the experiment."""
-
-    trajectory: Text | None = Field(None, description='the name of a recording or module')
-
-
-class _Entry(_Brushed):
+class _Entry(_Gun):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
-    trajectory: Text | None = Field(
-        None, description='the name of a recording, RAPID module or table'
-    )
     measurements: Text = Field(description='the name of a file of gauge readings')
     guns: list[Any] = Field(
-        [], description='a list of guns that painted the part together, each with its motion'
+        [], description='a list of guns that painted together, each with its motion'
     )
-    name: Name = Field('', description='a name')
+    name: Name = ''
     body: Text | None = Field(None, description='the name of the one body to take of the mesh')
     mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
     max_pose_gap_s: Number = Field(
@@ -105,10 +90,7 @@ class _Entry(_Brushed):
     down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
         None, description='[x, y, z], the direction of gravity in the mesh frame'
     )
-    points: Text | None = Field(
-        None,
-        description='the name of a file of measuring points, for readings that name theirs',
-    )
+    points: Text | None = Field(None, description='the name of a file of measuring points')
     columns: dict[Quantity, Text | int] = Field(
         {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
     )
@@ -130,10 +112,9 @@ def read_campaign(
     part_pose: Sequence[float] | None = None,
     remark: Remark = lambda kind, experiment, line: None,
 ) -> Campaign:
-    """Read a campaign with all that it names.
+    """Read a campaign with all that it names; paths in it are relative to it.
 
     Args:
-        path: YAML; paths in it are relative to it.
         progress: called with a line for each experiment.
         part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
             that has none of its own.
@@ -143,7 +124,8 @@ def read_campaign(
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
     """
     path = Path(path)
-    file = _read_file(path)
+    content = read_yaml(path, 'campaign', ReadingsError)
+    file = checked(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
     for number, written in enumerate(file.experiments, start=1):
         entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
@@ -157,36 +139,17 @@ def read_campaign(
             experiments.append(_read_experiment(path.parent, name, entry, remark))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
-    return Campaign(
-        tuple(experiments), _start(path, file), str(path), file.head, file.target_um,
-        file.tolerance_um,
-    )  # fmt: skip
-
-
-def model_of_campaign(path: str | Path) -> str | None:
-    """The start model's file that a campaign names, or None; nothing else is read.
-
-    Raises:
-        ReadingsError: the campaign's own file is at fault.
-    """
-    return _start(Path(path), _read_file(Path(path)))
-
-
-def _read_file(path: Path) -> _File:
-    content = read_yaml(path, 'campaign', ReadingsError)
-    if not isinstance(content, dict):
-        raise ReadingsError(f"{path}: is not a campaign; expected the key 'experiments'")
-    return checked(_File, f'{path}: campaign', content, ReadingsError)
-
-
-def _start(path: Path, file: _File) -> str | None:
-    return None if file.model is None else str(path.parent / file.model)
+    start = None if file.model is None else str(path.parent / file.model)
+    head = {key: text for key in HEAD if (text := getattr(file, key))}
+    return Campaign(tuple(experiments), start, str(path), head, file.target_um, file.tolerance_um)
 
 
 def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> Experiment:
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
     motions = _motions(folder, entry)
-    files |= _named([file for file, *_ in motions])
+    different = dict.fromkeys(file for file, *_ in motions)
+    for number, file in enumerate(different, start=1):
+        files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
     trajectories = [read_motion(file, source) for file, source, _ in motions]
@@ -194,7 +157,14 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
         path, counts = spray_path(trajectory, entry.max_pose_gap_s)
         require_spraying(trajectory, path)
-        paths.append(_with_brush(path, brush))
+        if brush is not None:
+            others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
+            if others:
+                raise ReadingsError(
+                    f'brush is {brush}, and the recording names {listed(others)}; leave it out'
+                )
+            path = path.with_(brush=np.full(len(path), brush))
+        paths.append(path)
         if counts.rejected:
             remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
@@ -203,7 +173,11 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     for warning in (warning for t in trajectories for warning in t.warnings):
         remark('warning', name, warning)
     points = None if entry.points is None else folder / entry.points
-    readings = read_readings(files['measurements'], points, _layout(entry), surface)
+    layout = Layout(
+        entry.columns, {kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
+        {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '',
+    )  # fmt: skip
+    readings = read_readings(files['measurements'], points, layout, surface)
     off = frozenset(entry.switched_off)
     settings: dict[str, float] = {}
     for trajectory in reversed(trajectories):
@@ -233,33 +207,3 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int |
         brush = entry.brush if gun.brush is None else gun.brush
         motions.append((str(folder / file), source, brush))
     return motions
-
-
-def _named(files: list[str]) -> dict[str, str]:
-    """The motions' files for reports: `trajectory`, and `trajectory 2` and so on for more."""
-    different = list(dict.fromkeys(files))
-    return {
-        'trajectory' if number == 1 else f'trajectory {number}': file
-        for number, file in enumerate(different, start=1)
-    }
-
-
-def _with_brush(path: SprayPath, number: int | None) -> SprayPath:
-    """The path with the brush that the campaign names for it."""
-    if number is None:
-        return path
-    named = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, number}
-    if named:
-        raise ReadingsError(
-            f'brush is {number}, and the recording names {listed(named)}; leave it out'
-        )
-    return path.with_(brush=np.full(len(path), number))
-
-
-def _layout(entry: _Entry) -> Layout:
-    return Layout(
-        columns=entry.columns,
-        unit={kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
-        decimal={None: '', 'comma': ',', 'point': '.'}[entry.decimal],
-        sheet=entry.sheet or '',
-    )

@@ -37,8 +37,7 @@ def read_readings(
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
             ``session`` and ``nx,ny,nz``; others are known by usual English and German headings.
             Without labels, readings at exactly one place are repeats.
-        points: file of the measuring points (label, x, y, z) of readings that name their point
-            only.
+        points: file of the measuring points (label, x, y, z) that readings name.
         layout: what the file does not say itself.
         surface: the part, for points that are given on its face.
 
@@ -63,34 +62,23 @@ def read_readings(
     if read.has('sigma'):
         sigma_um = read.numbers('sigma', may_be_empty=True)
         for k in np.flatnonzero(sigma_um <= 0.0):
-            text = f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0'
-            table.complain(k, text)
+            table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
     table.refuse_complaints()
     said = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
+    groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
     readings = Readings(
-        positions[row],
-        thickness,
-        labels[row],
-        np.array(read.texts('group'))[row],
-        sigma_um[row],
-        None if normals is None else normals[row],
-        str(path),
-        np.array(read.texts('session'))[row],
+        positions[row], thickness, labels[row], groups, sigma_um[row],
+        None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, said))}',
-    )
+    )  # fmt: skip
     require_repeats_close(readings)
     return readings
 
 
 def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarray]:
-    """Positions (3,) [m] by the names of points, in the order of the table.
+    """Positions (3,) [m] by the names of points in a table with ``point`` and x, y, z, in order.
 
-    Args:
-        path: of a table with a column ``point`` and x, y, z.
-        unit: 'm', 'mm' or 'cm' where the headings have none.
-
-    Raises:
-        ReadingsError: what is wrong with the file.
+    ``unit`` is 'm', 'mm' or 'cm' where the headings have none.
     """
     given = Layout(unit={'position': LENGTHS[unit]} if unit else {})
     points = MeasuringPoints.read(Path(path), given, None)
@@ -99,15 +87,7 @@ def read_points(path: str | Path, unit: str | None = None) -> dict[str, np.ndarr
 
 @dataclass(frozen=True)
 class MeasuringPoints:
-    """A list of points on a part.
-
-    Attributes:
-        path: of its file.
-        labels: one for each point.
-        positions_m: (P, 3) in the mesh frame [m].
-        normals: (P, 3) outward unit normals, or None.
-        words: what was understood, for the user.
-    """
+    """A list of points on a part: labels, (P, 3) in the mesh frame [m], outward unit normals."""
 
     path: Path
     labels: list[str]
@@ -117,11 +97,7 @@ class MeasuringPoints:
 
     @staticmethod
     def read(path: Path, layout: Layout, surface: Surface | None) -> MeasuringPoints:
-        """Read a list: point label and x, y, z, or from_left, height.
-
-        Raises:
-            ReadingsError: all that is wrong with the file.
-        """
+        """Read a list: point label and x, y, z, or from_left, height."""
         read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         positions, normals, place_words = _places(read, surface)
         quantity = 'point' if read.has('point') else 'number'

@@ -16,20 +16,12 @@ def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """JSON with arrays as lists and paths as text; numbers that are not finite become null.
-
-    Raises:
-        ValueError: a value that JSON cannot hold.
-    """
+    """JSON with arrays as lists and paths as text; numbers that are not finite become null."""
     return to_json(content, indent=2, inf_nan_mode='null', fallback=_without_numpy).decode()
 
 
 def plain(value: Any) -> Any:
-    """Numbers and containers of Python for those of NumPy.
-
-    Raises:
-        ValueError: a value that is neither.
-    """
+    """Numbers and containers of Python for those of NumPy; other values raise ValueError."""
     return to_jsonable_python(value, fallback=_without_numpy)
 
 

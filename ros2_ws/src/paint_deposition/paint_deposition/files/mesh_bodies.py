@@ -33,12 +33,10 @@ SHOWN_NAMES = 8
 
 @dataclass(frozen=True)
 class Bodies:
-    """What was read of a mesh file.
+    """Vertices (V, 3) in the file's own unit and precision, faces (F, 3), metres to the unit, and
+    notes.
 
-    Attributes:
-        vertices: (V, 3) in the file's own unit, and precision. faces: (F, 3).
-        unit_m: metres to the unit, 1 where the file has none.
-        notes: what was understood of unit and bodies, for the user.
+    ``unit_m`` is 1 where the file has no unit; the notes say what was understood, for the user.
     """
 
     vertices: np.ndarray
@@ -48,17 +46,14 @@ class Bodies:
 
 
 def read_bodies(path: Path, body: str | None = None) -> Bodies:
-    """Read all bodies of a file as one mesh, or the one that is named.
+    """Read all bodies of a file as one mesh, or the one of a name (object, solid, node or part).
 
-    Args:
-        path: a file with one of SUFFIXES.
-        body: name of an object, solid, node or part in it; default: all.
-
-    Raises:
-        MeshError: not a mesh, or no body of that name; says what to do.
+    Raises MeshError, saying what to do, for what is no mesh or has no such body.
     """
     kind = path.suffix.lower()
-    if kind == '.stl' and body in (None, path.stem) and (triangles := _binary_stl(path)):
+    if kind == '.stl' and (triangles := _binary_stl(path)):
+        if body not in (None, path.stem):
+            raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
         return Bodies(*triangles, 1.0, ())
     scene = _scene(path, kind)
     found = _by_name(path, scene)
@@ -178,13 +173,9 @@ def _as_utf8(path: Path, kind: str) -> bytes:
     content = path.read_bytes()
     if kind == '.ply':
         return content
-    if kind == '.stl':
-        triangles = int.from_bytes(content[80:84], 'little')
-        if len(content) == 84 + 50 * triangles:
-            return content
-        if content and b'facet' not in content:
-            raise MeshError(
-                f'{path}: not readable as a mesh, neither a text STL nor, with its '
-                f'{len(content)} bytes, a complete binary one; export it again'
-            )
+    if kind == '.stl' and content and b'facet' not in content:
+        raise MeshError(
+            f'{path}: not readable as a mesh, neither a text STL nor, with its {len(content)} '
+            'bytes, a complete binary one; export it again'
+        )
     return content.decode('utf-8', errors='replace').encode()

@@ -39,8 +39,9 @@ def read_mesh(
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
-        scale: metres per unit of the file, 0.001 for millimetres. glTF is in metres, and 3MF and
-            STEP have their unit: there it comes on top, for files whose unit is wrong.
+        scale: metres per unit of the file, 0.001 for millimetres; with glTF, 3MF and STEP on top
+        of
+            the unit that they have.
         max_edge_length_m: longest edge after refinement [m].
         down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.
@@ -49,8 +50,12 @@ def read_mesh(
         MeshError: no file, not a mesh, or nothing that could be painted; says what to do.
     """
     path = Path(path)
-    _require_positive('mesh_scale', scale, 'metres per unit of the file, 0.001 for millimetres')
-    _require_positive('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance')
+    for name, value, meaning in (
+        ('mesh_scale', scale, 'metres per unit of the file, 0.001 for millimetres'),
+        ('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance'),
+    ):
+        if not (np.isfinite(value) and value > 0.0):
+            raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
@@ -70,10 +75,7 @@ def write_mesh_ply(
 ) -> None:
     """Write a surface with its normals as PLY, replacing the file at once.
 
-    Args:
-        path: where to.
-        colours: (V, 3) or (V, 4) uint8, shown by viewers.
-        properties: (V,) values of the vertices by name, such as ``thickness_um``.
+    ``colours`` are (V, 3) or (V, 4) uint8; ``properties`` (V,) values of the vertices by name.
     """
     columns = [
         *zip(('x', 'y', 'z'), repeat('float'), surface.vertices_m.T, strict=False),
@@ -98,11 +100,7 @@ def write_mesh_ply(
 
 
 def _prepared(
-    path: Path,
-    scale: float,
-    max_edge_length_m: float,
-    down: np.ndarray | None,
-    body: str | None,
+    path: Path, scale: float, max_edge_length_m: float, down: np.ndarray | None, body: str | None
 ) -> Surface:
     read = _load(path, body)
     notes, unit_m = [*read.notes], read.unit_m
@@ -115,11 +113,6 @@ def _prepared(
     faces = _without_degenerate(path, vertices, faces, notes)
     faces = _oriented(vertices, faces, notes)
     return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
-
-
-def _require_positive(name: str, value: float, meaning: str) -> None:
-    if not (np.isfinite(value) and value > 0.0):
-        raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
 
 
 def _load(path: Path, body: str | None) -> Bodies:
@@ -152,15 +145,14 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
     used[faces] = True
     corners_m = vertices_m if used.all() else vertices_m[used]
     extent = float(box_extent_m(corners_m).max())
-    if extent > LARGEST_M:
+    if not SMALLEST_M <= extent <= LARGEST_M:
+        found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
+        remedy = '--mesh-scale, or mesh_scale'
+        if extent > LARGEST_M:
+            found = f'{extent:.4g} m large, it looks like millimetres; use '
+            remedy = '--mesh-scale 0.001, or mesh_scale: 0.001'
         raise MeshError(
-            f'{path}: the part would be {extent:.4g} m large, it looks like millimetres; '
-            "use --mesh-scale 0.001, or mesh_scale: 0.001 in a campaign or as the node's parameter"
-        )
-    if extent < SMALLEST_M:
-        raise MeshError(
-            f'{path}: the part would be only {extent * 1e3:.3g} mm large, it looks scaled down; '
-            "use a larger --mesh-scale, or mesh_scale in a campaign or as the node's parameter"
+            f"{path}: the part would be {found}{remedy} in a campaign or as the node's parameter"
         )
 
 

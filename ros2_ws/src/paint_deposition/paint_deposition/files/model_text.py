@@ -30,20 +30,11 @@ COMMENTS = {
 
 
 def model_text(
-    model: DepositionModel,
-    folder: Path,
-    header_comment: str,
-    name: str,
-    extras: Mapping[str, Any],
+    model: DepositionModel, folder: Path, header_comment: str, name: str, extras: Mapping[str, Any]
 ) -> str:
-    """YAML of a model.
+    """YAML of a model for a file in ``folder``, to which users' own effects are named relative.
 
-    Args:
-        model: what to write.
-        folder: where the file will be; users' own effects are named relative to it.
-        header_comment: lines for the top.
-        name: what the user calls the model.
-        extras: plain values by top-level key, left out where empty.
+    ``extras`` are plain values by top-level key, left out where empty.
     """
     text = CommentedMap({'name': name} if name else {})
     if header_comment:

@@ -46,8 +46,7 @@ def read_recording(
         more: the other fields of ``MotionSource``, ``part_pose`` say.
 
     Raises:
-        RecordingError: what the readers of these files refuse, an option that is another kind of
-            file's, or poses in another frame than the one named.
+        RecordingError: a file or an option that does not fit, poses in another frame than named.
     """
     given = {'pose_topic': pose_topic, 'state_topic': state_topic, 'gun_signal': gun_signal}
     return read_motion(path, checked(MotionSource, 'motion', given | more, RecordingError))
@@ -60,62 +59,50 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     """
     path = Path(path)
     if is_rapid(path):
-        source.refuse_other(path, 'a RAPID module', 'gun_signal')
+        source.refuse_other(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
-        return _brought_to_part(replace(recorded, source=str(path)), source, None)
-    if is_pose_table(path):
-        source.refuse_other(
-            path, 'a table of poses', 'state_topic', 'pose_unit', 'rotation', 'angle_unit'
-        )
+    elif is_pose_table(path):
+        source.refuse_other(path, 'a table of poses')
         layout = PoseLayout(
             source.state_topic, source.pose_unit, source.rotation, source.angle_unit
         )
         recorded = read_pose_table(path, layout)
-        return _brought_to_part(replace(recorded, source=str(path)), source, None)
-    source.refuse_other(
-        path, 'a bag', 'pose_topic', 'state_topic', 'tf', 'urdf', 'tip_link', 'base_link'
-    )
-    with open_bag(path) as bag:
-        recorded = replace(_recorded(bag, source, gun), source=str(path))
-        return _brought_to_part(recorded, source, bag)
+    else:
+        source.refuse_other(path, 'a bag')
+        with open_bag(path) as bag:
+            recorded = replace(_recorded(bag, source, gun), source=str(path))
+            return _brought_to_part(recorded, source, bag)
+    return _brought_to_part(replace(recorded, source=str(path)), source, None)
 
 
 def read_gun_motions(
     files: Sequence[Path], source: MotionSource, atomizers: Sequence[str] = ()
 ) -> list[GunMotion]:
-    """Read the motion of each gun.
+    """Read the motion of each gun from a bag, a RAPID module or a table for each.
 
-    Args:
-        files: a bag, a RAPID module or a table for each gun, or one bag with all ``atomizers``.
-        source: what holds for each of them.
-        atomizers: names of guns in bags whose topics stand behind them, as
-            /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves.
-
-    Raises:
-        RecordingError: the names and the files do not go together, or a file cannot be read.
+    Or from one bag with all ``atomizers``, whose names stand before their topics, as
+    /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves. Raises
+    RecordingError where names and files do not go together, or a file cannot be read.
     """
-    if not atomizers:
-        names = [file.stem for file in files]
-        if len(files) == 1:
-            names = ['']
-        elif len(set(names)) < len(names):
-            names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
-        motions = (read_motion(file, source) for file in files)
-        return [GunMotion(*pair) for pair in zip(names, motions, strict=True)]
-    if len(files) not in (1, len(atomizers)):
+    guns = [name.strip('/') for name in atomizers]
+    names = guns or [file.stem for file in files]
+    if guns and len(files) not in (1, len(guns)):
         raise RecordingError(
-            f'{len(files)} files for {len(atomizers)} atomizers: give one with all of them, or '
-            'one for each'
+            f'{len(files)} files for {len(guns)} atomizers: give one with all of them, or one for '
+            'each'
         )
-    if source.pose_topic or source.state_topic:
+    if guns and (source.pose_topic or source.state_topic):
         raise RecordingError(
             'an atomizer is given by its name and by topics: leave out --atomizer, or '
             '--pose-topic and --state-topic'
         )
-    names = [name.strip('/') for name in atomizers]
+    if not guns and len(files) == 1:
+        names = ['']
+    elif not guns and len(set(names)) < len(names):
+        names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
     each = list(files) * (len(names) if len(files) == 1 else 1)
-    motions = (read_motion(file, source, name) for name, file in zip(names, each, strict=True))
-    return [GunMotion(*pair) for pair in zip(names, motions, strict=True)]
+    of_each = zip(names, each, guns or [''] * len(each), strict=True)
+    return [GunMotion(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
 def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
@@ -198,12 +185,9 @@ def _on_a_moving_part(
     ]
     positions, quaternions = map(np.array, zip(*brought, strict=True))
     moved = replace(
-        recorded,
-        stamps_ns=recorded.stamps_ns[known],
-        positions_m=positions,
-        quaternions_xyzw=quaternions,
-        frame_id=part,
-    )
+        recorded, stamps_ns=recorded.stamps_ns[known], positions_m=positions,
+        quaternions_xyzw=quaternions, frame_id=part,
+    )  # fmt: skip
     if left_out := len(recorded) - len(moved):
         warning = (
             f'{recorded.source}: {left_out} of {len(recorded)} poses are left out, since the '

@@ -53,32 +53,18 @@ class MotionSource(BaseModel, extra='forbid'):
         None, description=f'the pose of the part in the frame of the poses, {POSE_WORDS}'
     )
 
-    def refuse_other(self, path: Path, kind: str, *known: str) -> None:
-        """Refuse what a kind of file does not have.
-
-        Args:
-            path: the file. kind: what it is, for the message.
-            known: the fields that mean something for it, beside those on the part.
-
-        Raises:
-            RecordingError: another field is given.
-        """
+    def refuse_other(self, path: Path, kind: str) -> None:
+        """Refuse fields that a kind of file does not have, such as 'a bag'."""
         for name, kinds in MOTION_KINDS.items():
-            if name not in known and getattr(self, name) is not None:
+            if PLURAL[kind] not in kinds and getattr(self, name) is not None:
                 option = f'--{name.replace("_", "-")}'
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
-# The fields that one kind of file has, and that kind.
+PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
+# The fields that only some kinds of files have.
 MOTION_KINDS = {
-    'pose_topic': 'bags',
-    'state_topic': 'bags and tables',
-    'tf': 'bags',
-    'urdf': 'bags',
-    'tip_link': 'bags',
-    'base_link': 'bags',
-    'gun_signal': 'RAPID modules',
-    'pose_unit': 'tables of poses',
-    'rotation': 'tables of poses',
-    'angle_unit': 'tables of poses',
-}
+    'pose_topic': 'bags', 'state_topic': 'bags and tables', 'tf': 'bags', 'urdf': 'bags',
+    'tip_link': 'bags', 'base_link': 'bags', 'gun_signal': 'RAPID modules', 'pose_unit': 'tables',
+    'rotation': 'tables', 'angle_unit': 'tables',
+}  # fmt: skip

@@ -18,14 +18,7 @@ MANY = ('distributed', PYARROW, 'ruptures')
 
 
 def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> None:
-    """Refuse to begin without libraries of the extra.
-
-    Args:
-        what: needs them: a command, an option or a file.
-
-    Raises:
-        ManyError: naming those that are missing.
-    """
+    """Refuse to begin what needs libraries of the extra, naming those that are missing."""
     missing = [name for name in libraries if find_spec(name) is None]
     if missing:
         raise ManyError(

@@ -6,7 +6,6 @@ A plan lies in a folder with its ``model.yaml``; its bag holds a copy. Bag, RAPI
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,18 +20,13 @@ PLAN_FILE = 'plan.json'
 IMPROVEMENT_FILE = 'improvement.json'
 # The key of the digest in a bag's custom data and in plan.json.
 DIGEST = 'model_sha256'
+IN_JSON = re.compile(rf'"{DIGEST}":\s*"([0-9a-f]{{64}})"')
 IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class PlannedModel:
-    """What a motion says of the model that it was planned with.
-
-    Attributes:
-        path: where the model should be.
-        digest: of the model.
-        file: the model, None where it is not there or is another one.
-    """
+    """What a motion says of its plan's model; ``file`` is None where that is not there."""
 
     path: Path
     digest: str
@@ -40,11 +34,7 @@ class PlannedModel:
 
 
 def planned_model(motion: Path) -> PlannedModel | None:
-    """The model of a plan's bag, module or table, None for a motion that was not planned.
-
-    Raises:
-        ModelError: a model.yaml beside it is not valid.
-    """
+    """The model of a plan's bag, module or table, None for a motion that was not planned."""
     folder = motion if motion.is_dir() else motion.parent
     digest = _digest(motion, folder)
     if not digest:
@@ -58,18 +48,13 @@ def planned_model(motion: Path) -> PlannedModel | None:
 
 def _digest(motion: Path, folder: Path) -> str:
     """Digest of the model that a motion was planned with, '' for none."""
-    if is_rapid(motion):
-        try:
-            found = IN_RAPID.search(motion.read_text(encoding='utf-8', errors='replace'))
-        except OSError:
-            return ''
-        return found[1] if found else ''
-    if motion.suffix != '.csv':
+    if not is_rapid(motion) and motion.suffix != '.csv':
         return custom_data(folder).get(DIGEST, '')
-    for name in (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ():
-        try:
-            figures = json.loads((folder / name).read_text(encoding='utf-8'))
-        except (OSError, ValueError):
-            continue
-        return str(figures.get(DIGEST, '')) if isinstance(figures, dict) else ''
+    files, pattern = [motion], IN_RAPID
+    if not is_rapid(motion):
+        plans = (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ()
+        files, pattern = [folder / name for name in plans], IN_JSON
+    for file in filter(Path.is_file, files):
+        found = pattern.search(file.read_text(encoding='utf-8', errors='replace'))
+        return found[1] if found else ''
     return ''

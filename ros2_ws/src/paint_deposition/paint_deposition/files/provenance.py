@@ -20,12 +20,18 @@ BLOCK_BYTES = 1 << 20
 def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
     """Texts by name: versions, the mesh's digest, the model in full. Empty paths are left out."""
     notes = {'package_version': __version__, 'git_version': git_version()}
-    if mesh_file:
-        digest = hashlib.sha256(_content(mesh_file, 'mesh_file')).hexdigest()
-        notes |= {'mesh_file': mesh_file, 'mesh_sha256': digest}
-    if model_file:
-        text = _content(model_file, 'model_file').decode('utf-8', errors='replace')
-        notes |= {'model_file': model_file, 'model_yaml': text}
+    for what, path in (('mesh_file', mesh_file), ('model_file', model_file)):
+        if not path:
+            continue
+        try:
+            content = Path(path).read_bytes()
+        except OSError as error:
+            raise PaintError(f'{what} {path}: {error.strerror}') from None
+        notes[what] = path
+        if what == 'mesh_file':
+            notes['mesh_sha256'] = hashlib.sha256(content).hexdigest()
+        else:
+            notes['model_yaml'] = content.decode('utf-8', errors='replace')
     return {key: value for key, value in notes.items() if value}
 
 
@@ -34,20 +40,16 @@ def origin(
     files: Mapping[str, str | Path] | None = None,
     campaign: str = '',
 ) -> dict[str, Any]:
-    """What figures were computed from, for the key ``provenance`` of every JSON.
-
-    Args:
-        model: or several by name; in full.
-        files: by what they are; each with its digest. Empty names are left out.
-        campaign: its file, '' for none.
-    """
+    """What figures were computed from, for ``provenance`` of every JSON."""
     models = model if isinstance(model, Mapping) else {'model': model} if model else {}
     named = {'campaign': campaign, **(files or {})}
     return {
         'package_version': __version__,
         'git_version': git_version(),
         'campaign': campaign,
-        'models': {name: _in_full(one) for name, one in models.items()},
+        'models': {
+            name: _values(one) | {'sha256': model_digest(one)} for name, one in models.items()
+        },
         'files': [
             {'what': what, 'file': str(file), 'sha256': sha256(file)}
             for what, file in named.items() if str(file) not in ('', '.')
@@ -58,10 +60,6 @@ def origin(
 def model_digest(model: DepositionModel) -> str:
     """SHA-256 of a model's values, wherever its file lies and however it is commented."""
     return hashlib.sha256(json_text(_values(model)).encode()).hexdigest()
-
-
-def _in_full(model: DepositionModel) -> dict[str, Any]:
-    return _values(model) | {'sha256': model_digest(model)}
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
@@ -75,11 +73,7 @@ def _values(model: DepositionModel) -> dict[str, Any]:
 
 
 def sha256(path: str | Path) -> str:
-    """Digest of a file, or of all files of a folder with their names, such as a bag's.
-
-    Raises:
-        PaintError: it cannot be read.
-    """
+    """Digest of a file, or of all files of a folder with their names, such as a bag's."""
     path, digest = Path(path), hashlib.sha256()
     try:
         for file in sorted(path.rglob('*')) if path.is_dir() else [path]:
@@ -92,10 +86,3 @@ def sha256(path: str | Path) -> str:
     except OSError as error:
         raise PaintError(f'{path}: {error.strerror}') from None
     return digest.hexdigest()
-
-
-def _content(path: str, parameter: str) -> bytes:
-    try:
-        return Path(path).read_bytes()
-    except OSError as error:
-        raise PaintError(f'{parameter} {path}: {error.strerror}') from None

@@ -14,16 +14,9 @@ Made = TypeVar('Made', bound=BaseModel)
 
 
 def checked(model: type[Made], where: str, values: Any, refusal: type[PaintError]) -> Made:
-    """The values as a model.
+    """The values as a model; the first that is wrong raises ``refusal`` in one line.
 
-    Args:
-        model: what to make.
-        where: how the user calls it.
-        values: as written.
-        refusal: error to raise.
-
-    Raises:
-        PaintError: of the class given, with one line for the first value that is wrong.
+    ``where`` is how the user calls what the values stand in.
     """
     try:
         made = model.model_validate(values)

@@ -10,16 +10,9 @@ from paint_deposition.errors import PaintError
 
 
 def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
-    """The one document of a file.
+    """The one document of a file, which should be a ``kind``.
 
-    Args:
-        path: of the file.
-        kind: what it should be, for the remedy.
-        refusal: error to raise.
-
-    Raises:
-        PaintError: of the class given; the file is not there, cannot be read, is no YAML, or gives
-            a key twice.
+    Raises ``refusal`` where the file cannot be read, is no YAML, or gives a key twice.
     """
     try:
         return YAML(typ='safe', pure=True).load(path.read_text(encoding='utf-8'))

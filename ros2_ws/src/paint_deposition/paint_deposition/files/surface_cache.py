@@ -63,8 +63,6 @@ def keep(place: Path, surface: Surface) -> None:
     """Keep a part for the next time, if it is large and the folder can be written."""
     if len(surface.vertices_m) < LEAST_VERTICES:
         return
-    if surface.in_hem is None or surface.neighbours is None:  # not of ``Surface.from_triangles``
-        return
     arrays = {name: getattr(surface, name) for name in ARRAYS}
     for item in fields(CurvedEdges):
         arrays[f'curved_{item.name}'] = getattr(surface.curved_edges, item.name)
@@ -93,11 +91,9 @@ def _make_room(folder: Path) -> None:
 def _prepared_by() -> tuple[str, ...]:
     """Digest of the code that prepares parts, and the versions of what it is built on."""
     package = Path(__file__).parent.parent
-    sources = [
-        *package.glob('part/*.py'), *package.glob('files/*mesh*.py'), Path(__file__),
-        package / 'kernel/blocks.py',
-    ]  # fmt: skip
-    code = hashlib.sha256(b'\0'.join(file.read_bytes() for file in sorted(sources)))
+    sources = [*package.glob('part/*.py'), *package.glob('files/*mesh*.py'), Path(__file__)]
+    sources = sorted([*sources, package / 'kernel/blocks.py'])
+    code = hashlib.sha256(b'\0'.join(file.read_bytes() for file in sources))
     return (code.hexdigest(), *(_version(name) for name in LIBRARIES))
 
 

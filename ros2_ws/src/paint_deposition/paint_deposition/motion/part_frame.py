@@ -68,10 +68,10 @@ class Rigid:
         return (*self.translation_m.tolist(), *self.quaternion_xyzw)
 
     def applied(self, positions_m: np.ndarray, quaternions_xyzw: np.ndarray) -> tuple:
-        """Poses after the transform: positions (..., 3) and quaternions (..., 4).
+        """Poses after the transform: positions (..., 3) and quaternions (..., 4) of unchanged
+        norm.
 
-        Each pose by itself, so that a pose comes out the same to the last bit whether it is alone
-        or among others. The norms of the quaternions stay as they are.
+        Each pose by itself, so that it comes out the same to the last bit alone or among others.
         """
         turned = np.sum(self.rotation * positions_m[..., np.newaxis, :], axis=-1)
         x, y, z, w = self.quaternion_xyzw

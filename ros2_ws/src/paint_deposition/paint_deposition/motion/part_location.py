@@ -21,13 +21,9 @@ NOTABLE_M = 0.002
 
 @dataclass(frozen=True)
 class PartPlace:
-    """The pose of a part, and how well it is known.
+    """The pose of a part in the frame of the robot, and how well it is known.
 
-    Attributes:
-        pose: of the part in the frame of the robot.
-        rms_m: root mean square of the residuals [m].
-        residuals_m: by point, how far it is from where the pose puts it [m].
-        warnings: what is odd, a line each.
+    ``residuals_m`` are, by point, how far it is from where the pose puts it; with their RMS [m].
     """
 
     pose: Rigid
@@ -37,23 +33,16 @@ class PartPlace:
 
     def to_dict(self) -> dict[str, Any]:
         """Pose, residuals and warnings."""
-        return {
-            'part_pose': list(self.pose.values),
-            'rms_m': self.rms_m,
-            'residuals_m': dict(self.residuals_m),
-            'warnings': list(self.warnings),
-        }
+        figures = {'part_pose': list(self.pose.values), 'rms_m': self.rms_m}
+        said = {'residuals_m': dict(self.residuals_m), 'warnings': list(self.warnings)}
+        return figures | said
 
 
 def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarray]) -> PartPlace:
     """The pose that brings points of the part to where they were touched, by least squares.
 
-    Args:
-        touched_m: (3,) by name, in the robot's frame [m].
-        points_m: (3,) by name, the same points in the part's frame; others are left out.
-
-    Raises:
-        RecordingError: fewer than three points in common, or points on a line.
+    Both are (3,) [m] by name, in the robot's and in the part's frame; points without a partner are
+    left out. Raises RecordingError for fewer than three in common, or points on a line.
     """
     names = [name for name in touched_m if name in points_m]
     if len(names) < FEWEST_POINTS:
@@ -71,7 +60,10 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
                 f'the {what} points {" ".join(names)} lie on a line, so that the part may be '
                 'turned about it; add a point beside it'
             )
-    pose, apart = _fitted(touched, points)
+    middle, about = touched.mean(axis=0), points.mean(axis=0)
+    turn, _ = Rotation.align_vectors(touched - middle, points - about)
+    pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
+    apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
     rms = float(np.sqrt(np.mean(apart**2)))
     warnings: tuple[str, ...] = ()
     if rms > NOTABLE_M:
@@ -82,12 +74,3 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
             'right-handed',
         )
     return PartPlace(pose, rms, dict(zip(names, apart.tolist(), strict=True)), warnings)
-
-
-def _fitted(touched: np.ndarray, points: np.ndarray) -> tuple[Rigid, np.ndarray]:
-    """Pose, and distance (N,) of each point from where it was touched."""
-    middle, about = touched.mean(axis=0), points.mean(axis=0)
-    turn, _ = Rotation.align_vectors(touched - middle, points - about)
-    pose = Rigid.of([*(middle - turn.apply(about)), *turn.as_quat()])
-    apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
-    return pose, apart

@@ -45,18 +45,10 @@ COS_PASS = math.sqrt(0.5)
 COS_TRACK = math.sqrt(0.75)
 
 AWAITED, RUNS, ENDED = 0, 1, 2
+_VECTORS = ('position', 'normal', 'mean', 'carried', 'closed_at')
 PASS_STATE = np.dtype(
-    [
-        ('number', 'i8'),
-        ('state', 'i8'),
-        ('length_m', 'f8'),
-        ('flow', 'f8'),
-        ('position', 'f8', 3),
-        ('normal', 'f8', 3),
-        ('mean', 'f8', 3),
-        ('carried', 'f8', 3),
-        ('closed_at', 'f8', 3),
-    ]
+    [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
+    + [(name, 'f8', 3) for name in _VECTORS]
 )
 
 
@@ -118,17 +110,11 @@ def _on_another_track(state):
 @njit(cache=True)
 @named_for_its_code
 def follow_passes(states, position, normal, heading, step, flow, after_gap):
-    """Number the spraying passes.
+    """Number the spraying passes: (M,) int64, the one that runs or ran last, -1 before the first.
 
-    Args:
-        states: (1,) record of dtype PASS_STATE, updated in place.
-        position, normal: (M, 3) TCP [m] and tool axis z.
-        heading, step: (M, 3) and (M,) from ``follow_strokes``.
-        flow: (M,) relative to the calibrated flow; 0 is gun off.
-        after_gap: (M,) bool, whether poses are missing before the sub-step.
-
-    Returns:
-        (M,) int64 number of the pass that runs or ran last, -1 before the gun first opened.
+    ``states`` (1,) is updated in place; position and normal (M, 3) are TCP [m] and tool z, heading
+    (M, 3) and step (M,) are from ``follow_strokes``, flow (M,) is relative, 0 gun off, and
+    after_gap (M,) bool.
     """
     spray_pass = np.empty(len(flow), np.int64)
     state = states[0]

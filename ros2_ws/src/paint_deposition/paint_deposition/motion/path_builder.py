@@ -21,11 +21,7 @@ LONGEST_GAP_NS = 3_155_760_000_000_000_000
 
 
 def gap_ns(max_pose_gap_s: float) -> int:
-    """The longest interval between poses that is no gap [ns].
-
-    Raises:
-        RecordingError: it is no number above 0.
-    """
+    """The longest interval between poses that is no gap [ns], from seconds above 0."""
     if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
         raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
     return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
@@ -36,16 +32,9 @@ class PathBuilder:
 
     Feed it in any batches: the sub-steps depend on the poses and trigger changes alone.
     ``PoseScreen`` says which poses are dropped and when a stream counts as restarted; that is
-    followed as after a gap.
-
-    Args:
-        max_pose_gap_s: a longer time between two poses is gun off [s].
-        max_step_m: longest travel of the spray in a sub-step [m].
-        whole_strokes: hand out a stroke when it is complete, with what lies ahead of each
-            sub-step known.
-
-    Raises:
-        RecordingError: ``max_pose_gap_s`` is no number above 0.
+    followed as after a gap. A time between poses longer than ``max_pose_gap_s`` is gun off; the
+    spray travels ``max_step_m`` at most in a sub-step. With ``whole_strokes`` a stroke is handed
+    out when it is complete, with what lies ahead of each sub-step known.
     """
 
     def __init__(
@@ -105,12 +94,10 @@ class PathBuilder:
             self._waiting = [stream]
 
     def take(self, until_ns: int | None = None, finish: bool = False) -> SprayPath:
-        """Hand out the sub-steps that are complete.
+        """Hand out the sub-steps that are complete, without poses later than ``until_ns``.
 
-        Args:
-            until_ns: leave poses that come later for the next call; None: take all.
-            finish: the stream has ended; the poses behind the last that was followed, and
-                incomplete strokes, are handed out too.
+        ``finish``: the stream has ended; the poses behind the last that was followed, and
+        incomplete strokes, are handed out too.
         """
         if finish:
             self._screen.finish()
@@ -209,11 +196,7 @@ def spray_path(
 
 
 def require_spraying(trajectory: Trajectory, path: SprayPath) -> None:
-    """Refuse a motion, with at least one sub-step, along which the gun never sprays.
-
-    Raises:
-        RecordingError: the trigger never opens, or only while there are no poses.
-    """
+    """Refuse a motion, with at least one sub-step, along which the gun never sprays."""
     if np.any(path.flow > 0.0):
         return
     stamps_ns, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow

@@ -10,7 +10,6 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Two hours at 250 Hz, 64 bytes a pose.
 DEFAULT_LIMIT_POSES = 2_000_000
-BLOCK_POSES = 4096
 # So few at once that other threads have their turn in between.
 BATCH_POSES = 256
 
@@ -59,6 +58,9 @@ class PoseBatch:
         return PoseBatch(*map(np.concatenate, columns))
 
 
+NO_POSES = PoseBatch(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+
 class MotionLog:
     """Poses as received and trigger changes in the order in which they came.
 
@@ -73,7 +75,8 @@ class MotionLog:
         self.limit_poses = limit_poses
         self.poses = 0
         self.complete = True
-        self._blocks: list[PoseBatch] = []
+        # With room for more than came.
+        self._kept = NO_POSES
         # With the number of poses that came before.
         self._changes: list[tuple[int, TriggerChange]] = []
 
@@ -90,52 +93,42 @@ class MotionLog:
             return
         if self.poses + len(event) > self.limit_poses:
             self.complete = False
-            self._blocks, self._changes = [], []
+            self._kept, self._changes = NO_POSES, []
         else:
             self._pack(event)
         self.poses += len(event)
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
         """What came until now, after so many poses and changes."""
-        blocks, end = self._blocks, self.poses
+        end, kept = self.poses, self._kept  # in this order: what is kept may grow meanwhile
         if not self.complete:
             return
         for before, change in self._changes[changes:]:
             if before > end:
                 break
-            yield from _rows(blocks, poses, before)
+            yield from _rows(kept, poses, before)
             yield change
             poses = before
-        yield from _rows(blocks, poses, end)
+        yield from _rows(kept, poses, end)
 
     def first_poses(self, count: int) -> PoseBatch | None:
         """The first poses that are kept, ``count`` if there are so many."""
-        batches = list(_rows(self._blocks, 0, min(count, self.poses if self.complete else 0)))
+        batches = list(_rows(self._kept, 0, min(count, self.poses if self.complete else 0)))
         return PoseBatch.joined(batches) if batches else None
 
     def _pack(self, batch: PoseBatch) -> None:
-        taken = 0
-        while taken < len(batch):
-            row = (self.poses + taken) % BLOCK_POSES
-            if row == 0:
-                shapes = ((BLOCK_POSES,), (BLOCK_POSES, 3), (BLOCK_POSES, 4))
-                kinds = (np.int64, np.float64, np.float64)
-                self._blocks.append(PoseBatch(*map(np.empty, shapes, kinds)))
-            count = min(BLOCK_POSES - row, len(batch) - taken)
-            part = batch.select(slice(taken, taken + count))
-            columns = zip(vars(self._blocks[-1]).values(), vars(part).values(), strict=True)
-            for kept, new in columns:
-                kept[row : row + count] = new
-            taken += count
+        end = self.poses + len(batch)
+        if end > len(self._kept):  # readers go on with the old one
+            rows = np.arange(2 * end) % max(len(self._kept), 1)
+            self._kept = (self._kept if self.poses else batch).select(rows)
+        for kept, new in zip(vars(self._kept).values(), vars(batch).values(), strict=True):
+            kept[self.poses : end] = new
 
 
-def _rows(blocks: list[PoseBatch], start: int, stop: int) -> Iterator[PoseBatch]:
+def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
     """The poses of this range."""
-    while start < stop:
-        block, row = divmod(start, BLOCK_POSES)
-        end = min(row + BATCH_POSES, row + stop - start, BLOCK_POSES)
-        yield blocks[block].select(slice(row, end))
-        start += end - row
+    for row in range(start, stop, BATCH_POSES):
+        yield kept.select(slice(row, min(row + BATCH_POSES, stop)))
 
 
 # RAPID writes quaternions with four digits; further off is damage, not rounding.
@@ -159,14 +152,12 @@ class PoseScreen:
         self.max_gap_ns = max_gap_ns
         self.counts = PoseCounts()
         self.newest_ns: int | None = None
-        self._behind = PoseBatch(np.empty(0, dtype=np.int64), np.empty((0, 3)), np.empty((0, 4)))
+        self._behind = NO_POSES
 
     def take(self, poses: PoseBatch) -> list[PoseBatch]:
-        """Screen poses.
+        """Screen poses; what comes back has strictly increasing stamps and unit quaternions.
 
-        Returns:
-            What to follow, stamps strictly increasing and quaternions of unit length. The first
-            batch continues those before; each further one is a restarted stream.
+        The first batch continues those before; each further one is a restarted stream.
         """
         poses = PoseBatch.joined([self._behind, self._rotations(poses)])
         streams: list[list[int]] = [[]]

@@ -42,7 +42,6 @@ class Move:
     Attributes:
         position_m: (3,) TCP at the end of the move [m].
         quaternion_xyzw: (4,) orientation of the tool there, scalar last.
-        speed_m_per_s: speed of the TCP on the way [m/s].
         spraying: whether the gun is on as the move begins.
         via_m: (3,) point that a circular move passes through, None for straight ones.
         switches: of the gun during the move, in the order written.
@@ -65,12 +64,8 @@ class Move:
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     """Poses along moves, from the end of the first on, at the programmed speeds.
 
-    Args:
-        moves: in the order in which they run.
-        gun_known: whether the moves say when the gun is on; else it sprays throughout.
-
-    Raises:
-        RecordingError: there is no second move, or one without a speed.
+    Where the gun is not known from the moves it sprays throughout. Raises RecordingError without a
+    second move or a speed.
     """
     if len(moves) < 2:
         raise RecordingError('there is a single move; give a program that travels')
@@ -89,10 +84,9 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
             )
-        changes.append((times_s[-1], move.spraying * move.flow, move.brush))
         changes += [
             (times_s[-1] + at * duration_s, on * move.flow, move.brush)
-            for at, on in _switches(move, length_m)
+            for at, on in [(0.0, move.spraying), *_switches(move, length_m)]
         ]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
@@ -102,25 +96,21 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     gun: dict[int, tuple[float, int]] = {}
     if gun_known or any(flow for _, flow, _ in changes):
         gun = {round(time_s * 1e9): (float(now), brush) for time_s, now, brush in changes}
-    stamps_ns = sorted(gun)
+    gun = dict(sorted(gun.items()))
     return Trajectory(
-        np.array([round(time_s * 1e9) for time_s in times_s]),
-        np.array(positions),
-        np.array(quaternions),
-        trigger_stamps_ns=np.array(stamps_ns, dtype=np.int64),
-        trigger_flow=np.array([gun[stamp][0] for stamp in stamps_ns]),
-        trigger_brush=numbered([gun[stamp][1] for stamp in stamps_ns]),
-    )
+        np.array([round(time_s * 1e9) for time_s in times_s]), np.array(positions),
+        np.array(quaternions), trigger_stamps_ns=np.array([*gun], dtype=np.int64),
+        trigger_flow=np.array([flow for flow, _ in gun.values()]),
+        trigger_brush=numbered([brush for _, brush in gun.values()]),
+    )  # fmt: skip
 
 
 def _switches(move: Move, length_m: float) -> list[tuple[float, bool]]:
     """Share of the move at which the gun is switched, and whether on, in order."""
-    switches = []
-    for switch in move.switches:
-        from_start_m = switch.distance_m if switch.from_start else length_m - switch.distance_m
-        share = from_start_m / length_m if length_m > 0.0 else 0.0
-        switches.append((min(max(share, 0.0), 1.0), switch.on))
-    return sorted(switches, key=lambda switch: switch[0])
+    at_m = [s.distance_m if s.from_start else length_m - s.distance_m for s in move.switches]
+    shares = [min(max(at / length_m, 0.0), 1.0) if length_m > 0.0 else 0.0 for at in at_m]
+    pairs = zip(shares, (switch.on for switch in move.switches), strict=True)
+    return sorted(pairs, key=lambda pair: pair[0])
 
 
 def _track(begin_m: np.ndarray, move: Move) -> tuple[float, Callable]:
@@ -140,11 +130,9 @@ def _track(begin_m: np.ndarray, move: Move) -> tuple[float, Callable]:
     along = np.cross(normal, radius) / math.sqrt(square)
     end = to_end - to_centre
     angle_rad = math.atan2(end @ along, end @ radius) % (2.0 * math.pi)
-    return (
-        float(np.linalg.norm(radius)) * angle_rad,
-        lambda share: (
-            centre
-            + np.outer(np.cos(share * angle_rad), radius)
-            + np.outer(np.sin(share * angle_rad), along)
-        ),
-    )
+
+    def place_at(share: np.ndarray) -> np.ndarray:
+        from_centre = np.outer(np.cos(share * angle_rad), radius)
+        return centre + from_centre + np.outer(np.sin(share * angle_rad), along)
+
+    return float(np.linalg.norm(radius)) * angle_rad, place_at

@@ -17,12 +17,9 @@ WINDOW_NS = 200_000_000
 
 
 class Intervals:
-    """Intervals between the stamps of poses received in order.
+    """Intervals between the stamps of poses received in order, the longest, and how many are long.
 
-    Attributes:
-        longest_ns: the longest.
-        long: how many were longer than 1.5 times the median of those before them. With a steady
-            stream each of them is a pose that was lost.
+    Long are more than 1.5 times the median of those before: with a steady stream, lost poses.
     """
 
     def __init__(self) -> None:
@@ -52,9 +49,7 @@ class Intervals:
 class Jumps:
     """Steps that no robot makes: two guns on one topic, or stamps of two clocks.
 
-    Attributes:
-        count: such steps.
-        fastest_m_per_s: the speed that the worst of them would take, 0 where there is none.
+    Their count, and the speed that the worst of them would take, 0 where there is none.
     """
 
     def __init__(self) -> None:

@@ -6,20 +6,9 @@ degrees off the stroke's mean. The mean is kept twice, in space and as the tool 
 when it is tilted, and a path leaves it only where it leaves both: neither a gun that follows a
 curved part turns, nor one that is tilted on a straight path.
 
-=======  =====================================  =======  =====================================
-state    event                                  next     what happens
-=======  =====================================  =======  =====================================
-new      first sub-step, or a gap before it     new      the stroke's number goes up; the turn
-                                                         is here
-new      less than a heading step since then    new
-new      a heading step                         runs     it is the stroke's mean heading
-runs     less than a heading step               runs
-runs     a heading step that keeps to the mean  runs     the mean takes it in
-runs     a heading step that leaves the mean    runs     the stroke's number goes up; the turn
-                                                         is where the two legs meet, behind
-                                                         here; the step is the new mean
-runs     a gap                                  new      as at the first sub-step
-=======  =====================================  =======  =====================================
+The first sub-step, or a gap before one, begins a stroke without a heading, whose turn is there;
+the first heading step is its mean, and each that keeps to the mean is taken in. One that leaves it
+begins the next stroke: the turn is where the two legs meet, behind there.
 
 A stroke is new while its ``length_m`` is zero.
 """
@@ -83,23 +72,12 @@ def take_in(heading, step_m, length_m, mean, carried):
         carried[k] += gain * (heading[k] - carried[k])
 
 
+# anchor and earlier are where the last two heading steps began, with the path since then: a turn
+# that shows now lies behind the earlier one.
+_LENGTHS = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
+_VECTORS = ('position', 'normal', 'anchor', 'earlier', 'heading', 'mean', 'carried')
 STROKE_STATE = np.dtype(
-    [
-        ('number', 'i8'),
-        ('from_turn_m', 'f8'),
-        ('length_m', 'f8'),
-        ('position', 'f8', 3),
-        ('normal', 'f8', 3),
-        # Where the last two heading steps began and the path since then: a turn that shows now
-        # lies behind the earlier one.
-        ('anchor', 'f8', 3),
-        ('earlier', 'f8', 3),
-        ('since_anchor_m', 'f8'),
-        ('since_earlier_m', 'f8'),
-        ('heading', 'f8', 3),
-        ('mean', 'f8', 3),
-        ('carried', 'f8', 3),
-    ]
+    [('number', 'i8'), *((n, 'f8') for n in _LENGTHS), *((n, 'f8', 3) for n in _VECTORS)]
 )
 
 
@@ -168,11 +146,8 @@ def _behind_turn_m(state):
 def follow_strokes(states, position, normal, velocity, dwell, after_gap):
     """Number the strokes and measure back along the path to where each began.
 
-    Args:
-        states: (1,) record of dtype STROKE_STATE, updated in place.
-        position, normal, velocity: (M, 3) TCP [m], tool axis z, and speed of the TCP [m/s].
-        dwell: (M,) duration of the sub-steps [s].
-        after_gap: (M,) bool, whether poses are missing before the sub-step.
+    ``states`` (1,) is updated in place; position, normal, velocity (M, 3) are TCP [m], tool z and
+    speed of the TCP [m/s], dwell (M,) durations [s], after_gap (M,) bool.
 
     Returns:
         stroke (M,) int64; from_turn_m (M,); heading (M, 3), the last unit heading, zero before
@@ -203,13 +178,8 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
 def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
     """Measure forward to the next trigger change and turn, within whole strokes.
 
-    Args:
-        stroke, since_on, from_turn: (M,) from ``follow_strokes`` and ``follow_trigger``; every
-            stroke complete.
-        velocity: (M, 3). dwell, flow: (M,).
-
-    Returns:
-        until_on_s, until_off_s, to_turn_m (M,); inf where a stroke ends without such an event.
+    All (M,) but velocity (M, 3); every stroke is complete. Returns until_on_s, until_off_s and
+    to_turn_m (M,); inf where a stroke ends without such an event.
     """
     count = len(dwell)
     until_on, until_off, to_turn = np.empty(count), np.empty(count), np.empty(count)

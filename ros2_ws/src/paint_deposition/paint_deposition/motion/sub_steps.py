@@ -78,19 +78,12 @@ def _detour_m(p0, p1, p2):
 
 @njit(cache=True)
 def followed_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
-    """Rows of the poses that are followed, the first among them.
+    """Rows (K,) of the poses that are followed, the first among them; those behind the last wait.
 
     Each pose is decided on by the last one followed, the one before it and itself: it does not
-    matter how a stream was cut into calls, if each begins at the last pose followed.
-
-    Args:
-        stamps_ns: (N,) int64, strictly increasing.
-        positions: (N, 3) [m]. quaternions: (N, 4) unit.
-        max_gap_ns: a longer time between poses is a gap: the poses at its ends are followed.
-        max_step_m: travel limit of a sub-step [m].
-
-    Returns:
-        (K,) rows, increasing. The poses behind the last of them wait for more.
+    matter how a stream was cut into calls, if each begins at the last pose followed. Stamps (N,)
+    int64 increase strictly, positions (N, 3) [m], quaternions (N, 4) unit. The poses at the ends
+    of a time longer than ``max_gap_ns`` are followed.
     """
     rows = np.zeros(len(stamps_ns), np.int64)
     count, last = 1, 0
@@ -112,14 +105,12 @@ def followed_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
 
 @njit(cache=True)
 def split_segments(stamps_ns, positions, quaternions, cuts_ns, max_gap_ns, max_step_m):
-    """Cut every segment at the trigger's changes and then into sub-steps.
+    """Cut every segment at the trigger's changes and then into sub-steps of ``max_step_m`` at
+    most.
 
-    Args:
-        stamps_ns: (N,) int64, strictly increasing.
-        positions: (N, 3) [m]. quaternions: (N, 4) unit.
-        cuts_ns: (C,) int64 times of trigger changes, strictly increasing.
-        max_gap_ns: a longer segment is gun off and gives no sub-steps.
-        max_step_m: travel limit of a sub-step [m].
+    Stamps (N,) and changes ``cuts_ns`` (C,) increase strictly, int64; positions (N, 3) [m],
+    quaternions (N, 4) unit. A segment longer than ``max_gap_ns`` is gun off and gives no
+    sub-steps.
 
     Returns:
         stamp_ns (M,), dwell_s (M,), position (M, 3), rotation (M, 3, 3), velocity (M, 3), and

@@ -57,15 +57,14 @@ class Trajectory:
         quaternions_xyzw: (N, 4) orientation of the tool, scalar last as in ROS.
         frame_id: frame of the poses, '' where the recording does not say.
         trigger_stamps_ns: (M,) int64 times at which the flow changes; empty: always spraying.
-        trigger_flow: (M,) flow from that time on, relative to the calibrated one; 0 is gun off.
-            Before the first of them the gun is off.
-        trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one,
-            throughout.
+        trigger_flow: (M,) from that time on, relative to the calibrated one; 0 is gun off, as it
+        is
+            before the first of them.
+        trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one.
         trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
             magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.
             Empty: all are unknown.
-        notes: remarks on the recording for the user, a line each.
-        warnings: what is likely wrong with it, a line each with the remedy.
+        notes, warnings: remarks for the user, and what is likely wrong, a line each.
         source: the file it came from, for messages.
         settings: of the process while the gun sprayed, by name; empty where not recorded.
 

@@ -23,14 +23,9 @@ SPRAYS_NOTHING = (
 
 
 def relative_flow(spraying: bool, flow: float = math.nan) -> float:
-    """Flow relative to the calibrated one, 0 while the gun is off.
+    """Flow relative to the calibrated one, 0 while the gun is off; NaN is unknown and taken as 1.
 
-    Args:
-        spraying: whether paint leaves the atomizer.
-        flow: measured flow relative to the calibrated one; NaN is unknown and taken as 1.
-
-    Raises:
-        RecordingError: the flow is negative or infinite.
+    Raises RecordingError for a flow that is negative or infinite.
     """
     if not spraying:
         return 0.0
@@ -50,12 +45,8 @@ def first_trigger(flow_before: float) -> np.ndarray:
 def follow_trigger(states, dwell, flow, brush, after_gap):
     """Measure back to the last opening and closing of the gun; a gap forgets them.
 
-    Args:
-        states: (1,) record of dtype TRIGGER_STATE, updated in place.
-        dwell: (M,) duration of the sub-steps [s].
-        flow: (M,) relative to the calibrated flow; 0 is gun off.
-        brush: (M,) int64 number of the brush; it counts where the gun is on.
-        after_gap: (M,) bool, whether poses are missing before the sub-step.
+    ``states`` (1,) is updated in place; all others (M,): dwell [s], relative flow, 0 gun off,
+    int64 brush, which counts where the gun is on, and after_gap.
 
     Returns:
         open_flow and open_brush (M,) of the opening that runs or ran last; since_on_s and

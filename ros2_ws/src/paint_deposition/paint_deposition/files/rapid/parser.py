@@ -44,11 +44,10 @@ class Token(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """A datum by name, with the indexes and components that follow it."""
+    """A datum by name; ``part`` is the index or component behind it as text, '' for none."""
 
     name: str
-    indexes: tuple = ()
-    components: tuple = ()
+    part: str = ''
 
 
 class Call(NamedTuple):
@@ -92,7 +91,8 @@ class Instruction:
 
 @dataclass(frozen=True)
 class Declaration:
-    type: str
+    """A datum's value, None where it is declared without, and the line that declares it."""
+
     value: object
     line: int
 
@@ -113,8 +113,6 @@ class ModuleParser:
         self._tokens = list(tokens(text, source))
         self._at = 0
         self._source = source
-
-    # --- tokens
 
     @property
     def _now(self) -> Token:
@@ -200,11 +198,13 @@ class ModuleParser:
                 return values, options
 
     def _reference(self, name: str) -> Reference:
-        indexes = self._arguments('}')[0] if self._takes('{') else []
-        components = []
-        while self._takes('.'):
-            components.append(self._name())
-        return Reference(name, tuple(indexes), tuple(components))
+        start = self._at
+        while self._now.text in ('.', '{'):
+            if self._next().text == '{':
+                self._skip_past('}')
+            else:
+                self._name()
+        return Reference(name, ''.join(token.text for token in self._tokens[start : self._at]))
 
     # --- declarations and procedures
 
@@ -215,30 +215,26 @@ class ModuleParser:
         if self._takes('('):
             self._skip_past(')')
         while not self._takes('endmodule'):
-            self._member(module)
+            word = self._now.word
+            if self._takes(*STORAGE):
+                self._declaration(module.data)
+            elif self._takes('proc'):
+                self._procedure(module)
+            elif word in SKIPPED_TO:
+                self._skip_past(SKIPPED_TO[word])
+            elif not self._takes('local', 'task'):
+                self._fail(f'{self._now.text or "the end"!r} is no declaration')
         return module
 
-    def _member(self, module: Module) -> None:
-        while self._takes('local', 'task'):
-            pass
-        word = self._now.word
-        if self._takes(*STORAGE):
-            self._declaration(module.data)
-        elif self._takes('proc'):
-            self._procedure(module)
-        elif word in SKIPPED_TO:
-            self._skip_past(SKIPPED_TO[word])
-        else:
-            self._fail(f'{self._now.text or "the end"!r} is no declaration')
-
     def _declaration(self, data: dict[str, Declaration]) -> None:
-        line, kind = self._now.line, self._name()
+        line = self._now.line
+        self._name()
         while True:
             name = self._name()
             if self._takes('{'):
                 self._skip_past('}')
             value = self._expression() if self._takes(':=') else None
-            data[name] = Declaration(kind, value, line)
+            data[name] = Declaration(value, line)
             if not self._takes(','):
                 break
         self._expect(';')

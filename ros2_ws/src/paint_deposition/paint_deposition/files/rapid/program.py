@@ -24,10 +24,8 @@ MOVES = {
 }  # fmt: skip
 JOINT_MOVES = ('moveabsj', 'moveextj')
 TRIGGERS = ('triggio', 'triggequip')
-# The analogue output for the flow relative to the calibrated one, as written by `writer`.
-FLOW_SIGNAL = 'aoflow'
-# The group output for the number of the brush, likewise.
-BRUSH_SIGNAL = 'gobrush'
+# What `writer` sets: an analogue output, the relative flow, and a group output, the brush.
+FLOW_SIGNAL, BRUSH_SIGNAL = 'aoflow', 'gobrush'
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,28 +33,20 @@ class RapidMove(Move):
     """A move of the TCP as programmed; zones cut its corners on the robot.
 
     Its pose is in the world, or in the work object where the module does not define that.
-
-    Attributes:
-        instruction: RAPID's name in lower case.
-        zone_m: radius in which the corner is cut, 0: stop.
-        tool, work_object: their names.
     """
 
-    instruction: str
-    zone_m: float
+    instruction: str  # in lower case
+    zone_m: float  # radius in which the corner is cut, 0: stop
     tool: str
     work_object: str
 
 
 @dataclass
 class RapidProgram:
-    """Moves in the order they run, and what was left out or assumed, a line each.
-
-    ``gun_signal`` is the digital output that opens the gun, '' where none is set.
-    """
+    """Moves in the order they run, and what was left out or assumed, a line each."""
 
     module: str
-    gun_signal: str = ''
+    gun_signal: str = ''  # the digital output that opens the gun
     moves: list[RapidMove] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
@@ -65,13 +55,11 @@ def read_program(path: Path | str, gun_signal: str | None = None) -> RapidProgra
     """Read the moves of a RAPID module (.mod, .prg).
 
     It begins with `main`, or the only procedure, and follows those called without arguments.
-
-    Args:
-        gun_signal: digital output that opens the gun; None: the only one that the module sets.
+    ``gun_signal`` is the digital output that opens the gun, None the only one that is set.
 
     Raises:
-        RecordingError: one line naming file, line and remedy: what is no RAPID, moves inside
-            loops and conditions, values from elsewhere, quaternions more than 1 % off.
+        RecordingError: what is no RAPID, moves inside loops and conditions, values from
+            elsewhere, quaternions more than 1 % off; with file, line and remedy.
     """
     path = Path(path)
     try:
@@ -93,11 +81,7 @@ def is_rapid(path: Path | str) -> bool:
 def program_trajectory(program: RapidProgram) -> Trajectory:
     """Poses along a program, from the end of its first move on, at the programmed speeds.
 
-    Joint moves are taken as straight, zones and acceleration are not: what that leaves out is in
-    the trajectory's notes. A program that never switches the gun sprays throughout.
-
-    Raises:
-        RecordingError: there is no second move, or one without a speed.
+    What is assumed is in the notes; a program that never switches the gun sprays throughout.
     """
     recorded = timed(program.moves, bool(program.gun_signal))
     notes = [PROGRAMMED, 'speeds are taken as programmed; acceleration is left out']
@@ -210,18 +194,27 @@ class _Run:
                     f'line {i.line}: the plane of SetBrush is not followed: the brush changes '
                     'where the next move begins'
                 )
-        elif i.name in TRIGGERS and self._is_gun(i):
-            self._triggers[_name(i.values[0])] = self._switch(i)
+        elif i.name in TRIGGERS and i.values:
+            self._declare_trigger(i, _name(i.values[0]))
         elif self._is_gun(i):
             self._gun_on = self._level(i)
-        elif _name(i.options.get('aop') or '') == FLOW_SIGNAL and i.name in TRIGGERS:
-            self._flow_triggers[_name(i.values[0])] = self._number(i, len(i.values) - 1)
         elif i.name == 'setao' and i.values and _name(i.values[0]) == FLOW_SIGNAL:
             self._flow = self._number(i, 1)
-        elif _name(i.options.get('gop') or '') == BRUSH_SIGNAL and i.name in TRIGGERS:
-            self._brush_triggers[_name(i.values[0])] = self._brush_number(i, len(i.values) - 1)
         elif i.name == 'setgo' and i.values and _name(i.values[0]) == BRUSH_SIGNAL:
             self._brush = self._brush_number(i, 1)
+
+    def _declare_trigger(self, i: Instruction, name: str) -> None:
+        """Of the gun, the flow or the brush; others do not matter here."""
+        if self._is_gun(i):
+            if i.options.get('time'):
+                self._data.fail(f'{i.name} by time is not followed; give a distance')
+            from_start = 'start' in i.options
+            switch = GunSwitch(self._number(i, 1) * 1e-3, from_start, self._level(i))
+            self._triggers[name] = switch
+        elif _name(i.options.get('aop', '')) == FLOW_SIGNAL:
+            self._flow_triggers[name] = self._number(i, len(i.values) - 1)
+        elif _name(i.options.get('gop', '')) == BRUSH_SIGNAL:
+            self._brush_triggers[name] = self._brush_number(i, len(i.values) - 1)
 
     def _brush_number(self, i: Instruction, index: int) -> int:
         number = self._number(i, index)
@@ -243,11 +236,6 @@ class _Run:
             return i.name == 'set'
         return bool(self._data.value(i.values[-1]))
 
-    def _switch(self, i: Instruction) -> GunSwitch:
-        if i.options.get('time'):
-            self._data.fail(f'{i.name} by time is not followed; give a distance')
-        return GunSwitch(self._number(i, 1) * 1e-3, 'start' in i.options, self._level(i))
-
     # --- moves
 
     def _move(self, i: Instruction) -> None:
@@ -265,23 +253,13 @@ class _Run:
         for name in map(_name, i.options.values()):
             self._flow = self._flow_triggers.get(name, self._flow)
             self._brush = self._brush_triggers.get(name, self._brush)
-        self._program.moves.append(
-            RapidMove(
-                instruction=i.name,
-                line=i.line,
-                position_m=position_m,
-                quaternion_xyzw=rotation.as_quat(),
-                via_m=poses[0][0] if count == 2 else None,
-                speed_m_per_s=self._speed(i, values[count], position_m),
-                zone_m=self._data.zone_m(values[-2]),
-                tool=tool,
-                work_object=work_object,
-                spraying=spraying,
-                switches=switches,
-                flow=self._flow,
-                brush=self._brush or ONLY_BRUSH,
-            )
-        )
+        move = RapidMove(
+            position_m, rotation.as_quat(), self._speed(i, values[count], position_m), spraying,
+            poses[0][0] if count == 2 else None, switches, i.line, self._flow,
+            self._brush or ONLY_BRUSH, instruction=i.name, zone_m=self._data.zone_m(values[-2]),
+            tool=tool, work_object=work_object,
+        )  # fmt: skip
+        self._program.moves.append(move)
         self._position_m = position_m
         if switches:
             self._gun_on = switches[-1].on

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-import numpy as np
-
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import Move
@@ -30,7 +28,6 @@ MODULE = r"""MODULE PaintPasses
   ENDPROC
 ENDMODULE
 """
-NOWHERE = '[[0,0,0],[1,0,0,0]]'
 FRAMES = r'tBell\WObj:=wobjPart'
 ANY_AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -40,16 +37,10 @@ def module_text(
 ) -> str:
     """A module whose `main` runs the moves: poses in the work object, the gun by TriggL.
 
-    The tool and the work object are taught on the robot and not defined here: the module's poses
-    are those of the tool's TCP in the part's frame. It approaches with a joint move, gun off, and
-    ends with the gun off. Where passes have flows of their own, the analogue output aoFlow is set
-    to them, relative to the calibrated flow, as the gun opens; where a brush has a number, so is
-    the group output goBrush. `read_program` reads it back within 0.001 mm.
-
-    Args:
-        moves: in the part's frame.
-        comments: more lines for the head of the module.
-        part: pose of the part in the robot's world; the work object is defined by it then.
+    Tool and work object are taught on the robot; ``part``, its pose in the robot's world, defines
+    the work object too. The approach is a joint move, gun off. Flows of their own set the analogue
+    output aoFlow as the gun opens, brushes with a number the group output goBrush. `read_program`
+    reads it back within 0.001 mm.
 
     Raises PlanError for speeds that no robot could run.
     """
@@ -57,10 +48,8 @@ def module_text(
     for speed in speeds:
         if not 0.0 < speed < 10.0:
             raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
-    data = [
-        f'  CONST robtarget p{k}:={_target(move.position_m, move.quaternion_xyzw)};'
-        for k, move in enumerate(moves, start=1)
-    ]
+    poses = [_pose([*move.position_m, *move.quaternion_xyzw]) for move in moves]
+    data = [f'  CONST robtarget p{k}:={pose[:-1]},{ANY_AXES}];' for k, pose in enumerate(poses, 1)]
     data += [
         f'  CONST speeddata {name}:=[{speed * 1e3:.3f},500,5000,1000];'
         for speed, name in speeds.items()
@@ -82,22 +71,18 @@ def module_text(
         speed_name = speeds[_speed(move)]
         run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
     about = ''.join(f'  ! {comment}\n' for comment in comments)
-    about += _work_object(part)
+    if part is not None:
+        at = _pose(part.values)
+        about += f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{at},[[0,0,0],[1,0,0,0]]];\n'
+    outputs = {name: f'AOp:=aoFlow,{flow:.4f}' for flow, name in flows.items()}
+    outputs |= {f'brush{number}': f'GOp:=goBrush,{number}' for number in brushes}
     return MODULE.format(
         about=about,
         data='\n'.join(data),
         moves='\n'.join(run),
-        flow_data=''.join(
-            f'\n  VAR triggdata {name};'
-            for name in (*flows.values(), *(f'brush{number}' for number in brushes))
-        ),
+        flow_data=''.join(f'\n  VAR triggdata {name};' for name in outputs),
         flow_events=''.join(
-            f'\n    TriggEquip {name},0\\Start,0\\AOp:=aoFlow,{flow:.4f};'
-            for flow, name in flows.items()
-        )
-        + ''.join(
-            f'\n    TriggEquip brush{number},0\\Start,0\\GOp:=goBrush,{number};'
-            for number in brushes
+            f'\n    TriggEquip {name},0\\Start,0\\{output};' for name, output in outputs.items()
         ),
     )
 
@@ -113,18 +98,6 @@ def _speed(move: Move) -> float:
 
 def _flow(move: Move) -> float:
     return round(float(move.flow), 4)
-
-
-def _work_object(part: Rigid | None) -> str:
-    """The line that defines the work object by the pose of the part, where that is known."""
-    if part is None:
-        return ''
-    return f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{_pose(part.values)},{NOWHERE}];\n'
-
-
-def _target(position_m: np.ndarray, quaternion_xyzw: np.ndarray) -> str:
-    pose = _pose([*position_m, *quaternion_xyzw])
-    return f'{pose[:-1]},{ANY_AXES}]'
 
 
 def _pose(values: Sequence[float]) -> str:

@@ -70,10 +70,8 @@ class Bag:
         return next((topic for topic in self.topics if topic.name.lstrip('/') == wanted), None)
 
     def choose(self, name: str, types: Sequence[str], kind: str) -> BagTopic:
-        """The named topic if it is of one of these types.
-
-        Raises:
-            RecordingError: it is not; names those there are.
+        """The named topic if it is of one of these types; else a RecordingError names those there
+        are.
         """
         listed = listed_topics(self.topics_of(*types), kind)
         topic = self.find(name)
@@ -116,25 +114,22 @@ class Bag:
         if topic not in self._stores:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
-            types = self._definitions(connection)
+            types = _definitions(connection)
             store.register({name: types[name] for name in types if name not in store.fielddefs})
             self._stores[topic] = store
         return self._stores[topic]
 
-    @staticmethod
-    def _definitions(connection: Connection) -> dict:
-        kind, text = connection.msgdef
-        if kind == MessageDefinitionFormat.MSG:
-            return get_types_from_msg(text, connection.msgtype)
-        if kind == MessageDefinitionFormat.IDL:
-            return get_types_from_idl(text)
-        # Older sqlite3 bags hold no definitions at all.
+
+def _definitions(connection: Connection) -> dict:
+    kind, text = connection.msgdef
+    if kind == MessageDefinitionFormat.IDL:
+        return get_types_from_idl(text)
+    if kind != MessageDefinitionFormat.MSG:  # older sqlite3 bags hold no definitions at all
         standard = get_typestore(definitions.STANDARD_STORE).fielddefs
         if connection.msgtype in standard:
             return dict(standard)
-        return get_types_from_msg(
-            definitions.installed(connection.msgtype).text, connection.msgtype
-        )
+        text = definitions.installed(connection.msgtype).text
+    return get_types_from_msg(text, connection.msgtype)
 
 
 def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
@@ -146,11 +141,7 @@ def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
 
 @contextmanager
 def open_bag(path: Path | str) -> Iterator[Bag]:
-    """Open a bag for reading.
-
-    Raises RecordingError with one line and the remedy when there is none at `path`, when it is
-    something else, and when it is unfinished or damaged; the latter while it is read, too.
-    """
+    """Open a bag; RecordingErrors say what it lacks and the remedy, also while it is read."""
     path = Path(path)
     _refuse_what_is_no_bag(path)
     with _reading(path):
@@ -172,10 +163,7 @@ def custom_data(path: Path) -> dict[str, str]:
 
 
 def mcap_files(path: Path) -> list[Path]:
-    """The MCAP files of a run: those of the folder in their order, or the one file given.
-
-    Raises RecordingError when the files of a folder belong to several runs.
-    """
+    """The MCAP files of a run in their order, or the one file given; several runs are refused."""
     if path.is_file():
         return [path]
     files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=_number)
@@ -193,13 +181,11 @@ def _number(file: Path) -> tuple[int, str]:
 
 def _is_unfinished(path: Path) -> bool:
     """True for a file that begins as MCAP and does not end as one."""
+    length = len(MCAP0_MAGIC)
     with path.open('rb') as stream:
-        if stream.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
+        if stream.read(length) != MCAP0_MAGIC:
             return False
-        size = stream.seek(0, 2)
-        if size < 2 * len(MCAP0_MAGIC):
-            return True
-        stream.seek(-len(MCAP0_MAGIC), 2)
+        stream.seek(max(stream.seek(0, 2) - length, length))
         return stream.read() != MCAP0_MAGIC
 
 

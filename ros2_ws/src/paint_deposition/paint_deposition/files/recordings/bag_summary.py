@@ -53,16 +53,11 @@ def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
 def _pose_stream(path: Path | str, topic: str, max_pose_gap_s: float) -> PoseStream:
     trajectory = read_trajectory(path, topic)
     steps_ns = np.diff(trajectory.stamps_ns)
-    gaps_ns = steps_ns[steps_ns > gap_ns(max_pose_gap_s)]
+    gaps = int(np.count_nonzero(steps_ns > gap_ns(max_pose_gap_s)))
     duration_s = trajectory.duration_s
+    rate_hz = len(steps_ns) / duration_s if duration_s > 0.0 else 0.0
     return PoseStream(
-        topic=topic,
-        frame_id=trajectory.frame_id,
-        poses=len(trajectory),
-        duration_s=duration_s,
-        mean_rate_hz=len(steps_ns) / duration_s if duration_s > 0.0 else 0.0,
-        gaps=len(gaps_ns),
-        longest_gap_s=float(steps_ns.max(initial=0)) * 1e-9,
-        repeated_stamps=int(np.count_nonzero(steps_ns == 0)),
-        backward_stamps=int(np.count_nonzero(steps_ns < 0)),
-    )
+        topic, trajectory.frame_id, len(trajectory), duration_s, rate_hz, gaps,
+        float(steps_ns.max(initial=0)) * 1e-9, int(np.count_nonzero(steps_ns == 0)),
+        int(np.count_nonzero(steps_ns < 0)),
+    )  # fmt: skip

@@ -33,35 +33,10 @@ MAX_CLOCK_OFFSET_S = 1.0
 WRITTEN_DEPTH = 500
 
 
-def read_trajectory(
-    path: Path | str,
-    pose_topic: str | None = None,
-    state_topic: str | None = None,
-    tf: Sequence[str] | None = None,
-    robot: Robot | None = None,
-) -> Trajectory:
-    """Read the atomizer's motion from a bag.
-
-    Args:
-        path: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP, split or not) or lone .mcap.
-        pose_topic: its PoseStamped topic, or that of the robot's joint states, leading slash or
-            not; None takes the only one.
-        state_topic: paint_msgs/AtomizerState, which counts from its header stamp, or
-            std_msgs/Bool, which counts from its log time; or a field of another message, see
-            ``read_switching``. None: the gun always sprays, and topics that could be its trigger
-            are noted.
-        tf: [target, source] of transforms instead of poses: the frame of the TCP (source) in the
-            frame in which the poses are to be (target).
-        robot: whose joint states are read instead of poses.
-
-    Returns:
-        The poses as recorded, unscreened, with stamps in integer nanoseconds.
-
-    Raises:
-        RecordingError: one line that names the bag, what is wrong and what to do.
-    """
+def read_trajectory(path: Path | str, *what: Any, **more: Any) -> Trajectory:
+    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a lone .mcap."""
     with open_bag(path) as bag:
-        return trajectory_of(bag, pose_topic, state_topic, tf, robot)
+        return trajectory_of(bag, *what, **more)
 
 
 def trajectory_of(
@@ -71,7 +46,18 @@ def trajectory_of(
     tf: Sequence[str] | None = None,
     robot: Robot | None = None,
 ) -> Trajectory:
-    """The same of an open bag."""
+    """The atomizer's motion from a bag: poses as recorded, unscreened, stamps in nanoseconds.
+
+    Args:
+        pose_topic: PoseStamped, or the robot's joint states; None takes the only one.
+        state_topic: see ``read_switching``; None: the gun always sprays, and topics that could be
+            its trigger are noted.
+        tf: [target, source] of transforms instead of poses: source, the TCP, in target.
+        robot: whose joint states are read instead of poses.
+
+    Raises:
+        RecordingError: one line that names the bag, what is wrong and what to do.
+    """
     if tf:
         from paint_deposition.files.recordings.transforms import read_tf_poses
 
@@ -92,14 +78,10 @@ def trajectory_of(
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
     return replace(
-        trajectory,
-        trigger_stamps_ns=gun.stamps_ns,
-        trigger_flow=gun.flow,
-        trigger_brush=gun.brush,
-        trigger_set_points=gun.set_points,
-        notes=(*trajectory.notes, *gun.notes),
-        settings=gun.settings,
-    )
+        trajectory, trigger_stamps_ns=gun.stamps_ns, trigger_flow=gun.flow,
+        trigger_brush=gun.brush, trigger_set_points=gun.set_points,
+        notes=(*trajectory.notes, *gun.notes), settings=gun.settings,
+    )  # fmt: skip
 
 
 def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
@@ -150,13 +132,9 @@ def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
             'let the publisher stamp each pose'
         )
     values = np.array(rows, dtype=float)
-    trajectory = Trajectory(
-        np.array(stamps, dtype=np.int64),
-        np.ascontiguousarray(values[:, :3]),
-        np.ascontiguousarray(values[:, 3:]),
-        next(iter(frames)),
-    )
-    return trajectory, np.array(log_times, dtype=np.int64)
+    positions, quaternions = map(np.ascontiguousarray, np.split(values, [3], axis=1))
+    trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, *frames)
+    return trajectory, np.array(log_times, np.int64)
 
 
 def write_pose_bag(
@@ -167,15 +145,10 @@ def write_pose_bag(
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
 ) -> Path:
-    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and its trigger.
+    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and its trigger before them.
 
-    The trigger's messages come before the poses that they hold for. They are Bool, or
-    AtomizerState where there is another flow than 0 or 1, or a brush with a number.
-
-    Args:
-        folder: to make.
-        custom_data: text by name for the metadata.
-        part: name and pose of the part's frame in that of the poses, for /tf_static.
+    The trigger is Bool, or AtomizerState where there is another flow than 0 or 1, or a brush with
+    a number. ``part`` is name and pose of the part's frame, for /tf_static.
     """
     poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
@@ -199,17 +172,19 @@ def write_pose_bag(
             _add_topic(run, state_topic, state_type)
         if part:
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
-            begin_ns = min(time_ns for time_ns, *_ in entries)
-            frames = _static_transform(types, begin_ns, trajectory.frame_id, *part)
-            cdr = types.serialize_cdr(frames, TF_TYPES[0])
+            begin_ns, (child, place) = min(time_ns for time_ns, *_ in entries), part
+            header = _header(types, begin_ns, trajectory.frame_id)
+            transform = _placed(types, 'Transform', 'Vector3', place.values)
+            stamped = types.types['geometry_msgs/msg/TransformStamped'](header, child, transform)
+            cdr = types.serialize_cdr(types.types[TF_TYPES[0]]([stamped]), TF_TYPES[0])
             run.write('/tf_static', bytes(cdr), begin_ns, begin_ns)
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
+            header = _header(types, time_ns, trajectory.frame_id)
             if is_pose:
-                pose = _pose(types, time_ns, trajectory.frame_id, poses[content].tolist())
-                cdr = types.serialize_cdr(pose, POSE_TYPE)
+                pose = _placed(types, 'Pose', 'Point', poses[content].tolist())
+                cdr = types.serialize_cdr(types.types[POSE_TYPE](header, pose), POSE_TYPE)
             else:
-                state = _state(types, state_type, time_ns, trajectory.frame_id, *content)
-                cdr = types.serialize_cdr(state, state_type)
+                cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
             run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
     return run.folder
 
@@ -220,45 +195,22 @@ def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = Fal
 
 
 def _state(
-    types: Typestore,
-    kind: str,
-    time_ns: int,
-    frame_id: str,
-    flow: float,
-    brush: int,
-    set_points: tuple[float, ...],
+    types: Typestore, kind: str, header: Any, flow: float, brush: int, set_points: tuple
 ) -> object:
     """The gun with flow, relative to the calibrated one, brush and set-points."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
-    header = _header(types, time_ns, frame_id)
     unknown = float('nan')
     wet, *others = set_points or (unknown,) * 4
     return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
 
 
-def _pose(types: Typestore, time_ns: int, frame_id: str, values: list[float]) -> object:
+def _placed(types: Typestore, kind: str, place: str, values: Sequence[float]) -> object:
+    """A Pose of a Point or a Transform of a Vector3, with its quaternion."""
     make = types.types
-    return make[POSE_TYPE](
-        _header(types, time_ns, frame_id),
-        make['geometry_msgs/msg/Pose'](
-            make['geometry_msgs/msg/Point'](*values[:3]),
-            make['geometry_msgs/msg/Quaternion'](*values[3:]),
-        ),
-    )
-
-
-def _static_transform(
-    types: Typestore, time_ns: int, parent: str, child: str, place: Rigid
-) -> object:
-    make = types.types
-    transform = make['geometry_msgs/msg/Transform'](
-        make['geometry_msgs/msg/Vector3'](*place.values[:3]),
-        make['geometry_msgs/msg/Quaternion'](*place.values[3:]),
-    )
-    header = _header(types, time_ns, parent)
-    stamped = make['geometry_msgs/msg/TransformStamped'](header, child, transform)
-    return make[TF_TYPES[0]]([stamped])
+    turn = make['geometry_msgs/msg/Quaternion'](*values[3:])
+    at = make[f'geometry_msgs/msg/{place}'](*values[:3])
+    return make[f'geometry_msgs/msg/{kind}'](at, turn)
 
 
 def _header(types: Typestore, time_ns: int, frame_id: str) -> Any:

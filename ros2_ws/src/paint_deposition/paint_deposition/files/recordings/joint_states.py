@@ -21,12 +21,7 @@ USUAL_TIP = 'tool0'
 
 @dataclass(frozen=True)
 class Robot:
-    """The chain of joints from a robot's base to its tip.
-
-    Attributes:
-        path: of the URDF. base, tip: links.
-        chain: joints in order, as pytransform3d describes them.
-    """
+    """The chain of joints from a robot's base link to its tip link, as of pytransform3d."""
 
     path: Path
     base: str
@@ -37,13 +32,8 @@ class Robot:
     def read(path: Path, tip: str | None = None, base: str | None = None) -> Robot:
         """Read a URDF.
 
-        Args:
-            path: of the file.
-            tip: link whose origin is the TCP; default: tool0, else the only last link.
-            base: link in which the poses are; default: the root.
-
-        Raises:
-            RecordingError: it is no URDF, or has no such links.
+        ``tip`` is the TCP, by default tool0 or the only last link; ``base`` the link in which the
+        poses are, by default the root. Raises RecordingError without such links.
         """
         from pytransform3d.urdf import parse_urdf
 
@@ -61,7 +51,10 @@ class Robot:
             raise RecordingError(f'{path} is no URDF ({" ".join(str(error).split())})') from None
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
         parents.add_nodes_from(link.name for link in links)
-        tip = tip or _last_link(path, parents)
+        last = sorted(link for link in parents if not parents.in_degree(link))
+        if tip is None and USUAL_TIP not in parents and len(last) != 1:
+            raise RecordingError(f'{path} ends in {" ".join(last)}; name one with --tip')
+        tip = tip or (USUAL_TIP if USUAL_TIP in parents else last[0])
         base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
             if name not in parents:
@@ -78,10 +71,8 @@ class Robot:
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
 
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) and quaternions (N, 4) of the tip in the base.
-
-        Args:
-            values: (N, J) of the moving joints [rad or m].
+        """Positions (N, 3) and quaternions (N, 4) of the tip, from (N, J) moving joints [rad or
+        m].
         """
         tip = np.tile(np.eye(4), (len(values), 1, 1))
         columns = iter(values.T)
@@ -99,28 +90,13 @@ class Robot:
         return tip[:, :3, 3], Rotation.from_matrix(tip[:, :3, :3]).as_quat()
 
 
-def _last_link(path: Path, parents: nx.DiGraph) -> str:
-    if USUAL_TIP in parents:
-        return USUAL_TIP
-    last = [link for link in parents if not parents.in_degree(link)]
-    if len(last) != 1:
-        raise RecordingError(f'{path} ends in {" ".join(sorted(last))}; name one with --tip')
-    return last[0]
-
-
 def read_joint_poses(
     bag: Bag, robot: Robot, topic_name: str | None
 ) -> tuple[Trajectory, np.ndarray]:
-    """The motion of a robot's tip from the joint states of a bag.
+    """The motion of a robot's tip from joint states, and when they were logged (N,) [ns].
 
-    Joints that come in messages of their own are interpolated at the times of the one that comes
-    most often.
-
-    Returns:
-        The motion, and the times (N,) int64 at which its joints were logged [ns].
-
-    Raises:
-        RecordingError: there are no joint states, or not of all joints.
+    Joints in messages of their own are interpolated at the times of the one that comes most often.
+    Raises RecordingError without joint states of all joints.
     """
     if not topic_name:
         topics = [topic for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]

@@ -41,8 +41,8 @@ class Recovery:
     Attributes:
         folder: the new run. counts: messages by topic.
         damaged_chunks: chunks left out because their content is broken.
-        breaks: where and why reading stopped, one line a file; empty for whole files.
-        skipped_topics: topics that no rosbag2 folder can hold (not CDR, or without a schema).
+        breaks: where and why reading stopped, a line for each file that is not whole.
+        skipped_topics: those that no rosbag2 folder can hold (not CDR, or without a schema).
     """
 
     folder: Path
@@ -62,11 +62,11 @@ def recover(
     on_bytes: Callable[[int], None] = lambda count: None,
     topics: Collection[str] = (),
 ) -> Recovery:
-    """Copy every readable message of `path` into the new run `folder`.
+    """Copy every readable message of an .mcap file or a run's folder into the new run `folder`.
+
+    QoS, type hashes, custom data and distribution come along.
 
     Args:
-        path: an .mcap file or the folder of a run (its files in the order of their numbers).
-        folder: must not exist; QoS, type hashes, custom data and distribution come along.
         on_bytes: called with the number of bytes read, for a progress bar.
         topics: to copy; all, if none are named.
 
@@ -97,21 +97,17 @@ def recover(
 
 
 def _copy(
-    file: Path,
-    writer: RunWriter,
-    recovery: Recovery,
-    on_bytes: Callable[[int], None],
+    file: Path, writer: RunWriter, recovery: Recovery, on_bytes: Callable[[int], None],
     topics: Collection[str],
-) -> None:
+) -> None:  # fmt: skip
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     try:  # the chunk that introduces a channel may be damaged; the end of a file repeats them
         with file.open('rb') as stream:
-            if summary := SeekingReader(
-                stream, record_size_limit=file.stat().st_size
-            ).get_summary():
+            reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
+            if summary := reader.get_summary():
                 schemas, channels = dict(summary.schemas), dict(summary.channels)
-    except DAMAGE:
+    except (*DAMAGE, OSError):  # too short for an end, too
         pass
     for record in _records(file, recovery, on_bytes):
         if isinstance(record, Schema):

@@ -17,25 +17,16 @@ from pathlib import Path
 
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
-from rosbags.interfaces import (
-    Qos,
-    QosDurability,
-    QosHistory,
-    QosLiveliness,
-    QosReliability,
-    QosTime,
-)
+from rosbags import interfaces as ros
+from rosbags.interfaces import Qos, QosTime
 from rosbags.rosbag2.metadata import dump_qos_v9
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.recordings.message_definitions import Definition
 
 METADATA_VERSION = 9
-COMPRESSIONS = {
-    'zstd': CompressionType.ZSTD,
-    'lz4': CompressionType.LZ4,
-    'none': CompressionType.NONE,
-}
+COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
 # What is not yet in a closed chunk is lost when the process is killed, so chunks are closed by
 # size and by age. At 250 Hz the default megabyte of mcap would hold half a minute of poses.
 CHUNK_BYTES = 64 * 1024
@@ -49,17 +40,10 @@ FOREVER = QosTime(9223372036, 854775807)
 
 def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos:
     """The QoS of a topic as rosbag2 stores it; a latched one is transient local."""
-    return Qos(
-        QosHistory.KEEP_LAST,
-        depth,
-        QosReliability.RELIABLE if reliable else QosReliability.BEST_EFFORT,
-        QosDurability.TRANSIENT_LOCAL if latched else QosDurability.VOLATILE,
-        FOREVER,
-        FOREVER,
-        QosLiveliness.AUTOMATIC,
-        FOREVER,
-        False,
-    )
+    history, liveliness = ros.QosHistory.KEEP_LAST, ros.QosLiveliness.AUTOMATIC
+    sent = ros.QosReliability.RELIABLE if reliable else ros.QosReliability.BEST_EFFORT
+    kept = ros.QosDurability.TRANSIENT_LOCAL if latched else ros.QosDurability.VOLATILE
+    return Qos(history, depth, sent, kept, FOREVER, FOREVER, liveliness, FOREVER, False)
 
 
 @dataclass(frozen=True)
@@ -83,8 +67,8 @@ class RunWriter:
     Args:
         folder: the run to create; it must not exist.
         custom_data: text by name, kept in `metadata.yaml` and in the file (mesh hash, model).
-        compression: 'zstd', 'lz4' or 'none'.
-        ros_distro: as rosbag2 records it; default is the environment's ROS_DISTRO.
+        compression: a key of COMPRESSIONS.
+        ros_distro: default is the environment's ROS_DISTRO.
     """
 
     def __init__(
@@ -107,13 +91,17 @@ class RunWriter:
         self._last_ns = 0
         self._chunk_opened_s: float | None = None
         self._failure: str | None = None
-        self._raw = self._create()
+        try:
+            self.folder.parent.mkdir(parents=True, exist_ok=True)
+            self.folder.mkdir()
+            self._raw = FileIO(self.path, 'xb')
+        except FileExistsError:
+            raise RecordingError(f'{self.folder} already exists; choose another name') from None
+        except OSError as error:
+            raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
         self._stream = BufferedWriter(self._raw)
         self._writer = Writer(
-            self._stream,
-            chunk_size=CHUNK_BYTES,
-            compression=COMPRESSIONS[compression],
-            index_types=INDEXES,
+            self._stream, CHUNK_BYTES, COMPRESSIONS[compression], index_types=INDEXES
         )
         with self._guarded():
             self._writer.start(profile='ros2', library='paint_deposition')
@@ -134,14 +122,12 @@ class RunWriter:
                 self._schemas[topic.type] = self._writer.register_schema(
                     topic.type, definition.encoding, definition.text.encode()
                 )
+            qos = _yaml(dump_qos_v9(list(topic.qos))).strip()
+            about = {
+                'offered_qos_profiles': qos, 'topic_type_hash': topic.definition.type_hash
+            }  # fmt: skip
             self._channels[topic.name] = self._writer.register_channel(
-                topic.name,
-                'cdr',
-                self._schemas[topic.type],
-                {
-                    'offered_qos_profiles': _yaml(dump_qos_v9(list(topic.qos))).strip(),
-                    'topic_type_hash': topic.definition.type_hash,
-                },
+                topic.name, 'cdr', self._schemas[topic.type], about
             )
         self._topics[topic.name] = topic
         self.counts[topic.name] = 0
@@ -169,10 +155,18 @@ class RunWriter:
 
     def finish(self) -> Path:
         """Complete the run and return its folder."""
-        if not self.complete:
-            with self._guarded():
-                self._finish()
-            self.complete = True
+        if self.complete:
+            return self.folder
+        with self._guarded():
+            self._writer.flush()
+            self._write_metadata_record()
+            self._writer.finish()
+            self._stream.flush()
+            os.fsync(self._stream.fileno())
+            self._stream.close()
+            information = {'rosbag2_bagfile_information': self._information()}
+            write_text(self.folder / 'metadata.yaml', _yaml(information))
+        self.complete = True
         return self.folder
 
     def abandon(self) -> None:
@@ -187,16 +181,6 @@ class RunWriter:
             self.finish()
         else:
             self.abandon()
-
-    def _create(self) -> FileIO:
-        try:
-            self.folder.parent.mkdir(parents=True, exist_ok=True)
-            self.folder.mkdir()
-            return FileIO(self.path, 'xb')
-        except FileExistsError:
-            raise RecordingError(f'{self.folder} already exists; choose another name') from None
-        except OSError as error:
-            raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
 
     @contextmanager
     def _guarded(self) -> Iterator[None]:
@@ -214,20 +198,6 @@ class RunWriter:
             self._raw.close()
             raise RecordingError(self._failure) from None
 
-    def _finish(self) -> None:
-        self._writer.flush()
-        self._write_metadata_record()
-        self._writer.finish()
-        self._stream.flush()
-        os.fsync(self._stream.fileno())
-        self._stream.close()
-        temporary = self.folder / 'metadata.yaml.tmp'
-        with temporary.open('w') as stream:
-            stream.write(_yaml({'rosbag2_bagfile_information': self._information()}))
-            stream.flush()
-            os.fsync(stream.fileno())
-        temporary.rename(self.folder / 'metadata.yaml')
-
     def _write_metadata_record(self) -> None:
         self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._information())})
 
@@ -238,31 +208,24 @@ class RunWriter:
             'duration': {'nanoseconds': duration_ns},
             'message_count': self.message_count,
         }
+        topics = [
+            {
+                'topic_metadata': {
+                    'name': name, 'type': topic.type, 'serialization_format': 'cdr',
+                    'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
+                    'type_description_hash': topic.definition.type_hash,
+                },
+                'message_count': self.counts[name],
+            }
+            for name, topic in self._topics.items()
+        ]  # fmt: skip
         return {
-            'version': METADATA_VERSION,
-            'storage_identifier': 'mcap',
-            **times,
-            'topics_with_message_count': [self._topic_entry(name) for name in self._topics],
-            'compression_format': '',
-            'compression_mode': '',
+            'version': METADATA_VERSION, 'storage_identifier': 'mcap', **times,
+            'topics_with_message_count': topics, 'compression_format': '', 'compression_mode': '',
             'relative_file_paths': [self.path.name],
             'files': [{'path': self.path.name, **times}],
-            'custom_data': self.custom_data,
-            'ros_distro': self.ros_distro,
-        }
-
-    def _topic_entry(self, name: str) -> dict:
-        topic = self._topics[name]
-        return {
-            'topic_metadata': {
-                'name': name,
-                'type': topic.type,
-                'serialization_format': 'cdr',
-                'offered_qos_profiles': dump_qos_v9(list(topic.qos)),
-                'type_description_hash': topic.definition.type_hash,
-            },
-            'message_count': self.counts[name],
-        }
+            'custom_data': self.custom_data, 'ros_distro': self.ros_distro,
+        }  # fmt: skip
 
 
 def _yaml(value: object) -> str:

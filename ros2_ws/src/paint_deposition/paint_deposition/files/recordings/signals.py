@@ -20,10 +20,8 @@ STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
 class Signal:
     """What is meant by ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
 
-    Attributes:
-        topic: its name. path: to the field, '' for a message that has one field, ``data``.
-        below: whether it is on below the level and not above it.
-        level: beyond which it is on.
+    ``path`` is '' for a message that has one field, ``data``; ``level`` is that beyond which, or
+    ``below`` which, it is on.
     """
 
     topic: str
@@ -33,11 +31,7 @@ class Signal:
 
     @staticmethod
     def of(text: str) -> Signal | None:
-        """The signal that a text names, None if it names none.
-
-        Raises:
-            RecordingError: the level is no number.
-        """
+        """The signal that a text names, None if it names none; a wrong level is refused."""
         said = SYNTAX.fullmatch(text.strip())
         if said is None:
             return None
@@ -49,17 +43,12 @@ class Signal:
             ) from None
         return Signal(said['topic'], said['path'], said['side'] == '<', level)
 
-    @property
-    def steps(self) -> list[tuple[str, str]]:
-        """(name, '') or ('', index) of each step of the path."""
-        return STEP.findall(self.path)
-
     def value(self, message: Any) -> float | None:
         """The number in a message, None where there is none."""
         value = message
         # The messages of std_msgs have one field.
         try:
-            for name, index in self.steps or [('data', '')]:
+            for name, index in STEP.findall(self.path) or [('data', '')]:
                 value = getattr(value, name) if name else value[int(index)]
         except (AttributeError, IndexError, TypeError):
             return None

@@ -1,14 +1,10 @@
-"""The frames of a recording, from its transforms: /tf_static, part_pose, and /tf over time.
-
-networkx finds the way from one frame to another; the interpolation over time and the products
-along the way are pytransform3d's.
-"""
+"""The frames of a recording, from its transforms: /tf_static, part_pose, and /tf over time."""
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -46,14 +42,15 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     topics = [topic.name for topic in bag.topics_of(*TF_TYPES)]
     topics = [name for name in topics if (name.rsplit('/', 1)[-1] == STATIC) == static]
     placed = part_pose_topics(bag) if static else []
-    rows: dict[tuple[str, str], list[tuple]] = {}
-    parts: dict[tuple[str, str], list[tuple]] = {}
+    rows: dict[tuple[str, str], list[tuple]] = defaultdict(list)
+    parts: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     for names, found in ((topics, rows), (placed, parts)):
         for _, log_time_ns, message in bag.decoded(names) if names else ():
             for transform in message.transforms if found is rows else [message]:
                 pair = transform.header.frame_id.lstrip('/'), transform.child_frame_id.lstrip('/')
-                row = (stamp_ns(transform.header), log_time_ns, _numbers(transform.transform))
-                found.setdefault(pair, []).append(row)
+                t, q = transform.transform.translation, transform.transform.rotation
+                pose = t.x, t.y, t.z, q.x, q.y, q.z, q.w
+                found[pair].append((stamp_ns(transform.header), log_time_ns, pose))
     for (parent, child), placings in parts.items():
         if len({pose for *_, pose in placings}) > 1:
             raise RecordingError(
@@ -65,15 +62,18 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     return [_edge(*pair, its[last]) for pair, its in (parts | rows).items()]
 
 
-def _numbers(transform: Any) -> tuple[float, ...]:
-    t, q = transform.translation, transform.rotation
-    return t.x, t.y, t.z, q.x, q.y, q.z, q.w
-
-
 def _edge(parent: str, child: str, rows: list[tuple]) -> Edge:
     stamps, log_times, poses = map(np.array, zip(*rows, strict=True))
     _, first = np.unique(stamps, return_index=True)  # in order, each stamp once
     return Edge(parent, child, stamps[first], log_times[first], poses[first].astype(float))
+
+
+def _pairs(graph: nx.Graph, begin: str, end: str) -> list[tuple[str, str]]:
+    """The steps from one frame to another, none where they are not connected."""
+    try:
+        return list(nx.utils.pairwise(nx.shortest_path(graph, begin, end)))
+    except (nx.NodeNotFound, nx.NetworkXNoPath):
+        return []
 
 
 @dataclass(frozen=True)
@@ -93,13 +93,11 @@ class _Way:
             for edge in _edges(bag, static=not moves):
                 graph.add_edge(edge.parent, edge.child, edge=edge, moves=moves)
         source, target = source.lstrip('/'), target.lstrip('/')
-        connected = source in graph and target in graph and nx.has_path(graph, source, target)
-        if not connected:
+        steps = [graph.edges[pair] for pair in _pairs(graph, source, target)]
+        if not steps:
             return None, sorted(graph)
-        pairs = nx.utils.pairwise(nx.shortest_path(graph, source, target))
-        steps = [graph.edges[pair] for pair in pairs]
-        edges = [step['edge'] for step in steps]
-        return _Way(source, target, edges, [s['edge'] for s in steps if s['moves']]), sorted(graph)
+        edges, moving = ([s['edge'] for s in steps if s['moves'] or not m] for m in (False, True))
+        return _Way(source, target, edges, moving), sorted(graph)
 
     def poses(self, stamps_ns: np.ndarray) -> np.ndarray:
         """Poses (N, 7) of the source in the target at these times, x y z qx qy qz qw."""
@@ -115,33 +113,30 @@ class _Way:
         for edge in self.edges:
             # It takes the scalar of a quaternion first.
             scalar_first = edge.poses[:, [0, 1, 2, 6, 3, 4, 5]]
+            moved = StaticTransform(transform_from_pq(scalar_first[0]))
             if len(edge.stamps_ns) > 1:
                 times_s = (edge.stamps_ns - stamps_ns[0]) * 1e-9
                 moved = NumpyTimeseriesTransform(times_s, scalar_first, time_clipping=True)
-                frames.add_transform(edge.child, edge.parent, moved)
-            else:
-                still = StaticTransform(transform_from_pq(scalar_first[0]))
-                frames.add_transform(edge.child, edge.parent, still)
+            frames.add_transform(edge.child, edge.parent, moved)
         times_s = (stamps_ns - stamps_ns[0]) * 1e-9
         found = frames.get_transform_at_time(self.source, self.target, times_s)
         return pqs_from_transforms(found)[:, [0, 1, 2, 4, 5, 6, 3]]
 
 
+def _covered(moving: list[Edge], stamps_ns: np.ndarray) -> np.ndarray:
+    """Whether all that moves is known at these times (N,)."""
+    known = np.ones(len(stamps_ns), dtype=bool)
+    for edge in moving:
+        known &= (stamps_ns >= edge.stamps_ns[0]) & (stamps_ns <= edge.stamps_ns[-1])
+    return known
+
+
 def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.ndarray]:
-    """The motion of one frame in another, from the transforms of a bag.
+    """The motion of ``source``, the TCP, in ``target``, and when its poses were logged (N,) [ns].
 
-    Between the transforms of the way that come most often the others are interpolated.
-
-    Args:
-        bag: open.
-        target: the frame in which the poses are. source: the frame of the TCP.
-
-    Returns:
-        The motion while all transforms of the way are known, and the times (N,) int64 at which
-        its poses were logged [ns].
-
-    Raises:
-        RecordingError: a frame is not there, they are not connected, or do not move.
+    It lasts while all transforms of the way are known; between those that come most often the
+    others are interpolated. Raises RecordingError for frames that are not there, not connected, or
+    do not move.
     """
     target, source = target.lstrip('/'), source.lstrip('/')
     way, frames = _Way.in_bag(bag, source, target)
@@ -153,10 +148,9 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         raise RecordingError(f"{bag.path}: no transforms lead from '{source}' to '{target}'")
     if not way.moving or max(len(edge.stamps_ns) for edge in way.moving) < 2:
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
-    begin = max(edge.stamps_ns[0] for edge in way.moving if len(edge.stamps_ns) > 1)
-    end = min(edge.stamps_ns[-1] for edge in way.moving if len(edge.stamps_ns) > 1)
     clock = max(way.moving, key=lambda edge: len(edge.stamps_ns))
-    known = (clock.stamps_ns >= begin) & (clock.stamps_ns <= end)
+    moving = [edge for edge in way.moving if len(edge.stamps_ns) > 1]
+    known = _covered(moving, clock.stamps_ns)
     stamps = clock.stamps_ns[known]
     if len(stamps) < 2:
         raise RecordingError(
@@ -165,7 +159,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
     poses = way.poses(stamps)
     note = f"tf: pose of '{source}' in '{target}', {len(stamps)} poses"
     if more := len(way.moving) - 1:
-        longest_s = max(_longest_s(edge, stamps) for edge in way.moving)
+        longest_s = max(np.diff(edge.stamps_ns).max(initial=0) for edge in way.moving) * 1e-9
         note += f', {more} more transforms interpolated over up to {longest_s:.3g} s'
     trajectory = Trajectory(stamps, poses[:, :3], poses[:, 3:], target, notes=(note,))
     return trajectory, clock.log_times_ns[known]
@@ -174,27 +168,15 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
 def poses_over_time(
     bag: Bag, frame: str, parent: str, stamps_ns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """A frame in another one that it moves in, from the transforms of a bag.
+    """Which of these times (N,) the transforms of a frame in another cover, and its poses (M, 7).
 
-    Returns:
-        Which of these times (N,) the transforms cover, and the poses (M, 7) at those, x y z qx qy
-        qz qw; None where the frames are not connected.
+    None where the frames are not connected.
     """
     way, _ = _Way.in_bag(bag, frame, parent)
     if way is None:
         return None
-    known = np.ones(len(stamps_ns), dtype=bool)
-    for edge in way.moving:
-        known &= (stamps_ns >= edge.stamps_ns[0]) & (stamps_ns <= edge.stamps_ns[-1])
+    known = _covered(way.moving, stamps_ns)
     return known, way.poses(stamps_ns[known]) if known.any() else np.empty((0, 7))
-
-
-def _longest_s(edge: Edge, stamps: np.ndarray) -> float:
-    """The longest time between two transforms around one of these times [s]."""
-    if len(edge.stamps_ns) < 2:
-        return 0.0
-    after = np.clip(np.searchsorted(edge.stamps_ns, stamps), 1, len(edge.stamps_ns) - 1)
-    return float((edge.stamps_ns[after] - edge.stamps_ns[after - 1]).max()) * 1e-9
 
 
 class StaticFrames:
@@ -221,14 +203,11 @@ class StaticFrames:
 
     def pose_of(self, frame: str, parent: str) -> Rigid | None:
         """The pose of a frame in another, None where they are not connected."""
-        try:
-            way = nx.shortest_path(self._graph, parent.lstrip('/'), frame.lstrip('/'))
-        except (nx.NodeNotFound, nx.NetworkXNoPath):
-            return None
-        found = Rigid.of([0, 0, 0, 0, 0, 0, 1])
-        for here, there in nx.utils.pairwise(way):
+        found = None
+        for here, there in _pairs(self._graph, parent.lstrip('/'), frame.lstrip('/')):
             edge = self._graph.edges[here, there]
-            found = found @ (edge['place'] if edge['child'] == there else edge['place'].inverse())
+            step = edge['place'] if edge['child'] == there else edge['place'].inverse()
+            found = found @ step if found else Rigid.of([0, 0, 0, 0, 0, 0, 1]) @ step
         return found
 
     def words(self, frame_id: str) -> str:

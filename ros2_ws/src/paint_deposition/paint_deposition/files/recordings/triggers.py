@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -27,11 +28,11 @@ class Switching:
     """How the gun was switched.
 
     Attributes:
-        stamps_ns: (M,) int64 times at which the flow changes; flow: (M,) from then on.
-        brush: (M,) int64 number of the brush from then on; empty where it is not recorded.
+        stamps_ns: (M,) int64 times of the changes, those of the log where ``by_log_time``.
+        flow: (M,) from then on.
+        brush: (M,) int64 from then on; empty where it is not recorded.
         set_points: (M, 4) as those of a trajectory; empty where none are recorded.
         settings: median of each setting in the states.
-        by_log_time: whether the times are those at which messages were logged.
         notes: what was understood, a line each.
     """
 
@@ -64,46 +65,33 @@ def unused_triggers(bag: Bag) -> tuple[str, ...]:
 
 
 def read_switching(bag: Bag, name: str) -> Switching:
-    """How a topic, or a field of its messages, switched the gun.
+    """How a topic of AtomizerState (header stamps) or Bool (log times) switched the gun.
 
-    Args:
-        bag: open.
-        name: a topic of AtomizerState or Bool; or topic, field and, where it is not 0, the level
-            beyond which the gun is on: ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``.
-
-    Raises:
-        RecordingError: there is no such topic or field, or it is no switch.
+    Or a field of other messages and, where it is not 0, the level beyond which the gun is on:
+    ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``. Raises RecordingError where there is
+    no such topic or field, or it is no switch.
     """
     signal = Signal.of(name)
     topic = bag.find(signal.topic) if signal else None
     if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
         return _states(bag, choose_state_topic(bag, name))
-    rows = list(_values(bag, topic, signal))
-    if not rows:
-        raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
-    stamps, values, stamped = (np.array(column) for column in zip(*rows, strict=True))
-    known = np.isfinite(values)
-    order = np.argsort(stamps[known], kind='stable')
-    stamps, values = stamps[known][order], values[known][order]
-    on = signal.is_on(values)
-    side = 'below' if signal.below else 'above'
-    low, high = (values.min(), values.max()) if len(values) else (np.nan, np.nan)
+    rows = sorted(_values(bag, topic, signal), key=lambda row: row[0])
+    known = [row for row in rows if math.isfinite(row[1])]
+    if not known:
+        raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
+    stamps, values, _ = map(np.array, zip(*known, strict=True))
     note = (
-        f'trigger {topic.name}{signal.path} is {low:.4g} to {high:.4g}: the gun is on where it '
-        f'is {side} {signal.level:g}'
+        f'trigger {topic.name}{signal.path} is {values.min():.4g} to {values.max():.4g}: the gun '
+        f'is on where it is {"below" if signal.below else "above"} {signal.level:g}'
     )
-    if not known.all():
-        note += f'; {np.count_nonzero(~known)} values that are no number are left out'
-    return Switching(
-        stamps, on.astype(float), numbered([]), by_log_time=not stamped.all(), notes=(note,)
-    )
+    if left_out := len(rows) - len(known):
+        note += f'; {left_out} values that are no number are left out'
+    on, by_log = signal.is_on(values), not all(stamped for *_, stamped in rows)
+    return Switching(stamps, on.astype(float), numbered([]), by_log_time=by_log, notes=(note,))
 
 
 def _states(bag: Bag, topic: BagTopic) -> Switching:
-    """Times, flows and brushes of all changes of AtomizerState or Bool.
-
-    States recorded before they had a brush are of the only one.
-    """
+    """Changes of AtomizerState or Bool; a state without a brush is of the only one."""
     changes: list[tuple[int, float, int, tuple[float, ...]]] = []
     settings: dict[str, list[float]] = {}
     without_flow = 0

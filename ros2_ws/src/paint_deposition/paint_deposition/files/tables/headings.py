@@ -21,7 +21,7 @@ UNIT_NAMES = {1.0: 'm', 1e-2: 'cm', 1e-3: 'mm', 1e-6: 'µm', 25.4e-6: 'mil', 25.
 
 @dataclass(frozen=True)
 class Heading:
-    """A heading as it is written, its words without the unit, and the unit ('' for none)."""
+    """A heading as written, its words without the unit, and the unit ('' for none)."""
 
     text: str
     words: tuple[str, ...]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from pathlib import Path
 
@@ -31,20 +31,15 @@ ROTATED = {
 }
 
 
-@dataclass(frozen=True)
-class PoseTable:
+@dataclass
+class PoseTable(Table):
     """A table whose columns are found by their names, see ``column_name``."""
 
-    table: Table
-    names: list[str]
+    names: list[str] = field(default_factory=list)
 
     @staticmethod
     def read(path: Path) -> PoseTable:
-        """Find the headings and the rows below them.
-
-        Raises:
-            RecordingError: the file cannot be read, or holds no rows.
-        """
+        """Find the headings and the rows below them; without them the file is refused."""
         sheet, header = find_table(path, RecordingError, _known)
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
@@ -52,24 +47,19 @@ class PoseTable:
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first})'
             )
         headings = headings_in(sheet.rows[header])
-        table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError)
+        names = [column_name(heading) for heading in headings]
         below = range(header + 1, len(sheet.rows))
-        table = table.select([k for k in below if not is_comment(sheet.rows[k])])
+        table = PoseTable(
+            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
+        ).select([k for k in below if not is_comment(sheet.rows[k])])
         if not len(table):
-            raise RecordingError(f'{path}: no poses below the row of headings')
+            raise table.error('no poses below the row of headings')
         if not sheet.form.startswith('commas'):
             table, _ = table.with_decimal(range(len(headings)))
-        return PoseTable(table, [column_name(heading) for heading in headings])
-
-    def __len__(self) -> int:
-        return len(self.table)
+        return table
 
     def find(self, *names: str) -> int | None:
-        """The column that is called by the first of these names that occurs.
-
-        Raises:
-            RecordingError: two columns are called so.
-        """
+        """The column called by the first of these names that occurs; two of a name are refused."""
         for name in names:
             found = [column for column, its in enumerate(self.names) if its == name]
             if len(found) > 1:
@@ -85,20 +75,12 @@ class PoseTable:
 
     def units(self, columns: Sequence[int]) -> set[str]:
         """The units of columns, '' for one without."""
-        return {self.table.headings[column].unit for column in columns}
+        return {self.headings[column].unit for column in columns}
 
-    def written(self, columns: Sequence[int]) -> str:
-        """Headings as the file has them; of all columns where none are given."""
-        return self.table.written(columns or range(len(self.names)))
-
-    def numbers(self, columns: Sequence[int]) -> np.ndarray:
-        """The values (N, C) of columns.
-
-        Raises:
-            RecordingError: every cell that is no number, with its line, up to a few.
-        """
-        read = [self.table.numbers(column, finite=False, switch=True) for column in columns]
-        self.table.refuse_complaints()
+    def values(self, columns: Sequence[int]) -> np.ndarray:
+        """The numbers (N, C) of columns; cells that are none are refused with their lines."""
+        read = [self.numbers(column, finite=False, switch=True) for column in columns]
+        self.refuse_complaints()
         return np.stack(read, axis=1)
 
     def stamps_ns(self, column: int) -> tuple[np.ndarray, str]:
@@ -108,7 +90,7 @@ class PoseTable:
         if (unit or 's') not in TIMES:
             raise RecordingError(f"{written}: '{unit}' is no unit of time")
         scale = TIMES[unit or 's']
-        times = self.numbers([column])[:, 0]
+        times = self.values([column])[:, 0]
         if not np.isfinite(times).all():
             raise RecordingError(f'{written} has a time that is not finite')
         # Written out, a time of a few letters may have a thousand million digits.
@@ -118,7 +100,7 @@ class PoseTable:
                 f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
             )
         try:
-            cells = [text.replace(',', '.') for text in self.table.texts(column)]
+            cells = [text.replace(',', '.') for text in self.texts(column)]
             stamps = [round(Decimal(cell) * round(scale * 1e9)) for cell in cells]
         except InvalidOperation:
             raise RecordingError(f'{written} has a word for a number; give numbers') from None

@@ -32,10 +32,8 @@ FRAME = ('frame', 'frameid')
 class PoseLayout:
     """What the user says of a table of poses; None is found or has its usual value.
 
-    Attributes:
-        trigger: heading of the column that opens the gun.
-        pose_unit, angle_unit: for headings without a unit.
-        rotation: see ``ROTATION_WORDS``.
+    ``trigger`` is the heading of the column that opens the gun, ``rotation`` one of
+    ROTATION_WORDS; the units are for headings without.
     """
 
     trigger: str | None = None
@@ -53,10 +51,7 @@ def read_pose_table(path: Path, layout: PoseLayout) -> Trajectory:
     """The motion in a table, with what was understood as a note.
 
     A table with times holds poses as recorded; one with speeds, passes as programmed, such as
-    ``passes.csv``.
-
-    Raises:
-        RecordingError: naming the file, the column and the remedy.
+    ``passes.csv``. Raises RecordingError naming the file, the column and the remedy.
     """
     table = PoseTable.read(path)
     try:
@@ -92,9 +87,9 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     (unit,) = table.units([speed])
     if (unit or 'm/s') not in SPEEDS:
         raise RecordingError(f"{table.written([speed])}: '{unit}' is no unit of speed")
-    speeds = table.numbers([speed])[:, 0] * SPEEDS[unit or 'm/s']
+    speeds = table.values([speed])[:, 0] * SPEEDS[unit or 'm/s']
     spraying = np.ones(len(speeds)) if flows is None else flows
-    columns = (speeds.tolist(), spraying.tolist(), table.table.lines, brushes.tolist())
+    columns = (speeds.tolist(), spraying.tolist(), table.lines, brushes.tolist())
     moves = [
         Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0, brush=brush)
         for position, quaternion, speed, flow, line, brush in zip(
@@ -112,7 +107,7 @@ def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
         found = ', '.join(sorted(unit or 'no unit' for unit in units))
         raise RecordingError(f'{table.written(columns)} in {found}; give all in m or in mm')
     unit = units.pop() or given or ''
-    positions = table.numbers(columns) * LENGTHS[unit or 'm']
+    positions = table.values(columns) * LENGTHS[unit or 'm']
     largest = float(np.nanmax(np.abs(positions), initial=0.0))
     if not unit and largest > LARGEST_CELL_M:
         raise RecordingError(
@@ -124,7 +119,7 @@ def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
 
 def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     """Flow (N,) from each row on, relative to the calibrated one, and how it was read."""
-    texts = [heading.text for heading in table.table.headings]
+    texts = [heading.text for heading in table.headings]
     if name is None:
         trigger, flow = table.find(*TRIGGER), table.find(*FLOW)
     elif name.strip() in texts:
@@ -139,7 +134,7 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
             'same; divide by it and drop the unit'
         )
     used = [column for column in (trigger, flow) if column is not None]
-    values = table.numbers(used)
+    values = table.values(used)
     on = np.nan_to_num(values[:, 0]) != 0.0
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
@@ -151,11 +146,11 @@ def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
     column = table.find(*BRUSH)
     if column is None:
         return np.full(len(table), ONLY_BRUSH, np.int64), ''
-    values, written = table.numbers([column])[:, 0], table.written([column])
+    values, written = table.values([column])[:, 0], table.written([column])
     strange = np.flatnonzero(~((values >= 0) & (values <= MOST) & (values == np.round(values))))
     if len(strange):
         raise RecordingError(
-            f'line {table.table.lines[strange[0]]}: {written} is {values[strange[0]]:g}; give the '
+            f'line {table.lines[strange[0]]}: {written} is {values[strange[0]]:g}; give the '
             'number of a brush, 0 for the only one'
         )
     return values.astype(np.int64), f', brush by {written}'
@@ -164,7 +159,7 @@ def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
 def _frame_id(table: PoseTable) -> str:
     """The frame that a column names, '' if there is none; several are refused."""
     column = table.find(*FRAME)
-    names = set() if column is None else {*table.table.texts(column)}
+    names = set() if column is None else {*table.texts(column)}
     if len(names) > 1:
         raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
     return ''.join(names).lstrip('/')

@@ -53,8 +53,7 @@ class Layout:
     Attributes:
         columns: heading, or number from 1, of a quantity's column.
         unit: metres in the unit of 'position' and of 'thickness'.
-        decimal: '.' or ',', or '' where it is to be found.
-        sheet: name of a workbook's sheet, or ''.
+        decimal: '.' or ','. sheet: name of a workbook's sheet.
     """
 
     columns: Mapping[Any, str | int] = field(default_factory=dict)

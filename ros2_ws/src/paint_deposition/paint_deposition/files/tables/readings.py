@@ -10,28 +10,12 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.tables import reading_columns as known_columns
+from paint_deposition.files.tables import table as cells_of
 from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
-from paint_deposition.files.tables.reading_columns import (
-    ALIASES,
-    AXES,
-    FILM_UNITS,
-    LENGTH_UNITS,
-    NORMALS,
-    ON_FACE,
-    Layout,
-    columns_of,
-    has_place,
-    not_found,
-)
+from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
 from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.table import (
-    Table,
-    find_table,
-    headings_in,
-    is_comment,
-    is_nothing,
-    is_value,
-)
+from paint_deposition.files.tables.table import Table, is_nothing, is_value
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
@@ -46,9 +30,7 @@ class ReadingTable:
     """Rows of readings or points, apart from all that stands around them.
 
     Attributes:
-        table: their cells.
         at: columns of each quantity; several of the thickness where each row holds repeats.
-        layout: what the user said of it.
         order: number of each row from 1, those without a reading counted.
         film_unit_m: metres in the unit of the thickness where a line above or a column has it.
         left_out: what was not taken for a row, for the user.
@@ -65,32 +47,26 @@ class ReadingTable:
     def read(
         path: Path, films: bool, layout: Layout, labels: Collection[str] = ()
     ) -> ReadingTable:
-        """Find the table in a file.
+        """Find the table of readings (``films``) or places in a file.
 
-        Args:
-            path: of a text file or workbook.
-            films: whether it holds readings, not only places.
-            layout: what the user says of it.
-            labels: of the listed points: a row with one of them is no statistic.
-
-        Raises:
-            ReadingsError: no such table; its lines are complained of later, all at once.
+        A row with one of ``labels``, those of the listed points, is no statistic. Raises
+        ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
         numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
 
         def known(headings: list[Heading]) -> int:
-            at = columns_of(headings, layout)
-            return len(at) if ('thickness' in at if films else has_place(at)) else 0
+            at = known_columns.columns_of(headings, layout)
+            return len(at) if ('thickness' in at if films else known_columns.has_place(at)) else 0
 
-        sheet, header = find_table(path, ReadingsError, known, layout.sheet)
+        sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet)
         first = 0 if numbered or header is None else header + 1
-        headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
+        headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        at = columns_of(headings, layout)
+        at = known_columns.columns_of(headings, layout)
         if header is None and not (numbered and known(headings)):
-            raise ReadingsError(f'{path}: {not_found(sheet, films, layout)}')
-        rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
+            raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')
+        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
         _refuse_rivals(table, at)
@@ -128,16 +104,12 @@ class ReadingTable:
         return self.table.numbers(self.at[quantity][0], may_be_empty=may_be_empty)
 
     def lengths_m(self, quantities: Sequence[str]) -> tuple[np.ndarray, str]:
-        """Columns of lengths (N, len(quantities)) [m], and their unit in words.
-
-        Raises:
-            ReadingsError: their units differ, or are none of a position.
-        """
+        """Columns of lengths (N, len(quantities)) [m], and their one unit in words."""
         values = np.column_stack([self.numbers(quantity) for quantity in quantities])
         given = self.layout.unit.get('position')
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
         units = {given} if given else {heading.unit_m for heading in headings}
-        if len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
+        if len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
             found = ' and '.join(UNIT_NAMES[unit] if unit else 'no unit' for unit in units)
             raise self.table.error(
                 f'{", ".join(quantities)} are in {found}; give all in one of m, mm, cm, inch'
@@ -192,13 +164,13 @@ def _unit_beside(
     if 'unit' in at:
         texts = sorted({text for text in table.texts(at['unit'][0]) if text})
         units = {length_of(text) for text in texts}
-        if len(units) > 1 or not units <= {*FILM_UNITS}:
+        if len(units) > 1 or not units <= {*known_columns.FILM_UNITS}:
             found = ', '.join(map(repr, texts))
             raise table.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
         return next(iter(units), None)
     for row in sheet.rows[:header]:
         cells = [part for cell in row for part in text_of(cell).split(':') if part]
-        if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
+        if len(cells) > 1 and ' '.join(words_of(cells[0])) in known_columns.ALIASES['unit']:
             return length_of(cells[1])
     return None
 

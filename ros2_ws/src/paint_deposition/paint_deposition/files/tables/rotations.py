@@ -9,13 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.tables import pose_columns
 from paint_deposition.files.tables.headings import ANGLES
-from paint_deposition.files.tables.pose_columns import (
-    QUATERNION,
-    ROLL_PITCH_YAW,
-    ROTATION_VECTOR,
-    PoseTable,
-)
+from paint_deposition.files.tables.pose_columns import QUATERNION, PoseTable
 
 ABB_QUATERNION = ('q2', 'q3', 'q4', 'q1')  # the scalar is the first one, q1
 EULER = ('ex', 'ey', 'ez')
@@ -48,24 +44,20 @@ def read_rotations(
 ) -> tuple[np.ndarray, str]:
     """Quaternions (N, 4), scalar last, and how they were read.
 
-    Args:
-        table: of poses.
-        rotation: what three numbers of an orientation are, or None; see ``ROTATION_WORDS``.
-        angle_unit: 'deg' or 'rad' for headings without a unit, or None.
-
-    Raises:
-        RecordingError: there is no orientation, or it can be read in two ways.
+    ``rotation`` says what three numbers of an orientation are, see ROTATION_WORDS; ``angle_unit``
+    is 'deg' or 'rad' for headings without. Raises RecordingError without an orientation, or with
+    one that can be read in two ways.
     """
     if rotation is None:
         for names in (QUATERNION, ABB_QUATERNION):
             if columns := table.find_all(names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
                 said = f'quaternion {table.written(columns)} ({order})'
-                return table.numbers(columns), said
+                return table.values(columns), said
     columns, by_axis, convention = _angle_columns(table, rotation)
     written = table.written(columns)
     unit = _unit(table, columns, convention, angle_unit)
-    angles = table.numbers(columns) * ANGLES[unit]
+    angles = table.values(columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
     if unit == 'rad' and largest > LARGEST_RAD:
         raise RecordingError(
@@ -84,14 +76,14 @@ def read_rotations(
 
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
-    if columns := table.find_all(ROTATION_VECTOR):
+    if columns := table.find_all(pose_columns.ROTATION_VECTOR):
         if rotation is None and table.units(columns) & {'deg', '°'}:
             raise RecordingError(
                 f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
                 f'give --rotation: {ROTATION_WORDS}'
             )
         return columns, True, rotation or ROTVEC
-    if columns := table.find_all(ROLL_PITCH_YAW):
+    if columns := table.find_all(pose_columns.ROLL_PITCH_YAW):
         return columns, True, rotation or 'rpy'
     for names, usual in IN_ORDER.items():
         if columns := table.find_all(names):

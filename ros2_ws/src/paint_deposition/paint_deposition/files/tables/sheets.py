@@ -28,12 +28,10 @@ EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls
 
 @dataclass(frozen=True)
 class Sheet:
-    """Rows of cells, before anything is known of their meaning; blank rows are left out.
+    """Rows of cells before anything is known of their meaning, without the blank ones.
 
-    Attributes:
-        rows: of cells.
-        lines: of the file or sheet that each row stands in, from 1.
-        form: how the cells were found, for the user: 'semicolons, cp1252'.
+    ``lines`` are those of the file, from 1; ``form`` says how the cells were found, for the user:
+    'semicolons, cp1252'.
     """
 
     rows: list[list[Cell]]
@@ -50,8 +48,7 @@ class Sheet:
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     """The sheets of a workbook, or a text once for each separator that is in it and by blanks.
 
-    Raises:
-        PaintError: of the class given; the file is neither text nor workbook.
+    A file that is neither raises ``refusal``.
     """
     try:
         content = path.read_bytes()
@@ -111,13 +108,11 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
     try:
         _refuse_far_cells(content)
         workbook = CalamineWorkbook.from_filelike(BytesIO(content))
-        return [
-            Sheet.of(
-                enumerate(([_cell(value) for value in row] for row in sheet.to_python(False)), 1),
-                f"sheet '{sheet.name}'",
-            )
-            for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names)
-        ]
+        sheets = []
+        for sheet in map(workbook.get_sheet_by_name, workbook.sheet_names):
+            rows = ([_cell(value) for value in row] for row in sheet.to_python(False))
+            sheets.append(Sheet.of(enumerate(rows, 1), f"sheet '{sheet.name}'"))
+        return sheets
     except (CalamineError, zipfile.BadZipFile, zlib.error, RuntimeError, OSError) as error:
         raise ValueError(f'a workbook ({error})') from None
 

@@ -6,6 +6,7 @@ import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -22,19 +23,16 @@ NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:i
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|none|null', re.IGNORECASE)
+Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
 
 
 @dataclass
 class Table:
-    """Headings and the rows under them; comments and blank rows are left out.
+    """Headings and the rows of cells under them, without comments and blank rows.
 
-    Attributes:
-        path: of the file. form: how it was understood, for the user.
-        headings: of all columns.
-        rows: of cells. lines: of the file that each row stands in.
-        refusal: the class of the errors.
-        decimal: the decimal mark of its numbers, '.' or ','.
+    ``form`` says how it was understood, for the user; ``lines`` are those of the file that the
+    rows stand in; ``refusal`` is the class of its errors; ``decimal`` the mark of its numbers.
     """
 
     path: Path
@@ -58,11 +56,8 @@ class Table:
     ) -> np.ndarray:
         """A column (N,) as written; what is no number is complained of.
 
-        Args:
-            column: its index.
-            may_be_empty: whether blank cells give nan without a complaint.
-            finite: whether nan and inf are complained of.
-            switch: whether on, off, yes, no, true and false are numbers too.
+        Blank cells may give nan without a complaint, nan and inf may be taken (not ``finite``),
+        and with ``switch`` on, off, yes, no, true and false are numbers too.
         """
         values = np.full(len(self), np.nan)
         name = self.headings[column].text or f'column {column + 1}'
@@ -92,8 +87,8 @@ class Table:
         return float(text) if NUMBER.fullmatch(text) else None
 
     def written(self, columns: Sequence[int]) -> str:
-        """Headings as the file has them."""
-        return ' '.join(self.headings[column].text for column in columns)
+        """Headings as the file has them; of all columns where none are given."""
+        return ' '.join(self.headings[k].text for k in columns or range(len(self.headings)))
 
     def complain(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
@@ -104,31 +99,25 @@ class Table:
         return self.refusal(f'{self.path}: {text}')
 
     def refuse_complaints(self) -> None:
-        """Refuse the file if anything is wrong in its lines.
-
-        Raises:
-            PaintError: with every complaint and its line, up to a number.
-        """
+        """Refuse the file with all that is wrong in its lines, up to a number."""
         if not self._complaints:
             return
         lines = [f'line {line}: {text}' for line, text in sorted(self._complaints.items())]
-        more = len(lines) - MOST_COMPLAINTS_SHOWN
-        rest = f'; and {more} more' if more > 0 else ''
         count = f'{len(lines)} complaints: ' if len(lines) > 1 else ''
-        raise self.error(f'{count}{"; ".join(lines[:MOST_COMPLAINTS_SHOWN])}{rest}')
+        if (more := len(lines) - MOST_COMPLAINTS_SHOWN) > 0:
+            lines[MOST_COMPLAINTS_SHOWN:] = [f'and {more} more']
+        raise self.error(count + '; '.join(lines))
 
-    def select(self, rows: Sequence[int]) -> Table:
+    def select(self: Kind, rows: Sequence[int]) -> Kind:
         """The chosen rows (indices); complaints are shared."""
         return replace(
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
 
-    def with_decimal(self, columns: Iterable[int], given: str = '') -> tuple[Table, str]:
+    def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
 
-        Args:
-            columns: of numbers.
-            given: the mark, if the user gives it.
+        ``given`` is the mark where the user says it.
         """
         seen: dict[str, str] = {}
         only_in_doubt = True
@@ -154,21 +143,13 @@ class Table:
 
 
 def find_table(
-    path: Path,
-    refusal: type[PaintError],
-    known: Callable[[list[Heading]], int],
-    sheet: str = '',
+    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = ''
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
-    Args:
-        path: of a text file or workbook.
-        refusal: the class of the errors.
-        known: how many quantities a row of headings names, 0 where a needed one is missing.
-        sheet: name of a workbook's sheet, or ''.
-
-    Raises:
-        PaintError: the file cannot be read, or several sheets of a workbook hold a table.
+    ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
+    ``sheet`` names a workbook's sheet. Raises ``refusal`` for a file that cannot be read, or with
+    tables in several sheets.
     """
     sheets = read_sheets(path, refusal)
     if sheet:
@@ -179,11 +160,9 @@ def find_table(
         sheets = named
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
-        ranks = [
-            (known(headings_in(row)), not is_comment(row)) for row in one.rows[:MOST_LINES_ABOVE]
-        ]
-        best = max(ranks, default=(0, False))
-        if best[0]:
+        above = one.rows[:MOST_LINES_ABOVE]
+        ranks = [(known(headings_in(row)), not is_comment(row)) for row in above]
+        if (best := max(ranks, default=(0, False)))[0]:
             found.append((one, ranks.index(best)))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
